@@ -12,15 +12,13 @@ install: .venv/.installed
 install-dev: .venv/.installed-dev
 
 # The build tools come first and from the same pins: pip would otherwise fetch whatever is newest for its isolated build.
-# MKL's wheels hold 0.5 GB that PARDISO does without; _slim removes it.
 .venv/.installed: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finger3d needs Python 3.11 or newer; none found (set PYTHON=/path/to/python3)"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "$(PYTHON) has no venv module: apt install python3-venv"; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@echo "installing finger3d and its packages into .venv (once; some minutes, 2.5 GB)"
+	@echo "installing finger3d and its packages into .venv (once; some minutes, 3 GB)"
 	@$(PIP) hatchling editables
 	@$(PIP) --no-build-isolation --editable '.[full]'
-	@$(BIN)/python -m finger3d._slim
 	@$(BIN)/python -c 'import OCP.gp' 2>/dev/null || { echo "build123d cannot be loaded; it needs libGL and libX11: apt install libgl1"; exit 1; }
 	@touch $@
 

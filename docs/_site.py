@@ -17,6 +17,7 @@ from typing import Any
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 from sphinx import addnodes
+from sphinx.transforms import SphinxTransform
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -204,6 +205,18 @@ class MathML:
         """Write a displayed formula."""
         writer.body.append(f'<div class="math">{latex2mathml.tex2mathml(node.astext(), as_block=True)}</div>')
         raise nodes.SkipNode
+
+
+class FullSizeFigures(SphinxTransform):
+    """Figures of validation/ are wider than a page: Sphinx links an image that is scaled to its full size."""
+
+    default_priority = 800  # after parsing
+
+    def apply(self, **kwargs: Any) -> None:
+        """Scale the figures to the width of the page."""
+        for image in self.document.findall(nodes.image):
+            if "validation/figures/" in image["uri"]:
+                image["width"] = "100%"
 
 
 class ProjectLinks(SphinxPostTransform):

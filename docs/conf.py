@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from _site import MathML, ProjectLinks, descriptions_below, digest, write_generated, write_notebooks
+from _site import FullSizeFigures, MathML, ProjectLinks, descriptions_below, digest, write_generated, write_notebooks
 
 import finger3d
 
@@ -61,6 +61,7 @@ def setup(app):
     """Write the generated pages; set formulas as MathML; turn links to files of the project into pages or downloads."""
     app.add_html_math_renderer("mathml", inline_renderers=(MathML.inline, None), block_renderers=(MathML.block, None))
     app.add_post_transform(ProjectLinks)
+    app.add_transform(FullSizeFigures)
     app.connect("autodoc-process-docstring", _prepare, priority=400)  # Napoleon has 500
     write_generated(Path(__file__).parent)
     write_notebooks(Path(__file__).parent / "tutorials")

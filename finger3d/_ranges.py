@@ -65,6 +65,11 @@ def number(value: float, digits: int = 6) -> str:
     return f"{mantissa}e{int(exponent)}" if e else text
 
 
+def four_digits(value: float) -> float:
+    """Return an edge length as a scene keeps it, with four digits."""
+    return float(f"{value:.4g}")
+
+
 def at_least(bound: float, digits: int = 6) -> str:
     """Return a lower bound rounded up, so that the number printed is not below it."""
     return _rounded(bound, digits, math.inf)

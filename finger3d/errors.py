@@ -13,7 +13,7 @@ class Finger3dError(Exception):
 
 
 class MissingError(Finger3dError):
-    """Something required is missing, for instance a package or a converged step. Exit code 3."""
+    """Something required is missing, for instance a package or a converged increment. Exit code 3."""
 
     exit_code = 3
 
@@ -34,8 +34,8 @@ class UnresolvedError(Finger3dError):
 
 
 OUT_OF_MEMORY = (
-    "out of memory; steps that were finished are kept; `finger3d plan` forecasts the memory, a larger mesh.size_mm or "
-    "fewer steps and gauges need less"
+    "out of memory; finished increments are kept; `finger3d plan` forecasts the memory, a larger mesh.size_mm or fewer "
+    "increments and gauges need less"
 )
 """What a user reads when memory runs out. Exit code 3."""
 
@@ -51,11 +51,11 @@ def out_of_memory(error: BaseException) -> bool:
 
 
 class Outcome(Enum):
-    """Outcome of a step. The value of a member is the text that a user reads: what failed, and what to try."""
+    """Outcome of an increment. The value of a member is the text that a user reads: what failed, and what to try."""
 
     CONVERGED = "converged"
     NO_CONVERGENCE = (
-        "contact did not settle to the tolerance; try more steps, a finer mesh, or a smaller friction coefficient"
+        "contact did not settle to the tolerance; try more increments, a finer mesh, or a smaller friction coefficient"
     )
     CYCLED = (
         "the paper's swap rule repeated a state and has no answer for this increment; use [contact] rule = 'projection'"
@@ -69,8 +69,8 @@ class Outcome(Enum):
         "[effects.large_deformation], or press less"
     )
     NEWTON = (
-        "large deformation did not settle; the steps before are good; try more steps or a shallower press, and a "
-        "fillet where a sharp edge of the finger folds over"
+        "large deformation did not settle; the increments before are good; try more increments or a shallower press, "
+        "and a fillet where a sharp edge of the finger folds over"
     )
     FORCE_NOT_REACHED = (
         "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"
@@ -81,15 +81,15 @@ class Outcome(Enum):
     )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     PASSED_THROUGH = (
-        "the object would pass through the finger's surface within an increment, or the surface through it; the steps "
-        "before are good; try more steps, or a finer mesh"
+        "the object would pass through the finger's surface within an increment, or the surface through it; the "
+        "increments before are good; try more increments, or a finer mesh"
     )
     UNRESOLVED = "the object passes between the contact points; try a smaller mesh.size_mm"
     NOT_FINITE = "the compliance or the gap contains NaN or infinity; check the mesh and the material"
 
     @property
     def ok(self) -> bool:
-        """Whether the step may be trusted."""
+        """Whether the increment may be trusted."""
         return self is Outcome.CONVERGED
 
     @property

@@ -1,6 +1,9 @@
-"""Commands of the command line, run in this process."""
+"""Commands of the command line, run in this process, and programs run in a process of their own."""
 
 from __future__ import annotations
+
+import subprocess
+import sys
 
 from finger3d.cli import main
 
@@ -23,6 +26,13 @@ STEP = {
 def run(*arguments: object) -> int:
     """Exit code of one command."""
     return main([str(a) for a in arguments])
+
+
+def loaded(program: str, *modules: str) -> set[str]:
+    """Which of some modules a program has loaded when it ends, in a process of its own."""
+    program += f"\nimport sys; print(); print(*({set(modules)!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120)
+    return set(done.stdout.splitlines()[-1].split())
 
 
 def refused(capsys, *arguments: str) -> str:

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.simplex import CONTACT, Mesh, quadratic
 from finger3d.objects import Plane
 from finger3d.plotting import solid as render
+from finger3d.plotting.deformed import DeformedFinger, draw_fingers
+from finger3d.plotting.layout import save
 from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 from tests.meshes import grid
 
@@ -88,6 +90,25 @@ def pressed(mesh: Mesh) -> dict[str, Any]:
         "status": [STATUS_NAMES[s] for s in status],
     }
     return {"displacement": u, "table": table, "contact_nodes": nodes}
+
+
+def finger_picture(path: Path, mesh: Mesh, displacement: np.ndarray, table: dict[str, Any], contact_nodes: np.ndarray,
+                   thing: np.ndarray | None = None, **more: Any) -> str:  # fmt: skip
+    """Draw the finger, and return the renderer."""
+    step = DeformedFinger(
+        mesh=mesh,
+        displacement=displacement,
+        pressure=table["pressure_MPa"],
+        shear=np.column_stack([table[f"shear_{axis}_MPa"] for axis in "xyz"]),
+        status=np.array([STATUS_NAMES.index(name) for name in table["status"]]),
+        nodes=contact_nodes,
+        faces=np.full(len(contact_nodes), CONTACT),
+        thing=thing,
+        **more,
+    )
+    (figure,), renderer = draw_fingers([step])
+    save(figure, path)
+    return renderer
 
 
 def solid_finger() -> tuple[Mesh, dict[str, Any]]:

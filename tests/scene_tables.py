@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ FINGER = {
     "edge_height_mm": 36.6,
     "width_mm": 20.0,
 }
-
+HEIGHT = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)  # of its crown
 
 SMALL = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.49}, "press": {"depth_mm": 10.0}}
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.cost import AddedCost, forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
@@ -18,6 +18,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
+from finger3d.objects import Plane, Sphere
 from finger3d.scene import load
 from finger3d.scene.registry import effect_names, effect_type
 
@@ -159,3 +160,22 @@ def test_a_mesh_that_needs_no_mesher_is_counted_exactly(domain: Domain) -> None:
     expected, problem = forecast(model), build(model)
     assert expected["contact_points"] == len(problem.surface.nodes)
     assert expected["dofs"] == problem.body.stiffness.upper.shape[0]
+
+
+def test_a_cost_is_told_with_its_reason() -> None:
+    text = str(AddedCost(seconds=12.345, memory_mb=678.9, reason="a mesh of its own"))
+    assert "12 s" in text
+    assert "6.8e+02 MB" in text
+    assert text.endswith("a mesh of its own")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sphere", [True, False])
+def test_an_unstructured_solid_has_the_size_that_was_foretold(sphere: bool) -> None:
+    thing = Sphere(radius_mm=20.0) if sphere else Plane()
+    depth = 3.0 if sphere else 6.0
+    plain = replace(baseline("solid"), legs=(Leg(depth, steps=2),), object=thing)
+    model = replace(plain, mesh=MeshOptions(1.5 if sphere else 2.0, 8.0, "ftetwild"))
+    expected, problem = forecast(model), build(model)
+    assert 0.8 < problem.body.stiffness.upper.shape[0] / expected["dofs"] < 1.25
+    assert 0.6 < len(problem.surface.nodes) / expected["contact_points"] < 1.25

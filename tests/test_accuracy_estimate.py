@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import pyvista
 
+from finger3d._cost import Budget
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import estimate, main_numbers, press_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
@@ -83,8 +84,7 @@ def test_increments_under_a_curved_object_have_bars_however_many_there_are(
 ) -> None:
     # without a budget they are judged with fewer multipliers, at poses that the press itself did not pass
     if not cheap:
-        monkeypatch.setattr("finger3d.accuracy.estimate._STEPS_S", 0.0)
-        monkeypatch.setattr("finger3d.accuracy.estimate._STEPS_SHARE", 0.0)
+        monkeypatch.setattr("finger3d.accuracy.estimate.INCREMENT_ERRORS", Budget(0.0, 0.0))
     model = replace(half_cylinder(0.2, steps=20), object=Cylinder(radius_mm=6.0, axis="z"))
     problem, frames = run(model)
     found, told = estimate(problem, frames, numbers=press_numbers), press_numbers(problem, frames[-1])

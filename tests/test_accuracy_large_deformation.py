@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from finger3d._cost import CHANGES, PressSize
 from finger3d.accuracy import large_deformation as module
-from finger3d.accuracy.changes import budget_s, changing_numbers
+from finger3d.accuracy.changes import changing_numbers
 from finger3d.accuracy.large_deformation import large_deformation
 from finger3d.accuracy.more_increments import more_increments
 from finger3d.contact.friction import Coulomb
@@ -72,7 +73,7 @@ def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.Monke
         (more_increments(filled, step, 2), "kinetic_friction"),
         (more_increments(papers, step, 2), "number of increments"),
         (more_increments(forced, step, 2), "to a force"),
-        (more_increments(problem, step, 10**6), f" {budget_s(problem, 10**6):.2g} s"),
+        (more_increments(problem, step, 10**6), f" {CHANGES.seconds(problem.size.press_s(10**6)):.2g} s"),
     ):
         assert found.changes == {}
         assert why in found.method
@@ -90,9 +91,7 @@ def test_a_body_of_a_million_unknowns_is_judged_from_a_small_one(monkeypatch: py
     mesh = MeshOptions(0.9, 0.9, "swept")
     large = SimpleNamespace(
         model=fig9(mesh=mesh),
-        dim=3,
-        body=SimpleNamespace(stiffness=SimpleNamespace(upper=SimpleNamespace(shape=(1_009_778, 1_009_778)))),
-        surface=SimpleNamespace(nodes=range(600)),
+        size=PressSize(3, 1_009_778, 600),
     )
     pressed: list[Model] = []
 

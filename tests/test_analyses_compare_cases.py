@@ -27,7 +27,7 @@ def scene(tmp_path) -> Path:
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu) -> None:
     model = load(scene, [f"model.domain={domain}", f"material.nu={nu}"]).model()
-    fine = cases.press_without_errors("fine", resized(model, 0.4))
+    fine = press_with_errors("fine", resized(model, 0.4))
     for size in (5.0, 3.0, 2.0):
         coarse = press_with_errors("coarse", resized(model, size))
         for key in (FORCE, "contact_length_mm"):

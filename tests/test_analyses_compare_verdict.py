@@ -7,7 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from finger3d.analyses.compare.verdict import Deviation, crossing_width, deviation, force_deviation, rounded, verdict
+from finger3d.analyses.compare.verdict import (
+    Deviation,
+    crossing_width,
+    deviation,
+    force_deviation,
+    numbers_table,
+    rounded,
+    verdict,
+)
 from finger3d.errors import Outcome
 from finger3d.results.comparison import FORCE, Case
 from tests.comparison_cases import case
@@ -80,6 +88,15 @@ def test_an_object_that_twists_has_a_moment_that_no_section_has() -> None:
         told = " ".join(verdict([case("plane strain", 20.0, 10.0), solid], 20.0, 50.0, turns))
         assert ("torsion" in told) == turns
         assert ("solid 3.25" in told) == turns
+
+
+def test_the_numbers_of_the_models_are_a_table() -> None:
+    cases = [case("plane strain", 20.0, 15.0, 0.2, gauge_g=0.01), case("solid", 20.0, 10.0, 0.1, gauge_g=0.02)]
+    head, force, *others = numbers_table([*cases, case("solid", 99.0, 1.0)], 20.0)
+    assert head == ["", "solid", "plane strain"]
+    assert force == ["force (N per mm of width)", "10.00 ± 0.10", "15.00 ± 0.20"]
+    assert ["strain of gauge g", "0.02", "0.01"] in others
+    assert numbers_table(cases, 50.0) == []
 
 
 def test_without_a_solid_there_is_no_verdict() -> None:

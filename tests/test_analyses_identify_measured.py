@@ -29,7 +29,6 @@ def scene_file(tmp_path: Path) -> Path:
         ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force": .*"normal_force_N"'),
         ("depth_mm,force_N\n1,2\n2,3\n", 'column "force_N": did you mean "normal_force_N"[?]'),
         ("depth_mm,iterations\n1,2\n2,3\n", 'column "iterations": it is none of'),
-        ("depth_mm;gauge_a\n1;2\n2;3\n", "semicolons"),
         ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,1e-160\n", "line 3: gauge_a_std = 1e-160: must be from 1e-12"),
         ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" .*"gauge_a"'),
         ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", '"gauge_a"'),

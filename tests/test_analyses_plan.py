@@ -18,7 +18,6 @@ def test_a_plan_forecasts_size_time_and_memory(tmp_path: Path) -> None:
 
 
 def test_a_plan_tells_the_size_of_a_file_as_it_lies(tmp_path: Path) -> None:
-    """The same box drawn with z up would read 30 x 12 x 16 mm."""
     from tests.bodies import box, write_stl
 
     stl = write_stl(tmp_path / "box.stl", box(30.0, 16.0, 12.0, (7.0, -3.0, 2.0)))
@@ -27,4 +26,9 @@ def test_a_plan_tells_the_size_of_a_file_as_it_lies(tmp_path: Path) -> None:
         f'[finger]\ngeometry = "{stl}"\n[material]\nE_MPa = 1.0\nnu = 0.3\n[press]\ndepth_mm = 0.5\n', encoding="utf-8"
     )
     found = finger3d.plan(scene).forecast["finger"]
-    assert found == "30 x 16 x 12 mm (x, y up, z), base 30 x 12 mm"
+    assert found == "30 x 16 x 12 mm (x, y up, z), base 30 x 12 mm; unit of the file: mm, as STL files have none"
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text.replace("[finger]\n", '[finger]\nup = "z"\n'), encoding="utf-8")
+    lying = finger3d.plan(scene).forecast["finger"]
+    assert lying.startswith("30 x 12 x 16 mm (x, y up, z), base 30 x 16 mm; ")
+    assert lying.endswith(", its z turned up")

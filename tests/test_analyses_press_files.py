@@ -189,7 +189,7 @@ def test_an_interrupted_press_counts_no_step_of_an_earlier_one(tmp_path, monkeyp
     monkeypatch.setattr("finger3d.mechanics.solve.march", interrupted)
     capsys.readouterr()
     assert main(words) == 130
-    assert "no step was finished" in capsys.readouterr().err
+    assert "no increment was finished" in capsys.readouterr().err
     assert contents(out) == before
 
 

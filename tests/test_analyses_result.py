@@ -53,7 +53,7 @@ def test_fields_of_the_end_and_of_every_kept_step(solid: PressResult) -> None:
     # the top comes down with the plane: 1/4 of 0.5 mm, up to the weighting of the gap over a facet, h^2 / 8 R, twice
     top = np.argmax(end.points[:, 1])
     assert first["displacement"][top, 1] == pytest.approx(-0.125, abs=2 * 0.5**2 / (8 * 5.0))
-    with pytest.raises(Finger3dError, match="step 9 .* 1, 2, 3, 4"):
+    with pytest.raises(Finger3dError, match="increment 9 .* 1, 2, 3, 4"):
         solid.to_pyvista(step=9)
     with pytest.raises(Finger3dError, match=r"fields\.vtu"):
         grid(solid.out / "nothing")
@@ -90,7 +90,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     shown = {
         "Scene": scene,
         "Calibration": Calibration((ReadingCurve("<g>", mu, 0.01 * mu, 1e-4),), 0.1),
-        "Comparison": Comparison((good, failed), ("2D would do",), tmp_path),
+        "Comparison": Comparison((good, failed), ("2D would do",), (), tmp_path),
         "ReducedModel": finger3d.ReducedModel.of(build(scene.model())),
         "History": solid.history,
         "Mesh": build(scene.model()).mesh,

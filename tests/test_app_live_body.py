@@ -44,19 +44,30 @@ def test_force_and_strain_are_those_of_the_scene(body: LiveBody) -> None:
     for mu in (0.1, 0.3):
         force, strain = pressed(mu)
         assert body.press(mu, 0.6).numbers["normal_force_N"] == pytest.approx(force, rel=1e-3)  # flat: normals are -y
-        assert body.read(gauge, mu, 0.6, 0.0).strain == pytest.approx(strain, rel=1e-9)
+        assert body.read(gauge, mu, 0.6, 1e-3).strain == pytest.approx(strain, rel=1e-9)
 
 
-def test_the_standard_deviation_of_mu_is_that_of_the_strain_over_its_slope(body: LiveBody) -> None:
+def test_the_standard_deviation_of_mu_is_that_of_a_calibration(body: LiveBody) -> None:
     found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), 0.3, 0.6, 1e-3)
     low, high = (pressed(0.3 + step)[1] for step in (-MU_STEP, MU_STEP))
-    assert found.slope == pytest.approx((high - low) / (2.0 * MU_STEP), rel=1e-6)
+    assert found.slope == pytest.approx((high - low) / (2.0 * MU_STEP), rel=0.01)  # almost straight
     moved = [
-        pressed(0.3, **{key: GAUGE[key] + TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
+        [
+            pressed(0.3, **{key: GAUGE[key] + sign * TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
+            for sign in (1.0, -1.0)
+        ]
         for key in ("x_mm", "y_mm", "angle_deg")
     ]
-    assert found.strain_sd == pytest.approx(math.hypot(1e-3, *moved), rel=1e-6)
+    spread = [math.sqrt(0.5 * (up**2 + down**2)) for up, down in moved]
+    assert found.strain_sd == pytest.approx(math.hypot(1e-3, *spread), rel=1e-3)  # with the error of the curve
     assert found.mu_sd == pytest.approx(found.strain_sd / abs(found.slope))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.005])
+def test_a_reading_at_small_friction_needs_no_negative_one(mu: float, body: LiveBody) -> None:
+    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), mu, 0.6, 1e-3)
+    assert found.strain == pytest.approx(pressed(mu)[1], rel=1e-9)
+    assert 0.0 < found.mu_sd < math.inf
 
 
 def test_traction_obeys_coulomb_along_the_middle_line(body: LiveBody) -> None:
@@ -80,12 +91,12 @@ def test_the_page_opens_with_the_numbers_of_the_press(steps: int | str) -> None:
     assert body.largest_depth_mm == own.last.depth_mm
     assert body.press(0.3, body.largest_depth_mm).numbers["normal_force_N"] == own.last.normal_force_N
     (gauge,) = body.problem.model.gauges
-    assert body.read(gauge, 0.3, 0.6, 0.0).strain == pytest.approx(own.last.gauges["g"], rel=1e-9)
+    assert body.read(gauge, 0.3, 0.6, 1e-3).strain == pytest.approx(own.last.gauges["g"], rel=1e-9)
 
 
 def test_a_gauge_outside_the_finger_is_refused(body: LiveBody) -> None:
     with pytest.raises(Finger3dError):
-        body.read(Gauge("g", 4.9, 4.9), 0.3, 0.6, 0.0)
+        body.read(Gauge("g", 4.9, 4.9), 0.3, 0.6, 1e-3)
 
 
 @pytest.mark.parametrize("effect", ["large_deformation", "viscosity"])

@@ -105,12 +105,11 @@ def test_meshes_that_are_no_body(name: str, role: str, tmp_path: Path, capsys: A
 
 @pytest.fixture(scope="module")
 def no_solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A STEP file with a face, and one with two solids."""
-    from build123d import Box, Compound, Face, Pos, export_step
+    """A STEP file with a face."""
+    from build123d import Face, export_step
 
     folder = tmp_path_factory.mktemp("step")
     assert export_step(Face.make_rect(5, 5), folder / "face.step")
-    assert export_step(Compound([Box(5, 5, 5), Pos(10, 0, 0) * Box(5, 5, 5)]), folder / "two.step")
     return folder
 
 
@@ -119,16 +118,12 @@ def no_solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("name", "content", "text"),
     [
         ("a.stl", b"hello", "STL"),
-        ("a.stl", b"", "STL"),
         ("a.stl", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "STL"),
-        ("a.stl", b"\0" * 80 + (2**31).to_bytes(4, "little"), "STL"),
         ("a.step", b"hello", "STEP"),
-        ("a.step", b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n", "STEP|solid"),
         ("face.step", None, "solid"),
-        ("two.step", None, "2 solids"),
         ("none.stl", None, "none.stl"),
     ],
-    ids=["text", "empty", "a picture", "header only", "text step", "empty step", "face", "two", "absent"],
+    ids=["text", "a picture", "text step", "face", "absent"],
 )
 def test_files_that_hold_no_body(
     role: str, name: str, content: bytes | None, text: str, no_solid: Path, tmp_path: Path, capsys: Any

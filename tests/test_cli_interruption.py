@@ -85,7 +85,7 @@ def test_ctrl_c_while_the_steps_are_written(root: Path, tmp_path: Path) -> None:
     running.send_signal(signal.SIGINT)
     printed, _ = running.communicate(timeout=60)
     judge(subprocess.CompletedProcess([], running.returncode, "", printed), out)
-    assert "of 3000 steps" in printed
+    assert "of 3000 increments" in printed
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["steps"]
 
 

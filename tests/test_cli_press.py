@@ -43,10 +43,11 @@ def test_press_without_figures(scene, tmp_path, fake_press) -> None:
 def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = Outcome.NO_CONVERGENCE
     assert run("press", scene, "--out", tmp_path / "out") == 3
-    err = capsys.readouterr().err
+    out, err = capsys.readouterr()
+    assert "5 mm, step 1 " in out  # the numbers of the step that converged
     assert len(err.splitlines()) == 1
     assert str(Outcome.NO_CONVERGENCE) in err
-    assert "1 of 2 steps" in err
+    assert "1 of 2 increments" in err
 
 
 def test_press_that_misses_something_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
@@ -60,7 +61,7 @@ def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_pat
     assert run("press", scene, "--out", tmp_path / "out") == 130
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
-    assert "2 of 2 steps" in err
+    assert "2 of 2 increments" in err
     assert str(tmp_path / "out") in err
 
 
@@ -106,4 +107,4 @@ def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsy
     assert run("press", scene, "--out", tmp_path / "out", "--json") == 3
     out, err = capsys.readouterr()
     assert json.loads(out)["outcome"] == str(Outcome.NO_CONVERGENCE)
-    assert "1 of 2 steps" in err
+    assert "1 of 2 increments" in err

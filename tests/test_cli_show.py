@@ -62,7 +62,7 @@ def test_a_solid_with_and_without_opengl(
         (["whole"], 3, "--png FILE"),
         (["whole", "--step", "1"], 2, "--step"),
         (["whole", "--png", "a.jpg"], 2, ".png"),
-        (["whole", "--png", "a.png", "--step", "9"], 2, "step 9 "),
+        (["whole", "--png", "a.png", "--step", "9"], 2, "increment 9 "),
         (["swept"], 2, "--png"),
         (["swept", "--png", "a.png", "--step", "1"], 2, "--png"),
         (["swept", "--png", "a.jpg"], 2, ".png"),

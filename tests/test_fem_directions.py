@@ -1,12 +1,13 @@
-"""Directions of contact points."""
+"""Directions of contact points, and compliances along them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from finger3d.fem.directions import bases_of
+from finger3d.fem.directions import bases_of, rotated_delassus
 from finger3d.objects import vertical_frame
+from tests.contact_cases import random_compliance
 
 
 def unit_vectors(dim: int) -> np.ndarray:
@@ -30,3 +31,19 @@ def test_a_basis_is_turned_about_the_axis_across_both_normals() -> None:
     rotation = np.swapaxes(vertical_frame(3).T @ bases_of(normal), 1, 2)
     axis = np.cross([0.0, -1.0, 0.0], normal)
     assert np.allclose(np.einsum("cij,cj->ci", rotation, axis), axis, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_turned_compliance_is_that_of_turned_vectors(dim: int) -> None:
+    rng = np.random.default_rng(0)
+    compliance = random_compliance(rng, 5, dim)
+    turn = np.linalg.qr(rng.normal(size=(5, dim, dim)))[0]
+    force = rng.normal(size=(5, dim))
+    plain = np.einsum("idjk,jk->id", compliance, np.einsum("cki,ck->ci", turn, force))
+    assert np.einsum("idjk,jk->id", rotated_delassus(compliance, turn), force) == pytest.approx(
+        np.einsum("cik,ck->ci", turn, plain), rel=1e-10
+    )
+    assert rotated_delassus(compliance, np.tile(np.eye(dim), (5, 1, 1))) is compliance
+    some = np.array([3, 0])
+    of_some = rotated_delassus(compliance, turn[some], some)
+    assert of_some == pytest.approx(rotated_delassus(compliance, turn)[np.ix_(some, range(dim), some, range(dim))])

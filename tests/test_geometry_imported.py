@@ -84,6 +84,47 @@ def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
         imported(step_with_base(tmp_path / "round.step", SMALL.solid(), dome))
 
 
+def test_a_body_drawn_with_z_up_is_turned_about_x(tmp_path: Path) -> None:
+    from build123d import Axis, Rot
+
+    upright = imported(step_of(tmp_path / "y.step", SMALL.solid()))
+    lying = Rot(90.0, 0.0, 0.0) * SMALL.solid()
+    path = step_of(tmp_path / "z.step", lying)
+    body = imported(path, up="z")
+    np.testing.assert_allclose(body.surface.high, upright.surface.high, atol=1e-9)
+    np.testing.assert_allclose(
+        body.top(np.array([3.0]), np.zeros(1)), SMALL.top(np.array([3.0]), np.zeros(1)), atol=3e-3
+    )
+    assert body.mirrors() == BOTH
+    assert body.solid().bounding_box().max.Y == pytest.approx(SMALL.height_mm, abs=1e-9)
+    assert body != imported(path)
+    where = (options(1.0, 2.0), (-1.0, 1.0, -1.0, 1.0), ())
+    assert cache.key(body, *where) != cache.key(imported(path), *where)
+    # a face named base agrees with it
+    based = imported(step_with_base(tmp_path / "base.step", lying, lying.faces().sort_by(Axis.Z)[0]), up="z")
+    np.testing.assert_allclose(based.surface.high, body.surface.high, atol=1e-9)
+
+
+def test_z_up_turns_y_to_minus_z_as_a_rotation_does(tmp_path: Path) -> None:
+    drawn = box(30.0, 12.0, 16.0)
+    drawn = replace(drawn, points=drawn.points * np.where(drawn.points[:, [1]] < 0.0, [0.5, 1.0, 1.0], 1.0))
+    body = imported(write_stl(tmp_path / "wedge.stl", drawn), up="z")
+    assert body.extent.startswith("30 x 16 x 12 mm (x, y up, z), base 30 x 12 mm; unit of the file: mm, as STL ")
+    assert body.extent.endswith(", its z turned up")
+    narrow = body.surface.points[:, 2] > 0.0  # y < 0 in the file
+    assert np.abs(body.surface.points[narrow, 0]).max() == pytest.approx(7.5)
+    assert body.volume_mm3 == pytest.approx(0.75 * 30.0 * 12.0 * 16.0)
+
+
+def test_the_unit_of_a_step_file_is_told(tmp_path: Path) -> None:
+    path = step_of(tmp_path / "finger.step", SMALL.solid())
+    assert imported(path).unit == "mm, as it says"
+    path.write_text(path.read_text(encoding="utf-8").replace(".MILLI.,.METRE.", ".CENTI.,.METRE."), encoding="utf-8")
+    body = imported(path)
+    assert body.unit == "cm, as it says"
+    assert body.extent.startswith("200 x 76.79 x 80 mm (x, y up, z), base 200 x 80 mm; ")
+
+
 def options(size: float, base: float) -> Any:
     return MeshOptions(size, base, "ftetwild")
 

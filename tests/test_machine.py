@@ -14,7 +14,7 @@ import pytest
 
 import finger3d
 from finger3d import _machine
-from finger3d._machine import PACKAGES, child_environment, cores, memory_bytes, versions
+from finger3d._machine import PACKAGES, child_environment, cores, environment_bytes, memory_bytes, versions
 
 
 def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None:
@@ -22,6 +22,14 @@ def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None
     assert found["python"] == platform.python_version()
     assert found["numpy"] == metadata.version("numpy")
     assert set(found) <= {"python", *PACKAGES}
+
+
+def test_a_file_with_two_names_counts_once(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"x" * 100_000)
+    one = environment_bytes(tmp_path)
+    assert 100_000 <= one < 200_000
+    os.link(tmp_path / "a", tmp_path / "b")
+    assert environment_bytes(tmp_path) == one
 
 
 def test_changing_the_answer_changes_no_later_one() -> None:

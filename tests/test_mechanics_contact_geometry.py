@@ -57,7 +57,7 @@ def test_an_object_as_soft_as_the_finger_meets_it_half_way() -> None:
     face, tilt = top(2), 0.2
     normal = np.array([np.sin(tilt), -np.cos(tilt)])
     made = contact_geometry(
-        lambda at: (at @ normal, np.tile(normal, (len(at), 1))), face, share=np.full(len(face.points), 0.5)
+        lambda at: (at @ normal, np.tile(normal, (len(at), 1))), face, object_share=np.full(len(face.points), 0.5)
     )
     assert np.allclose(made.bases[:, 0], [np.sin(tilt / 2.0), -np.cos(tilt / 2.0)])
 

@@ -6,26 +6,12 @@ import numpy as np
 import pytest
 
 from finger3d.mechanics.build import build
-from finger3d.mechanics.finite_state import contact_of, curvature_of, rotated
+from finger3d.mechanics.finite_state import contact_of, curvature_of
 from finger3d.mechanics.model import MeshOptions
 from finger3d.objects import ObjectPose, Plane
-from tests.contact_cases import random_compliance
 from tests.models import block
 
 COARSE = MeshOptions(1.5, 1.5, "swept")
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_turned_compliance_is_that_of_turned_vectors(dim: int) -> None:
-    rng = np.random.default_rng(0)
-    compliance = random_compliance(rng, 5, dim)
-    turn = np.linalg.qr(rng.normal(size=(5, dim, dim)))[0]
-    force = rng.normal(size=(5, dim))
-    plain = np.einsum("idjk,jk->id", compliance, np.einsum("cki,ck->ci", turn, force))
-    assert np.einsum("idjk,jk->id", rotated(compliance, turn), force) == pytest.approx(
-        np.einsum("cik,ck->ci", turn, plain), rel=1e-10
-    )
-    assert rotated(compliance, np.tile(np.eye(dim), (5, 1, 1))) is compliance
 
 
 def test_the_curvature_of_a_ball_is_one_over_the_distance_from_its_centre() -> None:

@@ -72,12 +72,14 @@ def test_a_force_beyond_the_height_ends_the_press_with_the_largest_that_was_foun
     assert "1e+06 N asked; the largest force is" in last.detail
 
 
-def search_of(force: Callable[[float], float], wanted: float, start: float) -> DepthSearch:
+def search_of(
+    force: Callable[[float], float], wanted: float, start: float, failure: Outcome = Outcome.NEWTON
+) -> DepthSearch:
     """A search in a function of the depth, mm; NaN stands for an increment that fails."""
 
     def trial(depth: float, good: Sequence[Trial]) -> Trial:
         value = force(depth)
-        outcome = Outcome.NEWTON if np.isnan(value) else Outcome.CONVERGED
+        outcome = failure if np.isnan(value) else Outcome.CONVERGED
         return Trial(depth, ContactSolution(REST, outcome, 0.0, 1, "none"), value)
 
     return DepthSearch(trial, wanted, start, 10.0)
@@ -99,6 +101,12 @@ def test_a_trial_that_fails_is_followed_by_one_nearer() -> None:
     assert search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0).run(8.0).solution.outcome is (
         Outcome.NEWTON
     )
+
+
+def test_where_the_papers_rule_has_no_answer_the_other_rule_is_named() -> None:
+    found = search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0, Outcome.CYCLED).run(8.0).solution
+    assert found.outcome is Outcome.FORCE_NOT_REACHED
+    assert found.detail.endswith("at 3 of the depths tried; use [contact] rule = 'projection'")
 
 
 def test_an_object_that_has_passed_through_does_not_hide_the_force() -> None:

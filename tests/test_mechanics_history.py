@@ -92,3 +92,13 @@ def test_an_area_is_uncertain_by_three_eighths_of_a_spacing_all_round() -> None:
     # both ends lie one spacing before the next point of the line
     assert bars["contact_half_length_mm"] == pytest.approx(0.2, rel=1e-12)
     assert bars["stick_half_length_mm"] == pytest.approx(0.3, rel=1e-12)
+
+
+def test_without_contact_the_force_is_0_and_not_minus_0() -> None:
+    points = grid(3, 3)
+    n = len(points.points)
+    state = ContactState(np.full(n, OPEN), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 2)), np.zeros((n, 2)))
+    step = StepResult(
+        ObjectPose(0.1), state, state, (0.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
+    )
+    assert str(measure(points, step)["normal_force_N"]) == "0.0"

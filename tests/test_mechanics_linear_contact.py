@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finger3d.contact.state import ContactState
-from finger3d.fem.directions import bases_of
+from finger3d.fem.directions import bases_of, rotated_delassus
 from finger3d.mechanics.build import build
-from finger3d.mechanics.linear_contact import LinearBody, carried_by_object, transported, turned_delassus
+from finger3d.mechanics.linear_contact import LinearBody, carried_by_object, transported
 from finger3d.mechanics.model import MeshOptions
 from finger3d.objects import Move, ObjectPose, vertical_frame
 from tests.contact_cases import random_compliance
@@ -33,7 +33,7 @@ def test_displacements_follow_forces_along_any_directions(dim: int) -> None:
     # the same compliance, of some points and along their directions
     points = np.array([0, 2, 3])
     rotations = bases[points] @ frame.T
-    own = turned_delassus(delassus, rotations, points)
+    own = rotated_delassus(delassus, rotations, points)
     alone = np.zeros_like(force)
     alone[points] = force[points]
     moved = (body.displacement(alone, bases) - past @ frame)[points]

@@ -95,7 +95,7 @@ def test_what_touches_no_point_is_refused_with_the_size_that_resolves_it(
     assert f"mesh.size_mm = {finer:g}" in str(refused.value)
     resolved = fig9(obj, depth, finer)
     problem = build(resolved)
-    assert overlap_of(problem).share <= 0.1
+    assert overlap_of(problem).ratio <= 0.1
     *_, end = march(problem)
     assert end.outcome.ok
     assert measure(problem.points, end)["normal_force_N"] > 0.0
@@ -142,7 +142,7 @@ def test_what_points_see_well_is_neither_refused_nor_warned_of(
     obj: RigidObject, depth: float, size: float, domain: str
 ) -> None:
     model = fig9(obj, depth, size, domain=domain, legs=(Leg(depth, steps=2), Leg(0.5 * depth, steps=1)))
-    assert overlap_of(build(model)).share < 0.1
+    assert overlap_of(build(model)).ratio < 0.1
     assert not warnings_before_meshing(model, symmetry(model))
 
 
@@ -166,7 +166,7 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
         spacing = np.diff(np.sort(problem.surface.points[:, 0]))[0]
         found = overlap_of(problem)
         assert found.depth_mm == pytest.approx(spacing**2 / (12.0 * 100.0), rel=0.02)
-        assert found.share == found.depth_mm / 0.5
+        assert found.ratio == found.depth_mm / 0.5
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_the_end_of_a_press_tells_how_deep_the_object_is_between_the_points(fini
         checks = check_surface(problem, [end])
         shares.append(checks[0].penetration_mm / depth)
         # what is hidden at rest, measured vertically, foretells the distance
-        assert shares[-1] == pytest.approx(overlap_of(problem).share, abs=0.08)
+        assert shares[-1] == pytest.approx(overlap_of(problem).ratio, abs=0.08)
         assert len(penetration_warnings(problem, checks)) == (shares[-1] > 0.1)
     assert shares[0] > 0.1 > shares[1]
 
@@ -270,7 +270,7 @@ def test_an_edge_that_cuts_between_points_which_moved_is_told() -> None:
     model = fig9(MeshObject(surface=box(10.0, 5.0, 40.0)), 4.0, 2.5, legs=(Leg(4.0, steps=5),))
     problem = build(Effect().apply(model))
     *_, end = march(problem)
-    assert overlap_of(problem).share < 0.01
+    assert overlap_of(problem).ratio < 0.01
     assert len(penetration_warnings(problem, check_surface(problem, [end]))) == 1
 
 

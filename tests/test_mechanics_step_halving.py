@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d._cost import PressSize
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.contact.rules import RULES
@@ -26,7 +27,10 @@ from tests.models import block, fig9
 
 def test_automatic_increments_end_within_their_estimate() -> None:
     problem = build(fig9(domain="plane-strain", legs=(Leg(10.0, steps="auto"),)))
-    *_, (frames, estimate) = refine(problem)
+    seen: list[tuple[int, int]] = []
+    *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
+    assert seen[:6] == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5), (1, 10)]
+    assert seen[-1] == (len(frames), len(frames))
     assert estimate is not None
     assert estimate.met
     assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01
@@ -121,7 +125,10 @@ def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest()
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])
 def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Domain) -> None:
     model = fig9(domain=domain)
-    found = [limits(model, 1e4 * points, points) for points in (30, 300, 3000)]
+    found = [
+        limits(model, PressSize(2 if domain == "plane-strain" else 3, 1e4 * points, points))
+        for points in (30, 300, 3000)
+    ]
     assert all(first == 5 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
-    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), 1e4, 100) == (3, 12)
+    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (3, 12)

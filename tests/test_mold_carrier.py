@@ -27,7 +27,6 @@ def test_holes_grip_and_are_open_to_the_air() -> None:
             assert math.dist(a, b) >= found.head_mm + 2.0 * OPTIONS.rim_mm - 1e-9
     held = sum(solid.volume for solid in key_solids(found, 0.0, OPTIONS))
     assert held == pytest.approx(found.volume_mm3(OPTIONS.carrier_mm), rel=1e-9)
-    assert found.neck_area_mm2 == pytest.approx(len(found.places) * math.pi * 1.5**2)
 
 
 def test_the_silicone_cannot_be_pulled_out(molds) -> None:
@@ -42,7 +41,8 @@ def test_the_silicone_cannot_be_pulled_out(molds) -> None:
     touching = silicone & carrier
     assert touching is None or sum(s.volume for s in touching.solids()) == pytest.approx(0.0, abs=1e-6)
     lifted = (Pos(0, 1.0, 0) * silicone) & carrier
-    assert sum(s.volume for s in lifted.solids()) > 0.1 * made.keys.neck_area_mm2
+    necks_mm2 = len(made.keys.places) * math.pi * made.keys.neck_mm**2 / 4.0
+    assert sum(s.volume for s in lifted.solids()) > 0.1 * necks_mm2
     # they share the interface: necks and base; the carrier's outer face is the base of both
     assert carrier.bounding_box().min.Y == pytest.approx(0.0, abs=1e-6)
     assert silicone.bounding_box().min.Y == pytest.approx(0.0, abs=1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finger3d.mold.fasteners import band_grooves, bolts, cover_groove_mm, pry_notches, screws
-from finger3d.mold.layout import layout
+from finger3d.mold.layout import layout_of
 from finger3d.mold.options import MoldOptions
 
 LOW, HIGH = np.array([-20.0, 0.0, -10.0]), np.array([20.0, 30.0, 10.0])
@@ -17,7 +17,7 @@ LOW, HIGH = np.array([-20.0, 0.0, -10.0]), np.array([20.0, 30.0, 10.0])
 def test_a_screw_of_standard_length_ends_in_its_nut() -> None:
     """The nut lies as deep as the screw reaches: length plus trap, less the nut, is the thickness of the mold."""
     o = MoldOptions()
-    at = layout(LOW, HIGH, o)
+    at = layout_of(LOW, HIGH, o)
     found = bolts(at, o)
     thick = at.outer_high[2] - at.outer_low[2]
     assert found.length_mm + found.trap_mm - o.screw_sizes.nut_mm == pytest.approx(thick)
@@ -34,7 +34,7 @@ def test_a_screw_of_standard_length_ends_in_its_nut() -> None:
 
 def test_bands_run_around_halves_and_lid() -> None:
     o = MoldOptions(fasten="bands")
-    at = layout(LOW, HIGH, o)
+    at = layout_of(LOW, HIGH, o)
     loops, only_lid = band_grooves(at, o), band_grooves(at, MoldOptions())
     assert len(loops.cut["half_a"]) == len(loops.cut["lid"]) + 8  # two loops of four faces
     assert len(only_lid.cut["half_a"]) == len(only_lid.cut["lid"])
@@ -46,7 +46,7 @@ def test_bands_run_around_halves_and_lid() -> None:
 
 def test_notches_are_open_to_the_parting_faces() -> None:
     o = MoldOptions()
-    at = layout(LOW, HIGH, o)
+    at = layout_of(LOW, HIGH, o)
     found = pry_notches(at, o)
     for notch in found.cut["half_a"]:
         box = notch.bounding_box()

@@ -37,10 +37,10 @@ def test_a_plug_fills_its_pocket_but_for_clearance_and_slit(paper_mold) -> None:
         height = plug.bounding_box().size.Z
         assert plug.volume == pytest.approx((block.prod() - slit) * height, rel=1e-6)
         outside = height - PLUG_MM
-        assert plug.bounding_box().max.Z - paper_mold.at.outer_high[2] == pytest.approx(outside, rel=1e-6)
+        assert plug.bounding_box().max.Z - paper_mold.layout.outer_high[2] == pytest.approx(outside, rel=1e-6)
 
 
 def test_strips_for_the_picture_reach_out_of_the_mold(paper_mold) -> None:
-    found = strips(paper_mold.foils, paper_mold.at, paper_mold.options)
-    assert found.high[2] > paper_mold.at.outer_high[2]
-    assert strips((), paper_mold.at, paper_mold.options) is None
+    found = strips(paper_mold.foils, paper_mold.layout, paper_mold.options)
+    assert found.high[2] > paper_mold.layout.outer_high[2]
+    assert strips((), paper_mold.layout, paper_mold.options) is None

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from finger3d.mold.layout import layout
+from finger3d.mold.layout import layout_of
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.pegs import THIN, carrier_pins, half_pegs, lid_pegs
 from finger3d.mold.solids import LEAD_IN
 
-AT = layout(np.array([-20.0, 0.0, -10.0]), np.array([20.0, 30.0, 10.0]), MoldOptions())
+AT = layout_of(np.array([-20.0, 0.0, -10.0]), np.array([20.0, 30.0, 10.0]), MoldOptions())
 
 
 def test_one_peg_is_thin_and_all_have_a_lead_in() -> None:
@@ -29,8 +29,8 @@ def test_one_peg_is_thin_and_all_have_a_lead_in() -> None:
 def test_pins_reach_through_the_carrier_as_far_as_pegs() -> None:
     o = MoldOptions(carrier=True)
     found = carrier_pins(AT, o)
-    assert len(found.own) == 4
-    for pin in found.own.values():
+    assert len(found.parts) == 4
+    for pin in found.parts.values():
         box = pin.bounding_box()
         assert box.max.Y == pytest.approx(o.peg_mm)
         assert box.min.Y == pytest.approx(-o.carrier_mm - 2.0 * o.rim_mm)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from finger3d.mold.layout import layout
+from finger3d.mold.layout import layout_of
 from finger3d.mold.options import TONGUE_HEIGHT_MM, MoldOptions
 from finger3d.mold.seal import seal
 from tests.bodies import box
@@ -27,7 +27,7 @@ def test_the_cord_lies_in_grooves_around_cavity_and_base() -> None:
     o = MoldOptions(seal="cord")
     width, depth = o.groove_mm
     assert (width, depth) == pytest.approx((2.6, 1.6))
-    found = seal([BODY], layout(BODY.low, BODY.high, o), o)
+    found = seal([BODY], layout_of(BODY.low, BODY.high, o), o)
     at = o.rim_mm + width / 2.0
     upright, flat = 2 * 12.0 + 40.0 + math.pi * at, 2 * (40.0 + 20.0) + 2.0 * math.pi * at
     assert _volume(found.cut["half_b"]) == pytest.approx(flat * width * depth, rel=5e-3)
@@ -37,7 +37,7 @@ def test_the_cord_lies_in_grooves_around_cavity_and_base() -> None:
 
 def test_the_tongue_fits_its_groove_with_the_clearance() -> None:
     o = MoldOptions()
-    found = seal([BODY], layout(BODY.low, BODY.high, o), o)
+    found = seal([BODY], layout_of(BODY.low, BODY.high, o), o)
     for tongue, groove in ((found.add["lid"], found.cut["half_b"]), (found.add["half_b"], found.cut["half_a"][:1])):
         (ridge,), (channel,) = tongue, groove
         assert (ridge - channel).volume == pytest.approx(0.0, abs=1e-6) if (ridge - channel) else True
@@ -51,6 +51,6 @@ def test_the_tongue_fits_its_groove_with_the_clearance() -> None:
 
 def test_nothing_stands_on_a_carrier() -> None:
     o = MoldOptions(carrier=True)
-    found = seal([BODY], layout(BODY.low, BODY.high, o), o)
+    found = seal([BODY], layout_of(BODY.low, BODY.high, o), o)
     assert set(found.add) == {"half_b"}
-    assert seal([BODY], layout(BODY.low, BODY.high, o), MoldOptions(seal="none")).cut == {}
+    assert seal([BODY], layout_of(BODY.low, BODY.high, o), MoldOptions(seal="none")).cut == {}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +11,9 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import contact_figure, finger_picture, force_figure, middle_line, zones
-from tests.pictures import MU, STEPS, finger, pixels, pressed, share, solid_finger
+from finger3d.plotting.figures import contact_figure, force_figure, middle_line, zones
+from tests.commands import loaded
+from tests.pictures import MU, STEPS, finger, finger_picture, pixels, pressed, share, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
@@ -33,12 +32,8 @@ def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:
 
 
 def test_what_draws_loads_neither_the_solver_nor_a_renderer() -> None:
-    code = (
-        "import sys, finger3d.plotting.figures;"
-        "print({'matplotlib', 'vtkmodules', 'scipy', 'finger3d.mechanics'} & set(sys.modules))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
+    heavy = ("matplotlib", "vtkmodules", "scipy", "finger3d.mechanics")
+    assert not loaded("import finger3d.plotting.figures, finger3d.plotting.deformed", *heavy)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -95,9 +90,16 @@ def test_a_huge_mu_does_not_flatten_the_contact_forces(tmp_path: Path) -> None:
 
 
 def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
-    force_figure(tmp_path / "f.png", STEPS, "Fig. 9")
+    force_figure(tmp_path / "f.png", STEPS)
     assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
     assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
+
+
+def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
+    many = [{**STEPS[-1], "depth_mm": 0.01 * k, "friction_sum_N": 0.01 * k} for k in range(320)]
+    force_figure(tmp_path / "many.png", many)
+    force_figure(tmp_path / "few.png", many[::10])
+    assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +111,7 @@ def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
-    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT] + 1
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
     table = {
         "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
         "pressure_MPa": [0.1 * k for k in range(9)],

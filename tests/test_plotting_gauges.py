@@ -9,10 +9,9 @@ import pytest
 
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting import solid
-from finger3d.plotting.figures import finger_picture
 from finger3d.plotting.gauges import COLOUR, marks_of
 from tests.meshes import mapped
-from tests.pictures import finger, pixels, pressed, share
+from tests.pictures import finger, finger_picture, pixels, pressed, share
 
 POINT = Gauge("g36", 36.0, 38.0, 2.5, np.radians(30.0))
 LONG = Gauge("long", -10.0, 30.0, 0.0, 0.0, 12.0)

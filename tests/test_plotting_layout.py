@@ -14,7 +14,7 @@ from finger3d.errors import Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison
-from finger3d.plotting.figures import contact_figure, finger_picture, force_figure
+from finger3d.plotting.figures import contact_figure, force_figure
 from finger3d.plotting.gauges import marks_of
 from finger3d.plotting.layout import DPI, sheet
 from finger3d.plotting.optimise import draw as draw_search
@@ -23,7 +23,7 @@ from finger3d.report.sweep import sweep_charts
 from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case
 from finger3d.sensor.maps import StrainMap
-from tests.pictures import CURVE, MU, MUS, STEPS, finger, pressed
+from tests.pictures import CURVE, MU, MUS, STEPS, finger, finger_picture, pressed
 
 SHOWN = 960  # CSS pixels of the narrowest picture in a page: 60 rem
 LEGIBLE = 7  # CSS pixels of an em: below, lower-case letters have less than four pixels
@@ -119,11 +119,11 @@ def test_a_picture_is_legible_on_a_page_and_its_parts_do_not_overlap(
 
 
 def test_axes_stand_in_equal_cells_below_the_title(tmp_path: Path) -> None:
-    made = sheet(2, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
+    made = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
     box = made.axes[4].get_position()
     assert (box.x0 * 6.0, box.y0 * 2.0) == pytest.approx((2.2, 0.3))
     assert (box.width * 6.0, box.height * 2.0) == pytest.approx((1.7, 0.6))
-    titled = sheet(2, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1), "a title")
+    titled = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1), "a title")
     assert titled.figure.get_figheight() > 2.0
     top = titled.axes[0].get_position()
     assert top.y1 * titled.figure.get_figheight() == pytest.approx(1.9)
@@ -132,6 +132,6 @@ def test_axes_stand_in_equal_cells_below_the_title(tmp_path: Path) -> None:
 def test_a_picture_is_written_at_its_size(tmp_path: Path) -> None:
     from PIL import Image
 
-    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1)).save(tmp_path / "ü.png")
+    sheet(2, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1)).save(tmp_path / "ü.png")
     with Image.open(tmp_path / "ü.png") as image:
         assert image.size == (6 * DPI, 2 * DPI)

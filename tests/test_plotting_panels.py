@@ -22,7 +22,7 @@ def test_a_ball_is_sliced_into_its_equator() -> None:
 
 
 def test_no_pressure_has_the_colour_of_the_body_and_the_highest_the_end_of_the_scale() -> None:
-    none, low, high = pressure_colours(np.array([0.0, 1e-9, 2.0]), 2.0)
+    none, low, high = pressure_colours(np.array([0.0, 1e-9, 2.0]), 2.0, np.array([OPEN, SLIP, STICK]))
     assert none.max() - none.min() < 0.1  # grey
     assert not np.allclose(none, low)
     assert high == pytest.approx([0.993, 0.906, 0.144], abs=1e-3)  # viridis

@@ -11,8 +11,7 @@ import pytest
 from finger3d.errors import MissingError
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import renderer
-from finger3d.plotting.figures import finger_picture
-from tests.pictures import OBJECT, assert_shows_the_zones, solid_finger
+from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES
+from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.simplex import Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import finger_picture
-from tests.pictures import OBJECT, assert_shows_the_zones, solid_finger, top
+from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger, top
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
 
@@ -50,3 +49,21 @@ def test_the_skin_is_the_whole_boundary_and_lies_on_the_curved_surface(solid: tu
     assert 0.4 < area[skin.status == SLIP].sum() / area[touching].sum() < 0.9
     assert 20 < len(skin.arrow) < 150
     assert np.linalg.norm(skin.arrow, axis=1).max() <= 1.0 + 1e-12
+
+
+def test_the_boundary_of_a_status_is_straight_across_a_facet() -> None:
+    """One corner that slips has the triangle between it and the middles of its edges, a quarter of the facet."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    seven = np.vstack([corners, 0.5 * (corners + np.roll(corners, -1, axis=0)), corners.mean(axis=0)])
+    sides = seven[render._SIX]
+    area = 0.5 * np.abs(np.linalg.det(sides[:, 1:] - sides[:, :1]))
+    assert area.sum() == pytest.approx(0.5)
+    for one in range(3):
+        status = np.full(3, STICK)
+        status[one] = SLIP
+        slips = render._status_on_six(status[None])[0] == SLIP
+        assert slips.sum() == 1
+        assert area[slips].sum() == pytest.approx(0.125)
+        assert (sides[slips] == corners[one]).all(axis=2).any()
+    shares = [area[render._status_on_six(np.array([[OPEN, STICK, SLIP]]))[0] == s].sum() for s in (OPEN, STICK, SLIP)]
+    assert shares == pytest.approx([1.0 / 6.0] * 3)

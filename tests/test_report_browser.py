@@ -241,7 +241,7 @@ def test_the_view_turns_and_answers_its_controls(browser: Any, results: dict[str
     assert np.abs(status - pressure).mean() > 1.0
     assert visit.page.locator(".key .zone").first.is_visible()
     visit.page.locator("#view-step").fill("0")
-    assert visit.page.locator("#view-label").inner_text().startswith("step 1: 0.125 mm")
+    assert visit.page.locator("#view-label").inner_text().startswith("increment 1: 0.125 mm")
     assert np.abs(visit.stage() - status).mean() > 0.5
     before = visit.stage()
     box = visit.page.locator("#view-stage").bounding_box()

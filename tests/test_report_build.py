@@ -48,7 +48,7 @@ def test_the_builder_takes_what_calibrate_and_sweep_have(tmp_path: Path) -> None
 
 
 def test_a_picture_stands_in_the_page_with_its_caption(tmp_path: Path) -> None:
-    sheet(1, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "title").save(tmp_path / "two.png")
+    sheet(2, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1), "title").save(tmp_path / "two.png")
     figures = [Figure("two.png", '<left> & "right"'), Figure("none.png", "not shown")]
     page = write_page(tmp_path, "t", figures=figures).read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 1

@@ -17,6 +17,7 @@ def test_a_comparison_tells_its_verdict_and_every_case(tmp_path: Path) -> None:
         "scene": {"title": "<t>", "finger": {"geometry": "block", "width_mm": 20.0}, "effects": {}},
         "outcome": "converged", "versions": {"finger3d": "1"},
         "verdict": ["Plane strain overstates the force by 74 %."],
+        "table": [["", "solid", "plane strain"], ["peak pressure (MPa)", "0.21", "0.34"]],
         "cases": [
             {**case, "model": "solid", "width_mm": 20.0, "numbers": {force: 15.2}, "errors": {force: 0.1}},
             {**case, "model": "plane strain", "width_mm": 20.0, "numbers": {force: 26.4}, "errors": {}},
@@ -32,4 +33,5 @@ def test_a_comparison_tells_its_verdict_and_every_case(tmp_path: Path) -> None:
     assert "solid 15.20 ± 0.10 N/mm" in text
     assert "plane strain 26.4 N/mm" in text
     assert data["verdict"][0] in text
+    assert "peak pressure (MPa) 0.21 0.34" in text
     assert "99 2 1 it failed" in text

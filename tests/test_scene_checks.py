@@ -46,32 +46,3 @@ def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
     with pytest.raises(Finger3dError, match=text) as refused:
         parse(tables)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("thing", "size"),
-    [
-        ({"shape": "plane", "tilt_deg": 0.0}, 0.4),
-        ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 600**0.5),  # sqrt(d (2 R - d)) each way, 600 points
-        ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, 2 * 2.78388 / 30),
-        ({"shape": "cylinder", "radius_mm": 100.0, "axis": "x"}, 4.0 / 12.0),  # as wide as the finger, no end inside
-        (
-            {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
-            4.0 / 12.0,
-        ),  # finer would be more than 600 points
-        ({"shape": "sphere", "radius_mm": 0.4}, 0.2 * 0.4),  # the finest
-    ],
-)
-def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> None:
-    from finger3d.scene import parse
-
-    tables = {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 4.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3},
-        "press": {"depth_mm": 0.5},
-        "object": thing,
-    }
-    wide = thing["shape"] in ("sphere", "plane")
-    tables["finger"]["width_mm"] = 20.0 if wide else 4.0
-    # the overlap is found on a grid of a hundredth of the finger
-    assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)

@@ -50,6 +50,22 @@ def test_paths_are_relative_to_the_scene_and_survive_it(tmp_path: Path, monkeypa
     assert load(elsewhere / "scene.toml") == scene
 
 
+def test_a_finger_with_z_up_stays_so_in_the_scene_as_run(tmp_path: Path) -> None:
+    scene = scene_with_object(write_stl(tmp_path / "plate.stl", box(6.0, 1.0, 6.0)))
+    scene["finger"] = {"geometry": str(write_stl(tmp_path / "finger.stl", box(30.0, 12.0, 16.0)))}
+    lying = parse(scene)
+    scene["finger"]["up"] = "z"
+    upright = parse(scene)
+    assert (lying.design.height_mm, upright.design.height_mm) == (12.0, 16.0)
+    assert upright != lying
+    again = tmp_path / "again.toml"
+    again.write_text(upright.to_toml(), encoding="utf-8")
+    assert load(again) == upright
+    scene["finger"]["up"] = "x"
+    with pytest.raises(Finger3dError, match='finger.up = "x": must be "y" or "z"'):
+        parse(scene)
+
+
 def test_object_scale_changes_the_object(tmp_path: Path) -> None:
     path = write_stl(tmp_path / "inches.stl", box(0.2, 0.1, 0.2))
     obj = parse(scene_with_object(path, scale=25.4)).object

@@ -102,7 +102,7 @@ MISTAKES = {
     "negative mu": ("mu = 0.25", "mu = -0.25", ["friction.mu = -0.25", "from 0 to 1e6"]),
     "number for a text": ('title = "test"', "title = 5", ["title = 5", "text"]),
     "number for a table": ('title = "test"', 'title = "test"\nmodel = 2', ["model = 2", "a table"]),
-    "one gauge in single brackets": ("[[gauge]]", "[gauge]", ["gauge = a table", "brackets"]),
+    "one gauge in single brackets": ("[[gauge]]", "[gauge]", ["gauge = a table", "under double brackets\n"]),
     "mesh larger than the finger": ("size_mm = 2.0", "size_mm = 21.0", ["mesh.size_mm = 21.0", " 20"]),
     "base larger than the finger": (
         "size_mm = 2.0",
@@ -170,7 +170,7 @@ MISTAKES = {
     ),
     "leg that starts at 0": (PRESS, "[[press.leg]]\ndepth_mm = 0.0\n", ["press.leg.0.depth_mm = 0.0", "above 0"]),
     "leg in single brackets": (PRESS, "[press.leg]\ndepth_mm = 1.0\n", ["press.leg = a table", "brackets"]),
-    "no legs": (PRESS, "[press]\nleg = []\n", ["press.leg = []", "not empty"]),
+    "no legs": (PRESS, "[press]\nleg = []\n", ["press.leg = []", "brackets, not empty"]),
     "slide in z of a section": (
         PRESS,
         PRESS + 'slide_z_mm = 1.0\n[model]\ndomain = "plane-strain"\n',

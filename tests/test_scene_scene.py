@@ -15,10 +15,8 @@ from finger3d.fem.material import Isotropic
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Plane
 from finger3d.scene import load, parse
-from tests.scene_tables import FINGER, SMALL
+from tests.scene_tables import HEIGHT, SMALL
 from tests.scenes import written
-
-HEIGHT = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)
 
 
 def test_the_least_scene_is_frictionless_on_a_plane_as_a_solid() -> None:
@@ -76,25 +74,6 @@ def test_the_contract_example_loads_without_its_effects(tmp_path) -> None:
     assert model.gauges[0].angle == pytest.approx(math.pi / 6)
 
 
-@pytest.mark.parametrize(("domain", "share"), [("solid", 1.0), ("plane-strain", 0.25), ("plane-stress", 0.25)])
-def test_absent_mesh_sizes_are_chosen_from_the_height(domain, share) -> None:
-    mesh = parse({**SMALL, "model": {"domain": domain}}).model().mesh
-    assert mesh.size_mm == pytest.approx(share * HEIGHT / 25, rel=1e-3)
-    assert mesh.base_size_mm == pytest.approx(share * HEIGHT / 6.25, rel=1e-3)
-
-
-@pytest.mark.parametrize("given_size", [{"size_mm": 10.0}, {"base_size_mm": 1.0}])
-def test_a_chosen_size_never_contradicts_a_given_one(given_size) -> None:
-    mesh = parse({**SMALL, "mesh": given_size}).model().mesh
-    assert mesh.size_mm <= mesh.base_size_mm
-    assert {k: getattr(mesh, k) for k in given_size} == given_size
-
-
-def test_a_thin_finger_gets_two_elements_across() -> None:
-    thin = parse({**SMALL, "finger": {**FINGER, "width_mm": 1.0}})
-    assert thin.model().mesh.size_mm == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize(
     "finger",
     [
@@ -131,7 +110,7 @@ def test_round_trip(extra, defaults) -> None:
 @given(
     nu=st.floats(0.0, 0.5),
     mu=st.floats(0.0, 1e6),
-    depth=st.floats(1e-2, 49.0),
+    depth=st.floats(1e-2, 38.0),  # deeper tilted ones reach the base, and are refused
     tilt=st.floats(-20.0, 20.0),  # steeper ones touch an edge first, and are refused
     x=st.floats(-50.0, 50.0),
 )

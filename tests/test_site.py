@@ -190,3 +190,10 @@ def test_generated_tables_keep_their_columns(root: Path) -> None:
     table = site["outputs"]().splitlines()
     assert {len(re.findall(r"(?<!\\)\|", line)) for line in table} == {4}  # a bare one would cut a cell
     assert any(r"\|friction\|" in line for line in table)
+
+
+@pytest.mark.browser  # needs the site
+@pytest.mark.timeout(1200)
+def test_a_figure_of_the_gallery_leads_to_its_full_size(site: Path) -> None:
+    gallery = (site / "gallery.html").read_text(encoding="utf-8")
+    assert re.search(r'<a [^>]*href="_images/gear\.png"><img [^>]*src="_images/gear\.png"', gallery)

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
 import pytest
 
-PATH = Path(__file__).parents[1] / "validation" / "_bench.py"
+from validation import _bench as bench
 
 
-@pytest.fixture(scope="module")
-def bench() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("finger3d_bench", PATH)
-    assert spec
-    assert spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_a_child_measures_every_stage(bench: ModuleType) -> None:
+def test_a_child_measures_every_stage() -> None:
     found = bench._child(6.0)
     assert set(found) == {
         "assembly", "condensation", "contact", "contact_all", "dofs", "rows", "peak_MB", "factorisation", "mumps"
@@ -30,14 +16,14 @@ def test_a_child_measures_every_stage(bench: ModuleType) -> None:
     assert found["dofs"] > 10 * found["rows"]
 
 
-def test_ratios_are_of_the_chain_to_the_plain_factorisation(bench: ModuleType) -> None:
+def test_ratios_are_of_the_chain_to_the_plain_factorisation() -> None:
     best = {"assembly": 1.0, "condensation": 11.0, "contact": 2.0, "factorisation": 10.0, "dofs": 1e5, "rows": 9.0}
     chain, assembly = bench._ratios(best)
     assert (chain.got, assembly.got) == pytest.approx((1.4, 0.1))
     assert chain.verdict == "holds"
 
 
-def test_a_busy_machine_is_named_in_every_row(bench: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_busy_machine_is_named_in_every_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "cores", lambda: 2)
     monkeypatch.setattr(bench.os, "getloadavg", lambda: (0.5, 0.5, 0.5))
     assert "BUSY" not in bench._row("anything", 1.0, 3.0).reason

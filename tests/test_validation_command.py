@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from finger3d import cli
 from tests.study_cases import STOPS, write_studies
 from validation import _runner as study
 from validation.__main__ import main
@@ -53,11 +52,6 @@ def test_an_interrupted_command_says_what_is_kept(own_studies: Path, capsys: pyt
     assert len(err.splitlines()) == 1
     assert "1 of 2 studies" in err
     assert str(own_studies) in err
-
-
-def test_the_package_says_where_the_studies_are(capsys: pytest.CaptureFixture) -> None:
-    assert cli.main(["validate", "patch_test"]) == 2
-    assert "python -m validation" in capsys.readouterr().err
 
 
 def test_a_study_of_the_checkout_as_json(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.errors import Finger3dError, MissingError
+import finger3d
+from finger3d.errors import Finger3dError
 from tests.study_cases import BAD, STOPS, write_studies
 from validation import _runner as study
 from validation._runner import chosen, kept_rows, run_studies, studies
 
-PACKAGE = Path(study.__file__).parents[1]
+PACKAGE = Path(finger3d.__file__).parent
 
 
 @pytest.fixture
@@ -151,8 +152,3 @@ def test_a_study_that_times_the_machine_runs_in_full_only_by_name(folder: Path) 
 def test_an_unknown_name_is_answered_with_the_nearest(folder: Path) -> None:
     with pytest.raises(Finger3dError, match=r"'godd'.*'good'.* bad, good$"):
         chosen(["godd"], studies(folder))
-
-
-def test_a_folder_without_studies_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(MissingError, match="from a checkout"):
-        studies(tmp_path)

@@ -14,6 +14,9 @@ from finger3d._types import Tree
 Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
 
+PAPER = "Maeno 2004"
+"""Beginning of the reference of a statement of the paper."""
+
 COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
 """Columns of a results file."""
 
@@ -109,10 +112,16 @@ def table(found: Mapping[str, Sequence[Row]]) -> list[list[str]]:
 
 
 def score(rows: Sequence[Row]) -> str:
-    """Return how many rows pass and how many statements hold."""
+    """Return how many rows pass, how many of the paper's statements hold, and how many others."""
     judged = [row for row in rows if row.kind != "statement"]
     said = [row for row in rows if row.kind == "statement"]
+    by_paper = [row for row in said if row.reference.startswith(PAPER)]
+    others = [row for row in said if not row.reference.startswith(PAPER)]
     parts = [f"{sum(row.passed for row in judged)} of {len(judged)} rows pass"] if judged or not said else []
-    if said:
-        parts.append(f"{sum(row.within for row in said)} of {len(said)} statements hold")
+    if by_paper:
+        parts.append(f"{sum(row.within for row in by_paper)} of the paper's {len(by_paper)} statements hold")
+    if others:
+        parts.append(
+            f"{sum(row.within for row in others)} of {len(others)} {'other ' if by_paper else ''}statements hold"
+        )
     return ", ".join(parts)

@@ -10,16 +10,15 @@ CalculiX is not installed, and in the quick version, the forces are compared wit
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from finger3d.analyses.calculix.deck import Contact
 from finger3d.analyses.calculix.run import program
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
@@ -31,7 +30,6 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 
-from ._ccx import Answer, Pressed
 from ._ccx import run as run_calculix
 from ._rows import Result, Row
 
@@ -115,8 +113,8 @@ def _compared(case: Case, quick: bool, table: dict[str, list[Any]]) -> Iterator[
     force = measure(problem.points, end)["normal_force_N"]
     theirs, source = None, "CalculiX 2.20, same mesh and law, number kept"
     if not quick and program():
-        with tempfile.TemporaryDirectory() as folder:
-            theirs = _calculix(case, problem.mesh, problem.axes, Path(folder))
+        contact = Contact(PENALTY, STICK, case.mu, LABELS[problem.mesh.dim])
+        theirs = run_calculix(case.model(), contact, LIMIT_S)
         source = "CalculiX, same mesh and law, run for this"
     wanted = case.kept if theirs is None else theirs.force
     on_walls = np.count_nonzero(end.state.force[problem.points.face > 0, 0] > 0.0)
@@ -130,13 +128,6 @@ def _compared(case: Case, quick: bool, table: dict[str, list[Any]]) -> Iterator[
     if case.is_timed and theirs:
         what = f"time of CalculiX over finger3d's, {case.what}, {problem.mesh.points.size} displacements"
         yield Row(what, "goal of this project", 30.0, theirs.wall / ours_s, 0.0, "a bound", "statement", "at least")
-
-
-def _calculix(case: Case, mesh: Any, axes: tuple[str, ...], folder: Path) -> Answer:
-    press = Pressed(
-        mesh, 1.0, case.nu, case.mu, case.depth, 10, case.body.width_mm, axes, True, LABELS[mesh.dim], PENALTY, STICK
-    )
-    return run_calculix(press, folder, LIMIT_S)
 
 
 def _draw(figure: Any, table: dict[str, list[Any]]) -> None:

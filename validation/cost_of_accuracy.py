@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import memory_bytes
-from finger3d.scene.checks import BASE_SHARE, SIZE_SHARE
+from finger3d.scene.mesh_sizes import BASE_SHARE, SIZE_SHARE
 
 from ._child import Bench, best_of
 from ._corner import clamped_free, observed

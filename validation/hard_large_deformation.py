@@ -38,7 +38,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
-from finger3d.scene.checks import chosen
+from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
 from ._rows import Result, Row
@@ -124,7 +124,8 @@ def ball(radius_mm: float, depth_mm: float) -> Model:
 def _by_default(model: Model) -> Model:
     """Return a model with the edge lengths of a scene that gives none."""
     table = MeshTable(mesher="swept")
-    return replace(model, mesh=chosen(table, model.design, model.domain, model.object, model.first_contact.contact_box))
+    box = model.first_contact.contact_box
+    return replace(model, mesh=mesh_options(table, model.design, model.domain, model.object, box))
 
 
 def _finger(rng: np.random.Generator, width: float) -> Design:

@@ -195,7 +195,7 @@ def _rows(found: list[Sliding], width: float, size: float) -> list[Row]:
     twist, slide = found[0], found[-1]
     deviation = [math.hypot(*s.pair) - 1.0 for s in found]
     hertz = hertz_mean_distance(twist.normal, width)
-    left = "what is left of the way to the steady state"
+    left = "remaining distance to the steady state"
     return [
         Row(f"F/mu P of a pure slide, {at}", "Coulomb", 1.0, slide.pair[0], 1e-8, "the solver's residual"),
         Row(f"M/M_max of a pure twist, {at}", GOYAL, math.cos(twist.step / 2.0), twist.pair[1], 1e-3,

@@ -68,12 +68,17 @@ def pressed(size_mm: float) -> tuple[float, float, int, float]:
 # %%
 sizes = [1.6, 0.8, 0.4]
 found = {size: pressed(size) for size in sizes}
-fine = finger3d.load("finger.toml", ["mesh.size_mm=0.1", "mesh.base_size_mm=0.4"])
+fine = finger3d.load(
+    "finger.toml", ["mesh.size_mm=0.1", "mesh.base_size_mm=0.4"]
+)
 truth = finger3d.press(fine, figures=False, error=False).last.normal_force_N
-print("edge (mm)  unknowns  force (N)  error bar (N)  true error (N)  seconds")
+print(
+    "edge (mm)  unknowns  force (N)  error bar (N)  true error (N)  seconds"
+)
 for size, (force, bar, dofs, seconds) in found.items():
     print(
-        f"{size:9g} {dofs:9d} {force:10.4f} {bar:14.4f} {abs(force - truth):15.4f} {seconds:8.2f}"
+        f"{size:9g} {dofs:9d} {force:10.4f} {bar:14.4f} "
+        f"{abs(force - truth):15.4f} {seconds:8.2f}"
     )
 
 # %% [markdown]
@@ -84,7 +89,9 @@ for size, (force, bar, dofs, seconds) in found.items():
 # %%
 unknowns = [found[size][2] for size in sizes]
 fig, ax = plt.subplots(figsize=(6, 3.5), layout="constrained")
-ax.loglog(unknowns, [found[size][1] for size in sizes], "s--", label="error bar")
+ax.loglog(
+    unknowns, [found[size][1] for size in sizes], "s--", label="error bar"
+)
 ax.loglog(
     unknowns,
     [abs(found[size][0] - truth) for size in sizes],
@@ -106,7 +113,8 @@ result = finger3d.press(scene, figures=False)
 force, summary = result.last.normal_force_N, result.summary()
 bar = summary["error_estimate"]["discretisation"]["normal_force_N"]
 print(
-    f"{force:.4f} N with {summary['mesh']['dofs']} unknowns; the error bar is {bar / force:.2%} of it"
+    f"{force:.4f} N with {summary['mesh']['dofs']} unknowns; "
+    f"the error bar is {bar / force:.2%} of it"
 )
 
 # %% [markdown]
@@ -115,5 +123,6 @@ print(
 # %%
 forecast = finger3d.plan(fine)
 print(
-    f"{forecast.dofs} unknowns, {forecast.total_s:.1f} s, {forecast.memory_MB:.0f} MB"
+    f"{forecast.dofs} unknowns, {forecast.total_s:.1f} s, "
+    f"{forecast.memory_MB:.0f} MB"
 )

@@ -89,7 +89,9 @@ plt.show()
 
 # %%
 for true in (0.2, 0.3, 0.4):
-    (found,) = finger3d.estimate(calibration, float(g36.at(true)), tolerances=False)
+    (found,) = finger3d.estimate(
+        calibration, float(g36.at(true)), tolerances=False
+    )
     print(found.verdict)
 
 # %% [markdown]

@@ -55,7 +55,8 @@ made = finger3d.export(
     "finger.toml", "out/mold", mold=finger3d.MoldOptions(shrinkage=0.001)
 )
 print(
-    f"{made.silicone_ml:.2f} ml of silicone for a finger of {made.volume_mm3:.0f} mm3"
+    f"{made.silicone_ml:.2f} ml of silicone "
+    f"for a finger of {made.volume_mm3:.0f} mm3"
 )
 print(*sorted(file.name for file in made.files), sep="\n")
 

@@ -58,22 +58,26 @@ shape = "sphere"
 radius_mm = 15.0
 x_mm = 3.0
 """
-_ = Path("ball.toml").write_text(SCENE.format(object=BALL, depth=0.8, more=MESH))
+_ = Path("ball.toml").write_text(
+    SCENE.format(object=BALL, depth=0.8, more=MESH)
+)
 ball = finger3d.press("ball.toml", figures=False, error=False)
 ball
 
 # %% [markdown]
 # The middle of the ball is 3 mm beside the apex of the dome. Contact forces act along the normals of the ball, so
-# that the finger is also pushed towards -x, although the ball moves straight down. The remark is right: lengths need
+# that the finger is also pushed towards -x, although the ball moves straight down. The remark is right: extents need
 # more contact points, hence a smaller `size_mm` and more time. All numbers have their units in their names.
 
 # %%
 last = ball.last
 print(
-    f"pressed down by {last.normal_force_N:.3f} N, sideways by {last.force_x_N:.3f} N"
+    f"pressed down by {last.normal_force_N:.3f} N, "
+    f"sideways by {last.force_x_N:.3f} N"
 )
 print(
-    f"contact area {last.contact_area_mm2:.1f} mm2, of which {last.stick_area_mm2:.1f} mm2 stick"
+    f"contact area {last.contact_area_mm2:.1f} mm2, "
+    f"of which {last.stick_area_mm2:.1f} mm2 stick"
 )
 
 # %% [markdown]
@@ -106,7 +110,9 @@ plt.show()
 # %%
 import build123d as cad
 
-bar = cad.extrude(cad.RegularPolygon(radius=5.0, side_count=6, rotation=30.0), 20.0)
+bar = cad.extrude(
+    cad.RegularPolygon(radius=5.0, side_count=6, rotation=30.0), 20.0
+)
 bar = cad.fillet(bar.edges().filter_by(cad.Axis.Z), 2.0)
 cad.export_stl(cad.Pos(0, 0, -10) * bar, "bar.stl")
 
@@ -122,7 +128,9 @@ domain = "plane-strain"
 size_mm = 0.15
 base_size_mm = 1.0
 """
-_ = Path("bar.toml").write_text(SCENE.format(object=BAR, depth=0.8, more=SECTION))
+_ = Path("bar.toml").write_text(
+    SCENE.format(object=BAR, depth=0.8, more=SECTION)
+)
 on_bar = finger3d.press("bar.toml", figures=False, error=False)
 on_bar.plot_contact()
 
@@ -134,5 +142,6 @@ on_bar.plot_contact()
 
 # %%
 print(
-    f"deepest penetration: {on_bar.last.largest_penetration_mm:.4f} mm of {on_bar.last.depth_mm:g} mm"
+    f"deepest penetration: {on_bar.last.largest_penetration_mm:.4f} mm "
+    f"of {on_bar.last.depth_mm:g} mm"
 )

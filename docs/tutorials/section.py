@@ -57,7 +57,9 @@ base_size_mm = 3.2
 # number has an error bar, and the verdict states by how much the sections are wrong.
 
 # %%
-comparison = finger3d.compare("finger.toml", "out/compare", widths=[4.0, 24.0])
+comparison = finger3d.compare(
+    "finger.toml", "out/compare", widths=[4.0, 24.0]
+)
 comparison
 
 # %% [markdown]
@@ -75,7 +77,9 @@ fig, ax = plt.subplots(figsize=(6, 3.5), layout="constrained")
 ax.plot(*zip(*solids, strict=True), "o-", label="solid")
 for model, style in (("plane strain", "--"), ("plane stress", ":")):
     force = next(
-        c.numbers["force_N_per_mm"] for c in comparison.cases if c.model == model
+        c.numbers["force_N_per_mm"]
+        for c in comparison.cases
+        if c.model == model
     )
     ax.axhline(force, color="grey", linestyle=style, label=model)
 ax.set(

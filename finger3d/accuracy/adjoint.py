@@ -31,9 +31,10 @@ from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
+from finger3d.fem.directions import rotated_delassus
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import transported, turned_delassus
+from finger3d.mechanics.linear_contact import transported
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import vertical_frame
 
@@ -93,7 +94,7 @@ class LinearisedIncrement:
             points, delassus = np.arange(c), problem.delassus
         else:
             points = np.flatnonzero(after.status != OPEN)
-            delassus = turned_delassus(problem.delassus, rotations[points], points)
+            delassus = rotated_delassus(problem.delassus, rotations[points], points)
         k = len(points)
         local = ContactProblem(
             previous=before.of_points(points),

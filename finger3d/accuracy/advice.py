@@ -41,11 +41,11 @@ def advise(
     if not model.finite_strain:
         if large and large.significant:
             said = _changes(large.significant)
-            out.append(f"large deformation would change {said}: [effects.large_deformation] accounts for it")
+            out.append(f"large deformation would change {said}: switch on [effects.large_deformation]")
         elif strain >= _LARGE_STRAIN:
             out.append(
-                f"principal strains reach {strain:.2g}, large for linear elasticity: [effects.large_deformation] "
-                "accounts for it"
+                f"principal strains reach {strain:.2g}, large for linear elasticity: switch on "
+                "[effects.large_deformation]"
             )
     if increments and increments.significant:
         said = _changes(increments.significant)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -15,16 +16,12 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import condensation_s, contact_s
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
 
 _LEAST_CHANGE = 0.01
 """Significant change of a force, relative to it, and of a strain, relative to the largest of all gauges."""
-
-_SHARE, _SECONDS = 0.3, 1.0
-"""Largest modelled cost of an estimate, relative to that of the press and in seconds; the larger limit applies."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +82,24 @@ class ChangeEstimate:
         }
 
 
-def attempted(estimate: Callable[[], ChangeEstimate]) -> ChangeEstimate:
-    """Return an estimate with its time, or one without changes that states why none can be made."""
-    start = time.perf_counter()
-    try:
-        found = estimate()
-    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        found = ChangeEstimate(method=f"no estimate: {error}")
-    return replace(found, seconds=time.perf_counter() - start)
+def attempted(
+    estimate: Callable[[Problem, StepResult, int], ChangeEstimate],
+) -> Callable[[Problem, StepResult, int], ChangeEstimate]:
+    """Let an estimate of a press return its time, and where it fails one without changes that states why.
+
+    The estimate takes the press, its last increment, and its number of increments, from which its cost is modelled.
+    """
+
+    @functools.wraps(estimate)
+    def timed(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
+        start = time.perf_counter()
+        try:
+            found = estimate(problem, last, increments)
+        except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
+            found = ChangeEstimate(method=f"no estimate: {error}")
+        return replace(found, seconds=time.perf_counter() - start)
+
+    return timed
 
 
 def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
@@ -142,10 +149,3 @@ def check_kind(model: Model) -> None:
         raise Finger3dError("it was not compared with presses to a force")
     if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
         raise Finger3dError("the result depends on the number of increments")
-
-
-def budget_s(problem: Problem, increments: int) -> float:
-    """Return the modelled seconds that an estimate may take, from the modelled cost of a press in small strain."""
-    unknowns, points = problem.body.stiffness.upper.shape[0], len(problem.surface.nodes)
-    press = condensation_s(unknowns, problem.dim) + increments * contact_s(points, problem.dim)
-    return max(_SHARE * press, _SECONDS)

@@ -1,39 +1,83 @@
-"""Forecast of the size, time and memory of a press from a calibrated cost model.
+"""Forecast of the size, time and memory of a press, and of what its effects add, from the cost model.
 
-Calibrated on the Fig. 9 finger on 2 cores, by the runs of validation/cost_of_accuracy.py and scaling.py: up to 386 000
-unknowns in 2D and 509 000 in 3D. The real time of other presses was 0.63 to 2.5 times the forecast, and their memory up
-to 1.58 times, of solids meshed by fTetWild.
+The size of a structured or given mesh is counted on the mesh itself.  That of an unstructured one follows from the
+field of edge lengths: 11 solids that fTetWild meshed had 0.83 to 1.22 times the cells and 0.68 to 1.17 times the
+contact points.  Edges almost as long as the body is thick give more cells (1.4 times in one case), and so do layers
+thinner than the edges (1.6 times).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from finger3d._cost import (
+    BASE_MB,
+    CAD_MB,
+    FIGURES_S,
+    GAUGE_CELL_S,
+    GAUGE_S,
+    START_S,
+    PressSize,
+    meshing_s,
+    rows_gb,
+    tet_mesh,
+)
 from finger3d._types import Tree
-from finger3d.mechanics.build import MARGIN, candidate_points
-from finger3d.mechanics.cost import PressCost, added_cost, state_size
+from finger3d.mechanics.build import MARGIN, WHOLE_FACE, candidate_points, poses
 from finger3d.mechanics.gauge_refinement import refined_at_gauges
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import free_surface
-from finger3d.mechanics.step_halving import automatic, condensation_s, contact_s, limits
+from finger3d.mechanics.step_halving import automatic, limits
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.given import GivenMesh
-from finger3d.meshing.limits import check_memory, rows_gb
+from finger3d.meshing.limits import check_memory
+from finger3d.meshing.sizing import Sizing
+from finger3d.objects import PlacedObject
 
-_BASE_MB = 170.0
-_TETWILD_MB = 500.0  # while meshing, even for a small mesh
-_IMPORT_S = 0.4
-_FIGURES_S = {2: 1.0, 3: 4.5}
-_GAUGE_S, _GAUGE_CELL_S = 3e-3, 7e-7  # for each gauge, and for each cell searched for it
+_USUAL = 80
+"""Median of automatic increments over the cases of validation/error_bars.py."""
+
+_LATTICE = 100
+"""Places along each side of a part at which the contact face of an unstructured mesh is counted."""
+
+_FOIL_ROWS = {2: 16, 3: 96}
+"""Condensed rows of a foil with its mirror images, by dimension."""
+
+_FOIL_S = {2: 0.02, 3: 0.2}
+"""Seconds to discretise a foil, by dimension."""
 
 
-@dataclass(frozen=True)
-class _Size:
-    cells: float
-    points: float
-    dofs: float
-    contact_points: float
+@dataclass(frozen=True, kw_only=True)
+class PressCost:
+    """Estimated cost of a press without effects.
+
+    Attributes
+    ----------
+    size : of the meshed part
+    increments : number of increments in all runs
+    runs : number of runs, each with another number of increments
+    seconds : time of each stage by name
+    """
+
+    size: PressSize
+    increments: int
+    runs: int
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddedCost:
+    """Seconds and memory that an effect adds to a press, and the reason."""
+
+    seconds: float = 0.0
+    memory_mb: float = 0.0
+    reason: str = "no factorisation and no further step"
+
+    def __str__(self) -> str:
+        return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
 
 
 def forecast(model: Model) -> Tree:
@@ -44,35 +88,30 @@ def forecast(model: Model) -> Tree:
     dict
         Printable values by name: domain, symmetry, cells, dofs, contact points, steps, seconds of each stage, memory.
     """
-    d = 3 if model.domain == "solid" else 2
     axes = symmetry(model)
-    zone = model.first_contact.contact_box
-    mixed = model.mixed
-    size = _size(model, zone, axes, mixed)
-    runs, free = _runs(model, size, d), sum(leg.steps == "auto" for leg in model.legs)
+    cells, size = _size(model, axes)
+    runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
     marched = len(runs) * fixed + sum(runs) * free
-    tetwild = d == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
-    seconds = _seconds(size, d, marched, tetwild)
-    seconds["assembly"] += len(model.gauges) * (_GAUGE_S + _GAUGE_CELL_S * size.cells)
-    memory = max(_memory(size, d, len(model.gauges)), _TETWILD_MB if tetwild else 0.0)
-    press = PressCost(
-        dim=d,
-        dofs=size.dofs,
-        contact_points=size.contact_points,
-        increments=marched,
-        runs=len(runs),
-        seconds=seconds,
-        factor_mb=_memory(size, d) - _BASE_MB,
-    )
-    memory += _states_mb(model, press, axes)
+    tetwild = size.dim == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
+    seconds = {
+        "start": START_S,
+        "mesh": meshing_s(cells) if tetwild else 3e-7 * size.dofs,
+        "assembly": size.assembly_s + len(model.gauges) * (GAUGE_S + GAUGE_CELL_S * cells),
+        "condensation": size.condensation_s,
+        "contact": marched * size.contact_s,
+        "output": FIGURES_S[size.dim],
+    }
+    press = PressCost(size=size, increments=marched, runs=len(runs), seconds=seconds)
+    memory = size.factor_mb + 1e3 * rows_gb(size.dim * size.contact_points + len(model.gauges)) + BASE_MB
+    memory += CAD_MB * tetwild + _states_mb(model, press, axes)
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
         "domain": model.domain,
-        "formulation": "mixed quadratic/linear" if mixed else "quadratic displacement",
+        "formulation": "mixed quadratic/linear" if model.mixed else "quadratic displacement",
         "symmetry": " and ".join(axes) if axes else "none",
-        "cells": round(size.cells),
+        "cells": round(cells),
         "dofs": round(size.dofs),
         "contact_points": round(size.contact_points),
         **({"gauges": len(model.gauges)} if model.gauges else {}),
@@ -86,54 +125,55 @@ def forecast(model: Model) -> Tree:
     }
 
 
-_USUAL = 80  # the median of automatic increments over the cases of validation/error_bars.py
-
-
-def _runs(model: Model, size: _Size, d: int) -> list[int]:
+def _runs(model: Model, size: PressSize) -> list[int]:
     """Increments of an automatic leg in every run that chooses them; the last is reported."""
     if not automatic(model):
         return [AUTO_START]
-    first, last = limits(model, size.dofs, size.contact_points)
+    first, last = limits(model, size)
     runs = [first]
     while runs[-1] < min(_USUAL, last):
         runs.append(2 * runs[-1])
     return runs
 
 
-def _size(model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], mixed: bool) -> _Size:
-    """Return the size of a structured mesh, or an estimate from the size field of pytetwild."""
+def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
+    """Return the cells and the size of a structured or given mesh, or estimates from the field of edge lengths."""
     from finger3d.meshing.generate import mesh_solid
     from finger3d.meshing.swept import mesh_section
 
-    h = model.mesh.size_mm
+    zone = model.first_contact.contact_box
     if model.domain != "solid" or model.mesh.mesher == "swept" or isinstance(model.design, GivenMesh):
         make = mesh_solid if model.domain == "solid" else mesh_section
         mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
-        d, vertices = mesh.dim, len(mesh.part_corners[0])
-        points, cells = report.points, report.cells
         first = model.first_contact.first_contact_mm
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
-    else:
-        from finger3d.meshing.sizing import forecast as count_cells
-        from finger3d.meshing.sizing import sizing
-        from finger3d.meshing.solids import box
+        dofs = mesh.dim * report.points + (len(mesh.part_corners[0]) if model.mixed else 0)
+        return report.cells, PressSize(mesh.dim, dofs, touching)
+    from finger3d.meshing.sizing import count_cells, sizing
+    from finger3d.meshing.solids import box
 
-        low, high = box(model.design, axes)
-        d, cells = 3, int(count_cells(model.design, sizing(model.design, model.mesh, zone, low, high)))
-        points, vertices = int(1.55 * cells), int(0.24 * cells)
-        touching = (zone[1] - zone[0]) * (zone[3] - zone[2]) / (0.87 * h**2) / 2 ** len(axes)
-    return _Size(cells, points, d * points + (vertices if mixed else 0), touching)
+    field = sizing(model.design, model.mesh, zone, *box(model.design, axes))
+    cells = int(count_cells(model.design, field))
+    return cells, PressSize(3, tet_mesh(cells, model.mixed)[1], _candidates(model, field))
 
 
-def _seconds(size: _Size, d: int, steps: int, tetwild: bool) -> dict[str, float]:
-    return {
-        "start": _IMPORT_S,
-        "mesh": 3.0 + 3.5e-4 * size.cells if tetwild else 3e-7 * size.dofs,
-        "assembly": 8e-6 * size.dofs if d == 3 else 0.005 + 3e-6 * size.dofs,
-        "condensation": condensation_s(size.dofs, d),
-        "contact": steps * contact_s(size.contact_points, d),
-        "output": _FIGURES_S[d],
-    }
+def _candidates(model: Model, field: Sizing) -> float:
+    """Estimate the candidate contact points of an unstructured mesh, as the vertices of equilateral triangles."""
+    middles, span = (np.arange(_LATTICE) + 0.5) / _LATTICE, field.high - field.low
+    x, z = np.meshgrid(field.low[0] + middles * span[0], field.low[2] + middles * span[2], indexing="ij")
+    top = model.design.top(x.ravel(), z.ravel()).reshape(x.shape)
+    inside = np.isfinite(top)
+    slopes = np.gradient(np.where(inside, top, 0.0), span[0] / _LATTICE, span[2] / _LATTICE)
+    area = np.sqrt(1.0 + slopes[0] ** 2 + slopes[1] ** 2) * span[0] * span[2] / _LATTICE**2
+    edge = field.at(np.stack([x, np.where(inside, top, 0.0), z], axis=-1).reshape(-1, 3)).reshape(x.shape)
+    vertices = np.where(inside, area / (0.866 * edge**2), 0.0)
+    path, touch = poses(model), model.first_contact.first_contact_mm
+    objects = (PlacedObject.of(model.object, touch, pose) for pose in path)
+    overlap = np.max([obj.overlap(x.ravel(), top.ravel(), z.ravel()) for obj in objects], axis=0).reshape(x.shape)
+    near = float(vertices[overlap > -MARGIN * max(pose.depth_mm for pose in path)].sum())
+    whole = float(vertices.sum())
+    made = field.share_made ** (2.0 / 3.0) * (whole if near >= WHOLE_FACE * whole else near)
+    return float(made + 1.9 * made**0.5)  # vertices on the rim have half of the area of others
 
 
 def _triangles(model: Model) -> dict[str, int]:
@@ -145,10 +185,59 @@ def _triangles(model: Model) -> dict[str, int]:
 def _states_mb(model: Model, press: PressCost, axes: tuple[str, ...]) -> float:
     """Memory of the states of all increments, MB: those of the part, of the whole finger and of the formulation."""
     steps = sum(leg.steps if isinstance(leg.steps, int) else 8 * AUTO_START for leg in model.legs)
-    numbers = 3 * press.dim * press.contact_points * (1 + 2 ** len(axes)) + state_size(model, press)
+    numbers = 3 * press.size.dim * press.size.contact_points * (1 + 2 ** len(axes)) + _state_size(model, press.size)
     return float(8e-6 * steps * numbers)
 
 
-def _memory(size: _Size, d: int, gauges: int = 0) -> float:
-    body = 1.19e-3 * size.dofs**1.2 if d == 3 else 2.5e-3 * size.dofs
-    return _BASE_MB + body + 1e3 * rows_gb(d * size.contact_points + gauges)
+def _state_size(model: Model, size: PressSize) -> float:
+    """Return how many numbers the state of the body holds: its unknowns, and its internal variables if it relaxes.
+
+    At finite strain these are 9 at 4 points of each of some dofs / 4.5 cells.
+    """
+    branches = len(model.relaxation.prony) if model.relaxation else 0
+    if model.finite_strain:
+        return size.dofs * (1.0 + 8.0 * (branches + 1 if branches else 0))
+    if model.relaxation is None:
+        return 0.0
+    return (1 + branches) * (size.dim * size.contact_points if model.relaxation.bulk else size.dofs)
+
+
+def added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
+    """Return the cost that the effect in a slot of the model adds; a friction law adds none."""
+    match slot:
+        case "hyperelastic_law":
+            return AddedCost(
+                seconds=press.increments * press.size.finite_strain_s,
+                memory_mb=press.size.factor_mb,
+                reason=f"about one factorisation and nine iterations in each of {press.increments} steps",
+            )
+        case "relaxation" if model.refactorises and not model.finite_strain:
+            lengths = _lengths_of_time_step(model, press)
+            return AddedCost(
+                seconds=lengths * press.seconds["condensation"] + press.seconds["assembly"],
+                memory_mb=lengths * press.size.factor_mb,
+                reason=f"{lengths} more factorisation{'s' * (lengths > 1)}, one for each length of step",
+            )
+        case "inclusions":
+            foils, d = len(model.gauges), press.size.dim
+            rows = _FOIL_ROWS[d] * foils
+            share = min(rows / max(d * press.size.contact_points, 1.0), 1.0)
+            return AddedCost(
+                seconds=share * press.seconds["condensation"] + press.seconds["contact"] + _FOIL_S[d] * foils,
+                memory_mb=40e-6 * rows**2,
+                reason=f"{rows} more rows, and every step once more without the foils",
+            )
+        case "object_compliance":
+            return AddedCost(
+                seconds=press.seconds["condensation"] + press.seconds["assembly"] + press.seconds["mesh"],
+                memory_mb=0.5 * press.size.factor_mb,
+                reason="the object is meshed and condensed like the finger; taken to be of its size",
+            )
+    return AddedCost()
+
+
+def _lengths_of_time_step(model: Model, press: PressCost) -> int:
+    """Return the number of different lengths of the increments of time, each of which has a factor of its own."""
+    fixed = {leg.duration_s / leg.steps for leg in model.legs if leg.duration_s and leg.steps != "auto"}
+    automatic = {leg.duration_s for leg in model.legs if leg.steps == "auto"}
+    return max(len(fixed) + press.runs * len(automatic), 1)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float, Tree
 from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
 from finger3d.accuracy.companions import companion, edge_ratio, is_unstructured
@@ -26,7 +27,6 @@ from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
 from finger3d.io import AREAS, MAIN, RESULTANTS
-from finger3d.mechanics.cost import finite_strain_s
 from finger3d.mechanics.history import StepResult, flat_readings, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
@@ -34,8 +34,6 @@ from finger3d.mechanics.step_halving import (
     COUNT_RATIOS,
     Run,
     choices_of_counts,
-    condensation_s,
-    contact_s,
     errors_from_counts,
     last_step,
     step_error,
@@ -45,12 +43,6 @@ from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
-
-_STEPS_SHARE = 0.15
-"""Largest cost of further increments over the cost of the press; both are modelled, not measured."""
-
-_STEPS_S = 0.2
-"""Modelled seconds that further increments may take in any case."""
 
 _MESHED_S = 1.0
 """Seconds above which a mesh was made by pytetwild and not read from the cache."""
@@ -189,7 +181,9 @@ def _of_increments(
         return errors, ", ".join(str(count) for count, _ in used) + ", order 1"
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
-    for on_own_mesh, way in choices_of_counts(_marching_cost(own), beside_s, _budget(own)):
+    own_s = _marching_cost(own)
+    budget = INCREMENT_ERRORS.seconds(own.size.condensation_s + own_s)
+    for on_own_mesh, way in choices_of_counts(own_s, beside_s, budget):
         judged = own if on_own_mesh else beside
         if judged is None:
             continue
@@ -255,23 +249,11 @@ def _own_bars(own: Problem, frames: Sequence[StepResult], runs: Sequence[Run]) -
 
 def _marching_cost(problem: Problem) -> float:
     """Return the modelled seconds of all increments, from their number, the contact points and the unknowns."""
-    model = problem.model
+    model, size = problem.model, problem.size
     count = sum(leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in model.legs)
-    condensation = condensation_s(_unknowns(problem), problem.dim)
-    contact = count * contact_s(len(problem.surface.nodes), problem.dim)
     if model.finite_strain:
-        return contact + count * finite_strain_s(_unknowns(problem), condensation)
-    return contact + len(model.legs) * condensation * model.refactorises
-
-
-def _budget(problem: Problem) -> float:
-    """Return the modelled seconds that other counts of increments may take, from the modelled cost of the press."""
-    press = condensation_s(_unknowns(problem), problem.dim) + _marching_cost(problem)
-    return max(_STEPS_SHARE * press, _STEPS_S)
-
-
-def _unknowns(problem: Problem) -> int:
-    return int(problem.body.stiffness.upper.shape[0])
+        return count * (size.contact_s + size.finite_strain_s)
+    return count * size.contact_s + len(model.legs) * size.condensation_s * model.refactorises
 
 
 def _on_mesh(beside: Problem, kind: str) -> str:
@@ -281,7 +263,7 @@ def _on_mesh(beside: Problem, kind: str) -> str:
     mesher = "bisected" if given else options.mesher if beside.dim == 3 else "structured"
     sizes = f"{mesher}, {options.size_mm:.4g} and {options.base_size_mm:.4g} mm"
     sizes += ", of both bodies" if beside.model.object_compliance else ""
-    text = f"mesh: {_unknowns(beside)} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}"
+    text = f"mesh: {beside.size.dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}"
     text += f"orders {ORDER:g} to {max(ORDERS.values()):g}"
     made = beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
     if is_unstructured(beside.model) and made > _MESHED_S:

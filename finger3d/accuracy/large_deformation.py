@@ -19,7 +19,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from finger3d.accuracy.changes import ChangeEstimate, attempted, budget_s, changing_numbers, check_kind, judged
+from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
+from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
 from finger3d.accuracy.cost import forecast
 from finger3d.effects.base import fill
@@ -38,30 +39,13 @@ _COARSER_STILL = 2.0
 _STEPS = (5, 3)
 """Increments in each leg, on the coarse mesh and on the one that is coarser still."""
 
-_MOST_SECONDS = 10.0
-"""Largest modelled cost of the coarse press; 30 % of a press of a million unknowns would hold 4 GB beside its 20 GB."""
-
 _SAFETY, _LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
 
 
+@attempted
 def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-    """Estimate what large deformation would change in the last increment of a press in small strain.
-
-    Parameters
-    ----------
-    problem, last : the press, and its last increment
-    increments : number of increments of the press, from which its cost is modelled
-
-    Returns
-    -------
-    ChangeEstimate
-        Without changes, and with the reason, where no estimate can be made; a failure does not fail the press.
-    """
-    return attempted(lambda: _estimated(problem, last, increments))
-
-
-def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
+    """Estimate what large deformation would change in the last increment of a press in small strain."""
     check_kind(problem.model)
     factor = _affordable_factor(problem, increments)
     coarse, change, other = _on_both_meshes(problem, factor)
@@ -84,7 +68,7 @@ def _affordable_factor(problem: Problem, increments: int) -> float:
 
     The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
     """
-    budget = min(budget_s(problem, increments), _MOST_SECONDS)
+    budget = min(CHANGES.seconds(problem.size.press_s(increments)), LARGE_DEFORMATION_S)
     for factor in _FACTORS:
         cost = forecast(_at_large_deformation(_coarse(problem.model, factor, _STEPS[0])))
         if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget:

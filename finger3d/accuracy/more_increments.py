@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from finger3d.accuracy.changes import ChangeEstimate, attempted, budget_s, changing_numbers, check_kind, judged
+from finger3d._cost import CHANGES
+from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import TOLERANCE, contact_s, last_step
+from finger3d.mechanics.step_halving import TOLERANCE, last_step
 
 _COUNTS = 4, 8
 """Increments of both further runs over those of the press."""
@@ -43,28 +44,14 @@ def may_matter(numbers: Mapping[str, float], errors: Mapping[str, float]) -> boo
     )
 
 
+@attempted
 def more_increments(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-    """Estimate what more increments would change in the last increment of a press in small strain.
-
-    Parameters
-    ----------
-    problem, last : the press, and its last increment
-    increments : number of increments of the press, from which its cost is modelled
-
-    Returns
-    -------
-    ChangeEstimate
-        Without changes, and with the reason, where no estimate can be made; a failure does not fail the press.
-    """
-    return attempted(lambda: _estimated(problem, last, increments))
-
-
-def _estimated(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
+    """Estimate what more increments would change in the last increment of a press in small strain."""
     check_kind(problem.model)
     if any(leg.steps == "auto" for leg in problem.model.legs):
         raise Finger3dError("the increments were chosen by their error")
-    budget = budget_s(problem, increments)
-    if sum(_COUNTS) * increments * contact_s(len(problem.surface.nodes), problem.dim) > budget:
+    budget = CHANGES.seconds(problem.size.press_s(increments))
+    if sum(_COUNTS) * increments * problem.size.contact_s > budget:
         raise Finger3dError(f"it would take more than {budget:.2g} s")
     values = changing_numbers(problem, last)
     some, many = (_numbers_in(problem, times) for times in _COUNTS)

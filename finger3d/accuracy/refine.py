@@ -13,6 +13,8 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
+from finger3d._cost import GROWTH, PRESS_TO_ROUND
+from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
 from finger3d.accuracy.companions import FACTOR, companion
@@ -42,8 +44,6 @@ _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
-_PRESS_TO_ROUND = 1.3  # time of a press over that of its last round: contact is solved again and drawn
-_EXPONENT = {2: 1.2, 3: 1.6}  # seconds grow with this power of the unknowns (measured from 161 000 to 523 000 in 3D)
 
 
 @dataclass(frozen=True)
@@ -269,7 +269,7 @@ def _next_sizes(
     factor = min(max((_SAFETY * tolerance / error) ** (1.0 / power), _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
     size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
     base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)
-    return replace(options, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+    return replace(options, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))
 
 
 def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
@@ -278,7 +278,9 @@ def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
     most = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
     width = 0.25 * design.width_mm if problem.dim == 3 else math.inf
     size = max(own.size_mm, min(2.0 * own.size_mm, contact_half_length_mm / _FEWEST_POINTS, most, width))
-    return replace(own, size_mm=_rounded(size), base_size_mm=_rounded(max(size, min(2.0 * own.base_size_mm, most))))
+    return replace(
+        own, size_mm=four_digits(size), base_size_mm=four_digits(max(size, min(2.0 * own.base_size_mm, most)))
+    )
 
 
 def _error_shares(
@@ -302,9 +304,9 @@ def _with_swept_mesher(problem: Problem, options: MeshOptions) -> MeshOptions:
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
     """Return the wanted edge lengths, or longer ones if time is short; None if no refinement is affordable."""
-    left /= _PRESS_TO_ROUND
+    left /= PRESS_TO_ROUND
     factor = min(wanted.size_mm / now.size_mm, wanted.base_size_mm / now.base_size_mm)
-    power = dim * _EXPONENT[dim]
+    power = dim * GROWTH[dim]
     if seconds * factor**-power <= left:
         return wanted
     least = (seconds / left) ** (1.0 / power) if left > 0.0 else 1.0
@@ -315,15 +317,11 @@ def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: flo
     size, base = (
         b * (w / b) ** part for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
     )
-    return replace(now, size_mm=_rounded(size), base_size_mm=_rounded(max(size, base)))
+    return replace(now, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))
 
 
 def _graded_seconds(problem: Problem, wanted: MeshOptions, seconds: float) -> float:
     """Return the forecast seconds of a press on a graded mesh, from those of a round on the mesh that it follows."""
     at_contact = (problem.model.mesh.size_mm / wanted.size_mm) ** (problem.dim - 1)
     growth = max(cell_growth(problem, wanted), at_contact)
-    return float(_PRESS_TO_ROUND * seconds * growth ** _EXPONENT[problem.dim])
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
+    return float(PRESS_TO_ROUND * seconds * growth ** GROWTH[problem.dim])

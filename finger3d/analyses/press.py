@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.problem import Problem
     from finger3d.scene import Scene, Source
+
+
+_SHOWN_EVERY_S = 1.0
+"""Seconds between reports of the trial depths under a prescribed force, and of the increments of a trial run."""
 
 
 def press(
@@ -145,7 +149,7 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
 
     for warning in record.warnings:
         report.say(f"warning: {warning}")
-    writer.progress(record, "incomplete: no step was finished")
+    writer.progress(record, "incomplete: no increment was finished")
     try:
         if automatic(record.problem.model):
             _march_automatically(record, writer, report)
@@ -177,7 +181,8 @@ def _march_automatically(record: PressRecord, writer: ResultWriter, report: Prog
 
     report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
-    for steps, estimate in refine(record.problem, record.workspace):
+    advanced = _now_and_then(lambda done, total, step: report.step(done, total, _remark(record.problem, step)))
+    for steps, estimate in refine(record.problem, record.workspace, advanced=advanced):
         record.seconds["contact"] += time.perf_counter() - begin
         record.steps, record.step_estimate = list(steps), estimate
         writer.progress(record)
@@ -185,6 +190,19 @@ def _march_automatically(record: PressRecord, writer: ResultWriter, report: Prog
         begin = time.perf_counter()
     if record.step_estimate and record.step_estimate.warning:
         record.warnings.append(record.step_estimate.warning)
+
+
+def _now_and_then(show: Callable[..., None]) -> Callable[..., None]:
+    """Return a function that calls `show` if it last did so more than `_SHOWN_EVERY_S` ago."""
+    last = time.perf_counter()
+
+    def shown(*arguments: object) -> None:
+        nonlocal last
+        if time.perf_counter() - last > _SHOWN_EVERY_S:
+            show(*arguments)
+            last = time.perf_counter()
+
+    return shown
 
 
 def _remark(problem: Problem, step: StepResult) -> str:

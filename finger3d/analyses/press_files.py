@@ -40,7 +40,7 @@ _WRITE_EVERY_S = 0.5
 _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
 
-_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the steps written are valid"
+_INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"
 _FILES = (
     "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
@@ -176,7 +176,9 @@ class ResultWriter:
     def pictures(self, record: PressRecord, fields: Fields) -> None:
         """Draw finger.png, contact.png, force.png, and markers.png if there are markers."""
         from finger3d.plotting import figures
+        from finger3d.plotting.deformed import DeformedFinger, draw_fingers
         from finger3d.plotting.gauges import marks_of
+        from finger3d.plotting.layout import save
 
         problem, good, mesh = record.problem, record.converged_steps, fields.mesh
         steps = [measure(problem.points, step) for step in good]
@@ -192,16 +194,20 @@ class ResultWriter:
             from finger3d.plotting.markers import draw
 
             draw(self.folder / "markers.png", markers)
-        figures.finger_picture(
-            self.folder / "finger.png",
-            mesh,
-            fields.displacement,
-            table,
-            problem.points.nodes,
+        finger = DeformedFinger(
+            mesh=mesh,
+            displacement=fields.displacement,
+            pressure=table["pressure_MPa"],
+            shear=np.column_stack([table[f"shear_{axis}_MPa"] for axis in "xyz"]),
+            status=good[-1].state.status.astype(int),
+            nodes=problem.points.nodes,
+            faces=problem.points.face.astype(int),
             thing=placed.to_scene(thing.points)[thing.faces],
-            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:g} mm",
+            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
         )
+        (figure,), _ = draw_fingers([finger])
+        save(figure, self.folder / "finger.png")
 
 
 def _markers(record: PressRecord) -> Tree | None:

@@ -12,6 +12,7 @@ import numpy as np
 from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
+from finger3d.geometry.imported import extent
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import History, StepResult, measure
 
@@ -141,6 +142,7 @@ class PressRecord:
 def _mesh(problem: Problem) -> Tree:
     report = problem.body.report
     return {
+        "finger": extent(problem.model.design),
         "points": report.points,
         "cells": report.cells,
         "dofs": int(problem.body.stiffness.upper.shape[0]),
@@ -196,4 +198,4 @@ def point_count_warning(record: PressRecord) -> list[str]:
     count = max((int(np.count_nonzero(step.state.status != OPEN)) for step in record.steps), default=0)
     if not count or count >= _RESOLVED_POINTS[record.problem.dim]:
         return []
-    return [f"Only {count} points touch: too few for contact and stick lengths. Lower mesh.size_mm."]
+    return [f"Only {count} points touch: too few for the extents of contact and stick zone. Lower mesh.size_mm."]

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
-import math
 import zipfile
 import zlib
-from dataclasses import asdict, fields, replace
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, fields, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
+from annotated_types import Gt, MinLen
+from pydantic import BaseModel, ConfigDict, create_model
 
 from finger3d._types import Array, Tree, TreeView
-from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.contact.rules import RULES
+from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
+from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.fem.simplex import FREE_FACES
@@ -24,19 +26,48 @@ from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import ContactPoints
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.problem import ContactSystem, Problem
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.mechanics.symmetry import Symmetry
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
+
+Made = TypeVar("Made", RigidObject, FrictionLaw)
 
 FORMAT, VERSION = "finger3d condensed body", 5
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 """Mesh options that a file stores; the grading is omitted, as a reduced model has no mesh."""
 
+_FRICTION: dict[str, type[FrictionLaw]] = {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 _MAX_STEPS = 1_000_000
 """Largest number of increments of a leg in a file."""
+
+_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+
+
+class _Header(BaseModel):
+    """The header; `object` and `friction` are tables whose ``kind`` names a class."""
+
+    model_config = _STRICT
+    format: str
+    version: int
+    about: dict[str, Any]
+    body: DesignSummary
+    material: Isotropic
+    mesh: MeshOptions
+    legs: Annotated[tuple[Leg, ...], MinLen(1)]
+    object: dict[str, Any]
+    friction: dict[str, Any]
+    gauges: tuple[Gauge, ...]
+    markers: tuple[Marker, ...]
+    taxels: tuple[Taxel, ...]
+    domain: Domain
+    rule: RuleName
+    warnings: tuple[str, ...]
+    filled: tuple[tuple[str, str], ...]
+    axes: tuple[Literal["x", "z"], ...]
+    touch_mm: Annotated[float, Gt(0.0)]
 
 
 def write(path: str | Path, problem: Problem, other: BoundarySurface, about: TreeView) -> Path:
@@ -84,11 +115,11 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
             f"{path}: version {header.get('version')}, this finger3d reads version {VERSION}; condense it again"
         )
     try:
-        model = _model(header, arrays)
-        axes = tuple(header["axes"])
+        checked = _Header.model_validate_json(arrays["header"].tobytes())
+        model = _model(checked, arrays)
         _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.reading_names))
-        problem = assembled(model, arrays, float(header["touch_mm"]), axes)
-        return problem, _face("other", arrays, problem.dim), header["about"]
+        problem = assembled(model, arrays, checked.touch_mm, checked.axes)
+        return problem, _face("other", arrays, problem.dim), checked.about
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         raise Finger3dError(
             f"{path}: parts of the reduced model are missing or damaged; condense the scene again"
@@ -222,25 +253,17 @@ def _header(problem: Problem) -> Tree:
     }
 
 
-def _model(header: TreeView, arrays: TreeView) -> Model:
-    placed = dict(header["object"])
-    kind = placed.pop("kind")
-    if kind == "MeshObject":
+def _model(header: _Header, arrays: TreeView) -> Model:
+    surface = {}
+    if header.object["kind"] == "MeshObject":
         from finger3d.geometry.surface import Triangles
 
-        placed["surface"] = Triangles(arrays["object_points"], arrays["object_faces"])
-    friction = dict(header["friction"])
-    law: FrictionLaw = _dataclass(_friction_laws()[friction.pop("kind")], friction)
-    if header["domain"] not in ("solid", "plane-strain", "plane-stress"):
-        raise ValueError("domain")
-    if header["rule"] not in RULES:
-        raise ValueError("rule")
-    if not header["legs"] or not set(header["axes"]) <= {"x", "z"} or _number(header["touch_mm"]) <= 0.0:
-        raise ValueError("legs, axes or touch_mm")
-    body, material = _dataclass(DesignSummary, header["body"]), _dataclass(Isotropic, header["material"])
-    legs = tuple(_dataclass(Leg, leg) for leg in header["legs"])
+        surface = {"surface": Triangles(arrays["object_points"], arrays["object_faces"])}
+    body, material, legs = header.body, header.material, header.legs
     if not (body.height_mm > 0.0 < body.width_mm and material.E_MPa > 0.0 <= material.nu <= 0.5):
         raise ValueError("body or material")
+    if not all(leg.steps == "auto" or 1 <= leg.steps <= _MAX_STEPS for leg in legs):
+        raise ValueError("a number of increments")
     if not all(0.0 <= leg.depth_mm <= 10.0 * body.height_mm for leg in legs):
         raise ValueError("a depth")
     if not all(leg.force_N is None or leg.force_N > 0.0 for leg in legs):
@@ -248,64 +271,31 @@ def _model(header: TreeView, arrays: TreeView) -> Model:
     return Model(
         body,
         material,
-        _dataclass(MeshOptions, header["mesh"]),
+        header.mesh,
         legs,
-        _dataclass(_SHAPES[kind], placed),
-        law,
-        gauges=tuple(_dataclass(Gauge, g) for g in header["gauges"]),
-        markers=tuple(_dataclass(Marker, m) for m in header["markers"]),
-        taxels=tuple(_dataclass(Taxel, t) for t in header["taxels"]),
-        domain=header["domain"],
-        rule=header["rule"],
-        symmetry=tuple(header["axes"]),
-        warnings=tuple(map(str, header["warnings"])),
-        filled=tuple((str(slot), str(effect)) for slot, effect in header["filled"]),
+        _of_kind(_SHAPES, header.object, surface),
+        _of_kind(_FRICTION, header.friction, {}),
+        gauges=header.gauges,
+        markers=header.markers,
+        taxels=header.taxels,
+        domain=header.domain,
+        rule=header.rule,
+        symmetry=header.axes,
+        warnings=header.warnings,
+        filled=header.filled,
     )
 
 
-def _friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Return the friction laws that a file may name."""
-    from finger3d.contact.friction import TwoCoefficients
-
-    return {law.__name__: law for law in (Coulomb, TwoCoefficients)}
-
-
-def _number(value: object) -> float:
-    """Return the value as a float.
-
-    Raises
-    ------
-    ValueError
-        If it is no finite number.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value!r} is no finite number")
-    return float(value)
-
-
-def _dataclass(kind: Any, values: TreeView) -> Any:
-    """Return a dataclass made from the header, with fields of the declared types.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If a field is missing, unknown, or of another type.
-    """
-    hints, numbers = get_type_hints(kind), {}
-    for field in fields(kind):
-        value, declared = values.get(field.name), "float" if hints[field.name] is float else str(field.type)
-        if value is None and (declared.endswith("| None") or field.name not in values):
-            continue
-        if declared.startswith("float"):
-            numbers[field.name] = _number(value)
-        elif declared.startswith("int"):
-            if value != "auto" and (type(value) is not int or not 1 <= value <= _MAX_STEPS):
-                raise ValueError(f"{field.name} is no number of increments")
-        elif declared == "str" and not isinstance(value, str):
-            raise ValueError(f"{field.name} is no text")
-        elif field.name == "axis" and value not in ("x", "z"):
-            raise ValueError("axis is neither x nor z")
-    return kind(**{**values, **numbers})
+def _of_kind(kinds: Mapping[str, type[Made]], table: TreeView, given: TreeView) -> Made:
+    """Return a dataclass of the kind that a table names, from its values and those given."""
+    values = dict(table)
+    kind = kinds[values.pop("kind")]
+    hints: Any = get_type_hints(kind, include_extras=True)
+    wanted: Any = {
+        f.name: (hints[f.name], ... if f.default is MISSING else f.default) for f in fields(kind) if f.name not in given
+    }
+    checked = create_model(kind.__name__, __config__=_STRICT, **wanted).model_validate(values)
+    return kind(**dict(checked), **given)
 
 
 def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:

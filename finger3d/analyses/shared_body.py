@@ -100,14 +100,6 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def families(scenes: Sequence[Scene]) -> dict[str, list[int]]:
-    """Return the indices of the scenes of each family, by `body_key`."""
-    found: dict[str, list[int]] = {}
-    for number, scene in enumerate(scenes):
-        found.setdefault(body_key(scene), []).append(number)
-    return found
-
-
 def finest(models: Sequence[Model]) -> MeshOptions:
     """Return the mesh options with the smallest sizes of the models."""
     sizes, bases = [m.mesh.size_mm for m in models], [m.mesh.base_size_mm for m in models]

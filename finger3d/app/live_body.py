@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.tolerances import GAUGE_PLACES, displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
@@ -22,6 +22,8 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
+from finger3d.sensor.curve import ReadingCurve
+from finger3d.sensor.model import SensorModel
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene
@@ -30,10 +32,9 @@ STEPS = 10
 """Increments of every press of a scene that slides or turns the object; those of other scenes are the scene's own."""
 
 MU_STEP = 0.02
-"""Difference of mu over which the slope of the strain is taken, to both sides."""
+"""Distance of the values of mu that the strain is calibrated at."""
 
 _KEPT = 64  # presses; a slider that goes back finds them
-_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 _ALONG = ("x_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status")
 _NUMBERS = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 
@@ -66,14 +67,14 @@ class LivePress:
 
 @dataclass(frozen=True)
 class LiveReading:
-    """Reading of a gauge, and the standard deviation of the friction coefficient inferred from it.
+    """Reading of a gauge, and the standard deviation of mu, as a calibration at three values of mu has them.
 
     Attributes
     ----------
     strain : of the gauge
     slope : d strain / d mu
     strain_sd : standard deviation of the strain by noise, and by the tolerances of place and direction
-    mu_sd : standard deviation of mu, `strain_sd` over the magnitude of the slope; infinite where the slope is zero
+    mu_sd : standard deviation of mu, as in a calibration; infinite where the slope is zero
     """
 
     strain: float
@@ -142,28 +143,26 @@ class LiveBody:
         Finger3dError
             If the gauge is not inside the finger.
         """
-        mesh, axes = self.problem.mesh, self.problem.axes
-        low, middle, high = (self.press(m, depth_mm) for m in (max(mu - MU_STEP, 0.0), mu, mu + MU_STEP))
+        model, mesh, axes = self.problem.model, self.problem.mesh, self.problem.axes
+        start = max(mu - MU_STEP, 0.0)
+        at = np.array([start, mu, mu + MU_STEP] if start < mu else [0.0, MU_STEP, 2.0 * MU_STEP])
+        displacements = np.stack([self.press(float(m), depth_mm).displacement.ravel() for m in at], axis=1)
 
-        def strain(place: Gauge, press: LivePress) -> float:
-            return float((place.row(mesh, axes) @ press.displacement.ravel())[0])
+        def strains(place: Gauge) -> Float:
+            return np.asarray((place.row(mesh, axes) @ displacements)[0])
 
-        spread = [noise]
-        for name in _PLACES:
+        own, tolerances = strains(gauge), []
+        for name in GAUGE_PLACES:
             sd = TOLERANCES[name][0]
-            key, step = ("angle", math.radians(sd)) if name == "gauge_angle_deg" else (name.removeprefix("gauge_"), sd)
-            spread.append(strain(replace(gauge, **{key: getattr(gauge, key) + step}), middle) - strain(gauge, middle))
-        slope = (strain(gauge, high) - strain(gauge, low)) / (mu + MU_STEP - max(mu - MU_STEP, 0.0))
-        strain_sd = float(np.linalg.norm(spread))
-        mu_sd = strain_sd / abs(slope) if slope else math.inf
-        return LiveReading(strain(gauge, middle), slope, strain_sd, mu_sd)
-
-    def outline(self) -> tuple[Float, Float]:
-        """Return x and y (k,), mm, of the contact curve at z = 0 and the base: the outline of the middle section."""
-        design = self.problem.model.design
-        x = np.linspace(-design.half_length_mm, design.half_length_mm, 201)
-        y = np.nan_to_num(design.top(x, np.zeros_like(x)))
-        return np.concatenate([x, x[::-1], x[:1]]), np.concatenate([y, np.zeros_like(x), y[:1]])
+            displaced = displaced_gauges(model, gauge, {name: sd})
+            tolerances.append(tolerance_of(name, sd, [(d.step, strains(d.gauge) - own) for d in displaced]))
+        curve = ReadingCurve(gauge.name, at, own, noise, tuple(tolerances))
+        return LiveReading(
+            strain=float(curve.at(mu)),
+            slope=float(curve.slope(mu)),
+            strain_sd=float(curve.reading_sd([mu])[0]),
+            mu_sd=float(SensorModel((curve,)).mu_sd(mu)[0]),
+        )
 
 
 @lru_cache(maxsize=_KEPT)

@@ -12,6 +12,7 @@ import numpy as np
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
+from finger3d.plotting.outlines import middle_section
 from finger3d.sensor.curve import NOISE
 
 if TYPE_CHECKING:
@@ -71,9 +72,9 @@ def page(body: LiveBody, mu: float) -> Dash:
         [Output(name, "figure") for name in ("traction", "section")],
         [Input(name, "value") for name in sliders],
     )
-    def answer(*given: object) -> tuple[str, str, str, go.Figure, go.Figure]:
+    def answer(*positions: object) -> tuple[str, str, str, go.Figure, go.Figure]:
         try:
-            values = [slider.checked(value) for slider, value in zip(sliders.values(), given, strict=True)]
+            values = [slider.checked(value) for slider, value in zip(sliders.values(), positions, strict=True)]
         except Finger3dError as error:
             return "", "", str(error), go.Figure(), go.Figure()
         mu, depth, x, y, angle = values
@@ -181,7 +182,7 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
     """Return the outline of the middle section and the gauge."""
     import plotly.graph_objects as go
 
-    x, y = body.outline()
+    x, y = middle_section(body.problem.model.design).T
     along = 0.06 * float(np.ptp(x)) * gauge.direction
     ends = np.stack([gauge.middle - along, gauge.middle + along])
     figure = go.Figure()

@@ -36,13 +36,13 @@ from finger3d.cli.terminal import legible_width, safe_streams
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
 
-def main(arguments: Sequence[str] | None = None, program: App = app) -> int:
-    """Run the command line of a program and return its exit code.
+def main(arguments: Sequence[str] | None = None, program: App | None = None) -> int:
+    """Run a command line, that of finger3d unless another program is given, and return its exit code.
 
     Errors are reported in one line on standard error. SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
     with safe_streams(), termination_interrupts(), legible_width():
-        return _run(list(sys.argv[1:] if arguments is None else arguments), program)
+        return _run(list(sys.argv[1:] if arguments is None else arguments), program or app)
 
 
 def _check_surroundings(arguments: Sequence[str]) -> None:
@@ -90,5 +90,5 @@ def _run(arguments: Sequence[str], program: App) -> int:
         # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
         if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        complain("interrupted while a package was loading; finished steps are kept")
+        complain("interrupted while a package was loading; finished increments are kept")
         return 130

@@ -60,7 +60,7 @@ def calibrate(
     from finger3d.sensor.files import as_dict
 
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
-        found = run(
+        calibration = run(
             loaded,
             [name.strip() for name in gauge.split(",")],
             out,
@@ -74,13 +74,13 @@ def calibrate(
             taxel_noise_MPa=taxel_noise,
         )
     if json_:
-        print_json(as_dict(found))
+        print_json(as_dict(calibration))
     else:
-        print_rows(loaded.title, [*moduli(loaded.tables).items(), *summary(found), ("results", str(out))])
-        print(found.verdict())
-    if found.failed:
-        mu_failed, why = found.failed[0]
+        print_rows(loaded.title, [*moduli(loaded.tables).items(), *summary(calibration), ("results", str(out))])
+        print(calibration.verdict())
+    if calibration.failed:
+        mu_failed, why = calibration.failed[0]
         raise MissingError(
-            f"{scene}: {len(found.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
+            f"{scene}: {len(calibration.failed)} of {report.steps_total} values of mu gave no strain, the first mu = "
             f"{mu_failed:.4g} {why}"
         )

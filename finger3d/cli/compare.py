@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, job, load, print_json
+from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
 from finger3d.errors import Finger3dError, MissingError
 
 
@@ -42,6 +42,8 @@ def compare(
     if json_:
         print_json(read_json(out / "compare.json"))
     else:
+        if result.table:
+            print_columns(result.table[0], result.table[1:])
         print("\n".join(result.verdict))
         print(f"results: {out}")
     if not result.outcome.ok:

@@ -100,11 +100,11 @@ def estimate(
         raise Finger3dError("estimate: --out goes with --csv")
     job = _Job.of(read(calibration), std or (), curve, tolerances)
     if strain is not None:
-        (found,) = job.estimates(job.named("--strain", strain), job.given_stds)
+        (result,) = job.estimates(job.named("--strain", strain), job.given_stds)
         if json_:
-            print_json(asdict(found))
+            print_json(asdict(result))
         else:
-            print(found.verdict)
+            print(result.verdict)
     elif follow is not None:
         for line in _followed(job, follow):
             print(line, flush=True)
@@ -160,7 +160,7 @@ class _Job:
 
     def named(self, option: str, texts: Sequence[str], plain_for_all: bool = False) -> dict[str, float]:
         """Return the numbers of an option by name: of ``NAME=NUMBER``, or of the plain number for a single reading."""
-        found: dict[str, float] = {}
+        numbers: dict[str, float] = {}
         for text in texts:
             name, equals, value = text.rpartition("=")
             try:
@@ -168,10 +168,10 @@ class _Job:
             except ValueError:
                 raise Finger3dError(f"{option} {text}: must be a number, or NAME=NUMBER") from None
             for one in self._meant(option, text, name.strip() if equals else "", plain_for_all):
-                if one in found:
+                if one in numbers:
                     raise Finger3dError(f"{option} {text}: {one} is given twice")
-                found[one] = number
-        return found
+                numbers[one] = number
+        return numbers
 
     def _meant(self, option: str, text: str, name: str, plain_for_all: bool) -> tuple[str, ...]:
         """Return the readings that a name stands for."""
@@ -199,17 +199,17 @@ class _Job:
         """Columns of the estimates."""
         return (*self.names, *_COLUMNS)
 
-    def line(self, found: Estimate) -> list[object]:
+    def line(self, estimate: Estimate) -> list[object]:
         """Return the cells of an estimate."""
-        return [*found.readings.values(), *(getattr(found, name) for name in _COLUMNS)]
+        return [*estimate.readings.values(), *(getattr(estimate, name) for name in _COLUMNS)]
 
     def columns_of(self, source: Path | str, names: Sequence[str]) -> dict[str, str]:
         """Return the columns of a file for ``NAME`` and ``NAME_std``; a missing column of readings is an error."""
-        found = {name: name for one in self.names for name in (one, f"{one}_std") if name in names}
+        columns = {name: name for one in self.names for name in (one, f"{one}_std") if name in names}
         if len(self.names) == 1:  # a single reading may be called strain
             short = {self.names[0]: "strain", f"{self.names[0]}_std": "std"}
-            found = {name: column for name, column in short.items() if column in names} | found
-        missing = [name for name in self.names if name not in found]
+            columns = {name: column for name, column in short.items() if column in names} | columns
+        missing = [name for name in self.names if name not in columns]
         missing = [f"{missing[0]} or strain"] if missing and len(self.names) == 1 else missing
         if missing:
             has = ", ".join(repr(name)[:40] for name in names) or "nothing"
@@ -217,7 +217,7 @@ class _Job:
                 f"{source}: must have a column named {' and one named '.join(missing)} and at least one reading; it "
                 f"has {has}"
             )
-        return found
+        return columns
 
 
 def _followed(job: _Job, source: str) -> Iterator[str]:
@@ -240,9 +240,9 @@ def _followed(job: _Job, source: str) -> Iterator[str]:
             continue
         try:
             row = dict(zip(names, cells, strict=False))
-            found = {name: _number(source, number, column, row) for name, column in columns.items()}
-            stds = job.given_stds | {name: found[f"{name}_std"] for name in job.names if f"{name}_std" in found}
-            (answer,) = job.estimates({name: found[name] for name in job.names}, stds)
+            values = {name: _number(source, number, column, row) for name, column in columns.items()}
+            stds = job.given_stds | {name: values[f"{name}_std"] for name in job.names if f"{name}_std" in values}
+            (answer,) = job.estimates({name: values[name] for name in job.names}, stds)
             answered = job.line(answer)
         except Finger3dError as error:
             nothing = dict.fromkeys(job.columns, math.nan)
@@ -313,12 +313,12 @@ def _readings(job: _Job, path: Path) -> tuple[dict[str, list[float]], dict[str, 
             f"{path}: not a CSV file; it must have a line of names, then one line for each reading"
         ) from None
     columns = job.columns_of(path, [str(name) for name in rows[0]] if rows else [])
-    found = {
+    values = {
         name: [_number(path, i, column, row) for i, row in enumerate(rows, start=2)] for name, column in columns.items()
     }
     stds: dict[str, list[float] | float] = {**job.given_stds}
-    stds |= {name: found[f"{name}_std"] for name in job.names if f"{name}_std" in found}
-    return {name: found[name] for name in job.names}, stds
+    stds |= {name: values[f"{name}_std"] for name in job.names if f"{name}_std" in values}
+    return {name: values[name] for name in job.names}, stds
 
 
 def _number(path: Path | str, line: int, name: str, row: Mapping[str, str | None]) -> float:

@@ -50,22 +50,22 @@ def identify(
     check_writable(out, scene)
     kept = f"every press is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
-        found = run(scene, measured, free, out, set_ or (), report)
+        result = run(scene, measured, free, out, set_ or (), report)
     if json_:
-        print_json(found.as_dict())
+        print_json(result.as_dict())
         return
-    f = found.fitted
-    fitted = zip(found.keys, f.values, f.stds, f.low, f.high, strict=True)
+    f = result.fitted
+    fitted = zip(result.keys, f.values, f.stds, f.low, f.high, strict=True)
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
             *(
                 (key, f"{value:.4g} +- {std:.2g} (68 % interval {low:.4g} to {high:.4g})")
                 for key, value, std, low, high in fitted
             ),
             ("deviations", DEVIATIONS),
-            *(("note", note) for note in found.notes),
-            ("presses", f"{found.presses} solved"),
+            *(("note", note) for note in result.notes),
+            ("presses", f"{result.presses} solved"),
             ("results", str(out / "identified.toml")),
             ("", str(out / "report.html")),
         ],

@@ -21,8 +21,7 @@ def info(*, json_: Json = False) -> None:
     import sys
     from pathlib import Path
 
-    from finger3d._machine import cores, memory_bytes, versions
-    from finger3d._slim import environment_bytes
+    from finger3d._machine import cores, environment_bytes, memory_bytes, versions
     from finger3d.fem import condense
     from finger3d.meshing.cache import folder
 

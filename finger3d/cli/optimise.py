@@ -73,24 +73,24 @@ def optimise(
     kept = f"every evaluated design is kept in {out}; the same command continues"
     mus = _mus(mu) if mu else None
     with job(json_, lambda _: kept) as report:
-        found = run(scene, free or (), out, objective, gauge, mus, noise, budget, method, seed, set_ or (), report)
-    _print_design(found, out, json_)
+        result = run(scene, free or (), out, objective, gauge, mus, noise, budget, method, seed, set_ or (), report)
+    _print_design(result, out, json_)
 
 
-def _print_design(found: OptimisationResult, out: Path, json_: bool) -> None:
+def _print_design(result: OptimisationResult, out: Path, json_: bool) -> None:
     """Print the best design."""
     from finger3d.results.summary import read_json
 
     if json_:
         print_json(read_json(out / "design.json"))
         return
-    chosen = zip(found.keys, found.best.values, strict=True)
+    chosen = zip(result.keys, result.best.values, strict=True)
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
-            ("objective", f"{found.best.value:.5g}, at the start {found.start.value:.5g}"),
+            ("objective", f"{result.best.value:.5g}, at the start {result.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
-            ("evaluated", f"{found.distinct_designs} designs, {found.bodies} bodies condensed"),
+            ("evaluated", f"{result.distinct_designs} designs, {result.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),
             ("", str(out / "evaluations.csv")),
             ("", str(out / "report.html")),
@@ -114,9 +114,9 @@ def _place_gauges(
 
     check_writable(out, scene)
     with job(json_, lambda _: "nothing was written") as report:
-        mus, known = _mus(mu) if mu else None, parsed_tolerances(tolerance)
-        found = place_gauges(scene, count, out, free, mus, noise, known, set_ or (), report)
-    data = found.as_dict()
+        mus, tolerances = _mus(mu) if mu else None, parsed_tolerances(tolerance)
+        result = place_gauges(scene, count, out, free, mus, noise, tolerances, set_ or (), report)
+    data = result.as_dict()
     if json_:
         print_json(data)
         return
@@ -129,10 +129,10 @@ def _place_gauges(
         for g in data["gauges"]
     ]
     print_rows(
-        found.scene.title,
+        result.scene.title,
         [
             *rows,
-            ("together", f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {found.mus[0]:g} to {found.mus[-1]:g}"),
+            ("together", f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {result.mus[0]:g} to {result.mus[-1]:g}"),
             ("results", str(out / "best.toml")),
             ("", str(out / "report.html")),
         ],

@@ -25,15 +25,15 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
     loaded = load(scene, set_)
     from finger3d.analyses.plan import plan as run
 
-    found = run(loaded)
+    result = run(loaded)
     if json_:
-        print_json(found.summary())
+        print_json(result.summary())
         return
-    print_rows("material", found.moduli.items())
+    print_rows("material", result.moduli.items())
     print_rows("effects", effect_rows(loaded))
-    print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in found.forecast.items()])
-    print("The real time is 0.6 to 2.5 times the forecast, the real memory up to 1.6 times.")
-    for text in found.warnings:
+    print_rows(loaded.title, [(key.replace("_", " "), value) for key, value in result.forecast.items()])
+    print("The real time is 0.5 to 2.5 times the forecast, the real memory 0.8 to 1.3 times.")
+    for text in result.warnings:
         print(f"warning: {text}")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError, MissingError, Outcome
 
 if TYPE_CHECKING:
     from finger3d._types import TreeView
@@ -68,14 +68,18 @@ def _kept(out: Path, report: Progress) -> str:
     except (Finger3dError, KeyError):
         steps = []
     good = sum(step["outcome"] == "converged" for step in steps)
-    return f"{good} of {report.steps_total} steps are kept in {out}" if good else "no step was finished, none is kept"
+    return (
+        f"{good} of {report.steps_total} increments are kept in {out}"
+        if good
+        else "no increment was finished, none is kept"
+    )
 
 
 _NUMBERS = {
     "normal force": ("normal_force_N", 1.0, 5, " N"),
     "friction sum": ("friction_sum_N", 1.0, 5, " N"),
-    "contact length": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
-    "stick length": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "contact extent": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
+    "stick extent": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
     "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
     "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
 }
@@ -83,11 +87,12 @@ _NUMBERS = {
 
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
-    """Yield the rows of the closing table: numbers of the last step with their errors, cost, and files."""
+    """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
     from finger3d.results.format import with_error
 
-    bars, estimate, steps = ErrorBars.of_summary(summary), summary.get("error_estimate"), summary["steps"]
+    bars, estimate = ErrorBars.of_summary(summary), summary.get("error_estimate")
+    steps = [step for step in summary["steps"] if step["outcome"] == str(Outcome.CONVERGED)]
 
     def number(value: float, key: str, digits: int, factor: float = 1.0) -> str:
         error = bars.total(key)
@@ -101,10 +106,10 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
     if steps:
         last = steps[-1]
         depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
-        yield "depth", f"{depth}, step {len(steps)}"
+        yield "depth", f"{depth}, increment {summary['steps'].index(last) + 1}"
         for name, (key, factor, digits, unit) in _NUMBERS.items():
             yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
-        yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all steps"
+        yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
         for name, strain in last["gauges"].items():
             yield f"strain {name}", number(strain, f"gauge_{name}", 5) + of_modulus(f"gauge_{name}", "")
         for name, moved in last["markers"].items():

@@ -16,11 +16,13 @@ def show(
     folder: Path,
     /,
     *,
-    png: Annotated[Path | None, Parameter(help="Write a picture of one step instead of opening a window.")] = None,
-    gif: Annotated[Path | None, Parameter(help="Write an animation of the steps instead of opening a window.")] = None,
-    step: Annotated[int | None, Parameter(help="Number of the step in the picture; default: the last.")] = None,
+    png: Annotated[Path | None, Parameter(help="Write a picture of one increment instead of opening a window.")] = None,
+    gif: Annotated[
+        Path | None, Parameter(help="Write an animation of the increments instead of opening a window.")
+    ] = None,
+    step: Annotated[int | None, Parameter(help="Number of the increment in the picture; default: the last.")] = None,
 ) -> None:
-    """Show a result in a window with fields, steps and a clip plane; --png and --gif need no display.
+    """Show a result in a window with fields, increments and a clip plane; --png and --gif need no display.
 
     Example: finger3d show out --png finger.png --gif press.gif
 

@@ -24,11 +24,11 @@ Tolerances = Annotated[
 
 def parsed_tolerances(texts: Sequence[str] | None) -> dict[str, float]:
     """Return standard deviations by name from texts such as ``depth_mm=0.05``."""
-    found = {}
+    stds = {}
     for text in texts or ():
         name, _, value = text.partition("=")
         try:
-            found[name.strip()] = float(value)
+            stds[name.strip()] = float(value)
         except ValueError:
             raise Finger3dError(f"--tolerance {text}: must be NAME=NUMBER, for instance depth_mm=0.05") from None
-    return found
+    return stds

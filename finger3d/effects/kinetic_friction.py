@@ -19,7 +19,7 @@ class Effect:
     Attributes
     ----------
     ratio : mu_kinetic / mu_static, 0 to 1
-    branch : what a slipping point does in the next step
+    branch : what a slipping point does in the next increment
     """
 
     slot: ClassVar[str] = "friction"

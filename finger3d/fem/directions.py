@@ -1,10 +1,13 @@
-"""Directions of contact points: normals and tangents."""
+"""Directions of contact points, normals and tangents, and the Delassus operator along them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
+
+_ROUND_OFF = 1e-13
+"""Round-off of directions."""
 
 
 def bases_of(normal: Float) -> Float:
@@ -24,3 +27,21 @@ def bases_of(normal: Float) -> Float:
     across = np.stack([-factor * n[:, 0] * n[:, 2], n[:, 2], 1.0 - factor * n[:, 2] ** 2], axis=1)
     along[opposite], across[opposite] = [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]  # about z, which a section has too
     return np.stack([n, along, across], axis=1)[:, :d, :d]
+
+
+def rotated_delassus(delassus: Float, rotations: Float, points: Int | None = None) -> Float:
+    """Return the Delassus operator (k, d, k, d) of some points along their own directions.
+
+    Parameters
+    ----------
+    delassus : (c, d, c, d) mm/N, in the directions before
+    rotations : (k, d, d) from these directions, point by point
+    points : (k,) numbers of the points; all of them if None
+    """
+    k, d = rotations.shape[:2]
+    if points is not None:
+        delassus = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
+    if np.allclose(rotations, np.eye(d), rtol=0.0, atol=_ROUND_OFF):  # as on a plane
+        return delassus
+    half = (rotations @ delassus.reshape(k, d, k * d)).reshape(k * d, k, d)
+    return np.asarray((half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d))

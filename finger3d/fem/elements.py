@@ -33,18 +33,16 @@ class Element:
     Attributes
     ----------
     name : str
+        In meshio.
     dim : int
         Dimension d of the reference simplex.
     order : int
         1 linear, 2 quadratic.
-    vtk_type : int
-        VTK's number of the cell type.
     """
 
     name: str
     dim: int
     order: int
-    vtk_type: int
 
     @property
     def edges(self) -> Int:
@@ -110,9 +108,9 @@ class Element:
         return np.asarray(np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian)))
 
 
-LINE2, LINE3 = Element("line2", 1, 1, 3), Element("line3", 1, 2, 21)
-TRI3, TRI6 = Element("tri3", 2, 1, 5), Element("tri6", 2, 2, 22)
-TET4, TET10 = Element("tet4", 3, 1, 10), Element("tet10", 3, 2, 24)
+LINE2, LINE3 = Element("line", 1, 1), Element("line3", 1, 2)
+TRI3, TRI6 = Element("triangle", 2, 1), Element("triangle6", 2, 2)
+TET4, TET10 = Element("tetra", 3, 1), Element("tetra10", 3, 2)
 
 _ELEMENTS = (LINE2, LINE3, TRI3, TRI6, TET4, TET10)
 _BY_SIZE = {(e.dim, e.node_count): e for e in _ELEMENTS}

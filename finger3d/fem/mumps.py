@@ -1,8 +1,9 @@
 """MUMPS: one symmetric indefinite factorisation with a Schur complement, where there is no MKL.
 
 The library is the sequential MUMPS (CeCILL-C) that CasADi's wheels bring for Linux, macOS and Windows, on x86-64 and
-ARM. Python's bindings of MUMPS have no wheels, so it is called through cffi, which reads the structure of its arguments
-from the header beside the library.
+ARM.  PARDISO comes first where both are installed: with 140 000 unknowns MUMPS takes 1.7 times its time and 1.25 times
+its memory (docs/install.md).  Python's bindings of MUMPS have no wheels, so it is called through cffi, which reads the
+structure of its arguments from the header beside the library.
 """
 
 from __future__ import annotations

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _NO_LABEL = re.compile(r"|COMPOUND|COMPSOLID|SOLID|SHELL|NONE|unnamed|Open_CASCADE.*|=>.*", re.IGNORECASE)
 """Names that CAD programs give to solids without a name."""
 
+_SYMBOLS = {"millimetre": "mm", "centimetre": "cm", "metre": "m", "micrometre": "um"}
+
 
 def read(path: Array) -> Mapping[str, Array]:
     """Read the solids of a STEP file, mm.
@@ -32,7 +34,7 @@ def read(path: Array) -> Mapping[str, Array]:
     -------
     dict
         ``error``, a text, empty if solids were read: then ``shape``, bytes in OpenCASCADE's binary format, ``labels``
-        (s,) of the solids, and the names ``faces`` of their faces, one solid after the other.
+        (s,) of the solids, the names ``faces`` of their faces, one solid after the other, and the ``unit`` of length.
     """
     from OCP.BinTools import BinTools
     from OCP.BRepCheck import BRepCheck_Analyzer
@@ -64,7 +66,20 @@ def read(path: Array) -> Mapping[str, Array]:
     stream = io.BytesIO()
     BinTools.Write_s(shape, stream)
     content = np.frombuffer(stream.getvalue(), dtype=np.uint8)
-    return {"error": np.array(""), "shape": content, "labels": np.array(labels), "faces": np.array(faces)}
+    return {
+        "error": np.array(""), "shape": content, "labels": np.array(labels), "faces": np.array(faces),
+        "unit": np.array(_unit(reader)),
+    }  # fmt: skip
+
+
+def _unit(reader: STEPControl_Reader) -> str:
+    """Return the unit of length of the file, that of SI as a symbol; empty if it names none, and is read as mm."""
+    from OCP.collections import Sequence_TCollection_AsciiString
+
+    lengths, angles, solid_angles = (Sequence_TCollection_AsciiString() for _ in range(3))
+    reader.FileUnits(lengths, angles, solid_angles)
+    names = dict.fromkeys(name.ToCString().lower() for name in lengths)
+    return " and ".join(_SYMBOLS.get(name, name) for name in names)
 
 
 def _error(text: str) -> Mapping[str, Array]:

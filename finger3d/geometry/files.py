@@ -211,11 +211,13 @@ class StepBody:
     solids : in the order of the file
     labels : name of each solid, or else of its product; "" for none or one that only says what it is, like SOLID
     faces : by their names in the file, in lower case
+    unit : of length in the file; empty if it names none
     """
 
     solids: tuple[Solid, ...]
     labels: tuple[str, ...]
     faces: Mapping[str, list[Face]]
+    unit: str
 
 
 def read_step(path: Path) -> StepBody:
@@ -250,7 +252,7 @@ def read_step(path: Path) -> StepBody:
     for face, name in zip((f for solid in solids for f in solid.faces()), read["faces"].tolist(), strict=True):
         if name:
             faces.setdefault(name.lower(), []).append(face)
-    return StepBody(solids, tuple(read["labels"].tolist()), faces)
+    return StepBody(solids, tuple(read["labels"].tolist()), faces, str(read["unit"]))
 
 
 def tessellated(solid: Solid | Compound) -> Triangles:

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
+from finger3d.geometry.design import Design
 from finger3d.geometry.files import STEP, StepBody, content, read_step, read_surface, tessellated
 from finger3d.geometry.parts import apart, check_gaps, glue
 from finger3d.geometry.surface import Triangles
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from finger3d.geometry.tessellate import Tessellation
 
 
+Up: TypeAlias = Literal["y", "z"]
+
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 
 _BASE_NAME = "base"  # of a face in a STEP file
@@ -32,6 +35,11 @@ _DOWNWARD = 1.0 - 1e-6  # least component along -y of the base's unit normal
 _LEAST_BASE_SHARE = 0.02  # of the footprint
 _MIRROR_TOLERANCE = 2e-4  # over the size: a few times the error of the tessellation
 _MAX_MIRRORED_POINTS = 2_000  # that are compared with their mirror images
+
+
+def in_mm(*lengths: float) -> str:
+    """Return lengths as text, such as 30 x 12 mm."""
+    return " x ".join(f"{length:.4g}" for length in lengths) + " mm"
 
 
 class FileDesign:
@@ -66,6 +74,13 @@ class FileDesign:
         """Twice the largest abs(z)."""
         return 2.0 * float(max(-self.surface.low[2], self.surface.high[2]))
 
+    @property
+    def extent(self) -> str:
+        """Size along x, y and z, and that of the base, in words."""
+        base = self.surface.corners[(self.surface.corners[:, :, 1] == 0.0).all(axis=1)].reshape(-1, 3)
+        foot = np.ptp(base, axis=0)
+        return f"{in_mm(*(self.surface.high - self.surface.low))} (x, y up, z), base {in_mm(foot[0], foot[2])}"
+
     def section(self) -> None:
         """Return None: no constant section is known of a file."""
 
@@ -79,9 +94,16 @@ class FileDesign:
         return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
 
 
+def extent(design: Design) -> str:
+    """Return the size of a finger along the axes of the scene in words, and of one from a file how it was read."""
+    if isinstance(design, FileDesign):
+        return design.extent
+    return in_mm(2.0 * design.half_length_mm, design.height_mm, design.width_mm) + " (x, y up, z)"
+
+
 @dataclass(frozen=True)
 class Imported(FileDesign):
-    """A body from a STEP or STL file, y up, with the middle of its base at the origin.
+    """A body from a STEP or STL file, with the middle of its base at the origin.
 
     The base is the lowest plane, or the plane of the face named "base" in a STEP file, rotated to face down.
 
@@ -96,6 +118,8 @@ class Imported(FileDesign):
     surface : closed triangles in the final position, mm
     cad : the build123d solid in the final position; None for STL
     parts : build123d shapes of the parts in the final position, by their labels; empty for a body of one part
+    up : axis of the file that is y here; z is turned to y about x
+    unit : of length in the file, and how it is known
     """
 
     path: str = field(compare=False)
@@ -107,6 +131,14 @@ class Imported(FileDesign):
     surface: Triangles = field(compare=False, repr=False)
     cad: Solid | None = field(compare=False, repr=False)
     parts: Mapping[str, Compound] = field(default_factory=dict, compare=False, repr=False)
+    up: Up = "y"
+    unit: str = field(default="mm, as STL files have none", compare=False)
+
+    @property
+    def extent(self) -> str:
+        """Size along x, y and z, that of the base, and how the file was read, in words."""
+        turned = ", its z turned up" if self.up == "z" else ""
+        return f"{super().extent}; unit of the file: {self.unit}{turned}"
 
     @property
     def part_labels(self) -> tuple[str, ...]:
@@ -116,7 +148,7 @@ class Imported(FileDesign):
     @property
     def cache_fields(self) -> Mapping[str, object]:
         """Content of the file and how it was turned; the file's name does not matter."""
-        turned = {"named_base": "True"} if self.named_base else {}
+        turned = ({"named_base": "True"} if self.named_base else {}) | ({"up": "z"} if self.up == "z" else {})
         dimensions = {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down)}
         return {"design": "imported", "dimensions": {**dimensions, **turned}}
 
@@ -160,7 +192,7 @@ class Imported(FileDesign):
         return body(self.surface) if self.cad is None else None
 
 
-def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) -> Imported:
+def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up: Up = "y") -> Imported:
     """Read a body from a file and place its base on y = 0.
 
     Parameters
@@ -170,6 +202,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         are parts with their names as labels; those without a name are the main body. A body may be hollow.
     upside_down : turn it, so that its highest plane becomes the base
     scale : for STL only
+    up : axis of the file that becomes y; z does by a quarter turn about x, before anything else
 
     Raises
     ------
@@ -189,6 +222,9 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
         from finger3d.geometry.cad import enlarged
 
         read = read_step(path)
+        unit = f"{read.unit}, as it says" if read.unit else "mm, as it names none"
+        if up == "z":
+            read = _y_up(read)
         solid, parts = united(path, read)
         moves: list[Callable[[Solid], Solid]] = []
         if base := read.faces.get(_BASE_NAME, []):
@@ -204,10 +240,22 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0) ->
             raise Finger3dError(f"{path}: the body {reason}")
     else:
         surface = read_surface(path, scale)
+        unit = "mm, as STL files have none"
+        if up == "z":
+            surface = Triangles(surface.points[:, [0, 2, 1]] * [1.0, 1.0, -1.0], surface.faces)
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
     found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
-    return replace(found, named_base=bool(base), parts=_moved(parts, found.middle))
+    return replace(found, named_base=bool(base), parts=_moved(parts, found.middle), up=up, unit=unit)
+
+
+def _y_up(read: StepBody) -> StepBody:
+    """Return a body drawn with z up, turned about x so that y is up."""
+    from build123d import Axis
+
+    solids = tuple(solid.rotate(Axis.X, -90.0) for solid in read.solids)
+    faces = {name: [face.rotate(Axis.X, -90.0) for face in found] for name, found in read.faces.items()}
+    return replace(read, solids=solids, faces=faces)
 
 
 def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
@@ -272,7 +320,9 @@ def _on_its_base(
         solid = solid.moved(Location(tuple(float(-m) for m in middle)))
     moved = Triangles(points, surface.faces)
     if not (moved.normals[~base, 1] > 1e-3).any():
-        raise Finger3dError(f"{path}: nothing of the body looks up; is it drawn with y up?")
+        raise Finger3dError(
+            f'{path}: nothing of the body looks up; is it drawn with y up? A finger with z up takes up = "z"'
+        )
     return Imported(path, digest, scale, upside_down, False, middle, moved, solid)
 
 
@@ -322,6 +372,7 @@ def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:
     if area < _LEAST_BASE_SHARE * footprint:
         raise Finger3dError(
             f"{path}: no base: the {which} point of the body lies on no level plane (area {area:.3g} of "
-            f"{footprint:.3g} mm2 seen from there); draw it with y up and a flat base"
+            f"{footprint:.3g} mm2 seen from there); draw it with y up and a flat "
+            'base (a finger drawn with z up takes up = "z")'
         )
     return base

@@ -157,7 +157,7 @@ def block_section(half_length_mm: float, height_mm: float) -> Section:
     return Section(Flat(half_length_mm, height_mm), half_length_mm, height_mm, 2.0 * half_length_mm * height_mm)
 
 
-def with_layer(section: Section, thickness_mm: float, label: str = "skin") -> Section:
+def with_layer(section: Section, thickness_mm: float) -> Section:
     """Return a section with a layer of constant thickness (mm) under its contact curve, from wall to wall.
 
     Where the contact curve runs down to the base, the layer ends on the base.
@@ -172,13 +172,13 @@ def with_layer(section: Section, thickness_mm: float, label: str = "skin") -> Se
         raise ValueError(f"a layer of {thickness_mm} mm does not fit into the section")
     if isinstance(contact, Flat):
         below = block_section(length, edge - thickness_mm)
-        return replace(section, layer=Layer(below, label))
+        return replace(section, layer=Layer(below, "skin"))
     radius, centre = contact.radius_mm - thickness_mm, contact.centre_y_mm
     if edge == 0.0:
         length = math.sqrt(radius**2 - centre**2)
     else:
         edge = centre + math.sqrt(radius**2 - length**2)
-    return replace(section, layer=Layer(cylinder_section(radius, length, edge), label))
+    return replace(section, layer=Layer(cylinder_section(radius, length, edge), "skin"))
 
 
 def largest_layer_mm(section: Section) -> float:

@@ -91,17 +91,15 @@ def tessellate(
     tolerance_mm: float,
     angle: float = 0.5,
     exact: tuple[float, ...] = (0.0,),
-    voids: Triangles | None = None,
 ) -> Tessellation:
     """Tessellate a build123d solid within `tolerance_mm` (absolute) and `angle` radians between facets.
 
     build123d's own `tessellate` and `export_stl` take a relative tolerance and reuse what was tessellated before.
-    `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit. `voids` are the inner
-    surfaces of the whole body, for a part of it on one side of a plane of symmetry, which may cut them open.
+    `exact` lists numbers (mm) that a plane's constant coordinate may stand for to the last bit.
     """
     faces = tuple(GluedFace(face, 0, OUTSIDE) for face in labelled_faces(solid))
     body = Glued(solid, ("",), (), faces)
-    return tessellate_parts(body, tolerance_mm, angle, exact, voids_of(solid, tolerance_mm) if voids is None else voids)
+    return tessellate_parts(body, tolerance_mm, angle, exact, voids_of(solid, tolerance_mm))
 
 
 def tessellate_parts(
@@ -111,7 +109,11 @@ def tessellate_parts(
     exact: tuple[float, ...] = (0.0,),
     voids: Triangles | None = None,
 ) -> Tessellation:
-    """Tessellate glued solids like :func:`tessellate`; faces between them have their triangles once."""
+    """Tessellate glued solids like :func:`tessellate`; faces between them have their triangles once.
+
+    `voids` are the inner surfaces of the whole body, for a part of it on one side of a plane of symmetry, which may cut
+    them open.
+    """
     points, triangles, face = triangulated(body.shape, [f.face for f in body.faces], tolerance_mm, angle)
     cad_faces = []
     for i, f in enumerate(body.faces):

@@ -51,7 +51,7 @@ MARGIN = 0.3
 _STATIONS = 4, 20
 """Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""
 
-_WHOLE_FACE = 0.95
+WHOLE_FACE = 0.95
 """Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
 
 _MANY_READINGS = 100
@@ -213,28 +213,28 @@ def _widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
 def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, readings: int) -> tuple[Float, Float]:
     """Return compliance of contact points, and readings per contact force, from the compliance of rows."""
     count, dim = face.points.shape
-    found = np.zeros((readings, count * dim))
-    found[:, active] = rows[len(active) : len(active) + readings, : len(active)]
-    return scatter_to_points(rows, active, count, dim), found
+    reading_rows = np.zeros((readings, count * dim))
+    reading_rows[:, active] = rows[len(active) : len(active) + readings, : len(active)]
+    return scatter_to_points(rows, active, count, dim), reading_rows
 
 
-def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: float) -> BoundarySurface:
+def candidate_points(model: Model, free: BoundarySurface, first_contact_mm: float, margin: float) -> BoundarySurface:
     """Return the points of the free faces that come near the object on its path, the nearest first.
 
     At finite strain points that do not face the object at rest may turn towards it: those near others are included.
 
     Parameters
     ----------
-    touch : height of the object's lowest point at first touch, mm
+    first_contact_mm : height of the object's lowest point at first touch, mm
     margin : rigid gap that the points reach to, in depths of the press
     """
-    path = [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
+    path = poses(model)
     reach = folding = margin * max(pose.depth_mm for pose in path)
     tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
 
     def gaps(pose: ObjectPose) -> tuple[Float, Float]:
         """Gaps of points that face the object at rest, and of those that may do so later; infinite for others."""
-        placed = PlacedObject.of(model.object, touch, pose)
+        placed = PlacedObject.of(model.object, first_contact_mm, pose)
         geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
         normal = geometry.bases[:, 0]
         allowed = may_touch(free, normal), may_touch(free, normal, model.finite_strain)
@@ -249,10 +249,15 @@ def candidate_points(model: Model, free: BoundarySurface, touch: float, margin: 
         apart = cKDTree(free.points[chosen]).query(free.points[turning])[0]
         chosen[turning[apart <= folding + model.mesh.size_mm]] = True
         nearest = np.minimum(nearest, later)
-    if np.count_nonzero(chosen & on_contact) >= _WHOLE_FACE * np.count_nonzero(on_contact):
+    if np.count_nonzero(chosen & on_contact) >= WHOLE_FACE * np.count_nonzero(on_contact):
         chosen |= on_contact
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
     return restrict(free, order[chosen[order]])
+
+
+def poses(model: Model) -> list[ObjectPose]:
+    """Return the poses at which rigid gaps are taken to find the candidate points."""
+    return [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
 
 
 def _stations(leg: Leg) -> int:

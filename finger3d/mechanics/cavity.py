@@ -28,10 +28,10 @@ def cavity_warnings(mesh: Mesh, displacement: Float) -> list[str]:
 
     triangles = facets[:, TRIANGLES].reshape(-1, 3) if facets.shape[1] == 6 else facets
     nodes, faces = np.unique(triangles, return_inverse=True)
-    found = crossings(Triangles((mesh.points + displacement)[nodes], faces.reshape(-1, 3)))
-    if not len(found):
+    pairs = crossings(Triangles((mesh.points + displacement)[nodes], faces.reshape(-1, 3)))
+    if not len(pairs):
         return []
-    where = (mesh.points[nodes[faces.reshape(-1, 3)[found[0]]]]).mean(axis=0)
+    where = (mesh.points[nodes[faces.reshape(-1, 3)[pairs[0]]]]).mean(axis=0)
     return [
         "the inner surface of the finger crosses itself near x, y, z = "
         + ", ".join(f"{value:.3g}" for value in where)

@@ -105,7 +105,7 @@ def contact_geometry(
     surface: BoundarySurface,
     displacement: Float | None = None,
     axes: tuple[str, ...] = (),
-    share: Float | None = None,
+    object_share: Float | None = None,
 ) -> ContactGeometry:
     """Return gaps and directions of a surface's points.
 
@@ -115,7 +115,7 @@ def contact_geometry(
         Signed distance (n,) mm from the object, and its gradient (n, d).
     displacement : (c, d) mm, of the contact points; none unless given
     axes : symmetry planes, in which the normals of points on them lie
-    share : (c,)
+    object_share : (c,)
         Share of an elastic object in the compliance of each point; none is rigid.  Its surface turns towards that of
         the finger by this share: two mirror images meet in a plane.
     """
@@ -127,10 +127,10 @@ def contact_geometry(
     value, gradient = distance(moved)
     mean = _in_planes(np.asarray(surface.average @ gradient), surface, axes)
     length = np.linalg.norm(mean, axis=1)
-    if share is not None:
-        own = _in_planes(surface.normals, surface, axes)
-        own *= (share * length / np.linalg.norm(own, axis=1))[:, None]
-        mean = (1.0 - share[:, None]) * mean - own
+    if object_share is not None:
+        normals = _in_planes(surface.normals, surface, axes)
+        normals *= (object_share * length / np.linalg.norm(normals, axis=1))[:, None]
+        mean = (1.0 - object_share[:, None]) * mean - normals
     size = np.linalg.norm(mean, axis=1)
     normal = np.where((size > 0.0)[:, None], mean / np.where(size > 0.0, size, 1.0)[:, None], vertical_frame(d)[0])
     offset = np.zeros_like(normal) if displacement is None else displacement - surface.average @ interpolated

@@ -68,13 +68,13 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
     out, largest = [], reached_depth(problem.model, steps)
     for u, step in zip(_displacements(problem, steps), steps, strict=True):
         within = _stays_out(problem, u, step.target, others)
-        at = free.samples + free.interpolate @ u
-        value, _ = tracker.distance(problem.placed(step.target), at, 0.0)
+        samples = free.samples + free.interpolate @ u
+        value, _ = tracker.distance(problem.placed(step.target), samples, 0.0)
         worst = int(value.argmin())
         depth = max(-float(value[worst]), 0.0) if rigid else step.penetration_mm
         corners = hats[:, [worst]].indices
         face, at_crease = int(free.face[corners[0]]), bool(creased[corners].any())
-        out.append(SurfaceCheck(within, depth, at[worst], face, at_crease, largest))
+        out.append(SurfaceCheck(within, depth, samples[worst], face, at_crease, largest))
     return out
 
 
@@ -97,9 +97,9 @@ def reached_depth(model: Model, steps: Sequence[StepResult]) -> float:
 
 def resolving_edge(check: SurfaceCheck) -> float:
     """Return the edge length, over the present one, at which penetration is a hundredth of the depth."""
-    share = check.penetration_mm / check.depth_mm
+    ratio = check.penetration_mm / check.depth_mm
     order = _ORDER_AT_CREASE if check.at_crease else _ORDER
-    return float(min(1.0, _MARGIN * (_ADVISE_ABOVE / share) ** (1.0 / order))) if share > _ADVISE_ABOVE else 1.0
+    return float(min(1.0, _MARGIN * (_ADVISE_ABOVE / ratio) ** (1.0 / order))) if ratio > _ADVISE_ABOVE else 1.0
 
 
 def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float, most: float) -> list[str]:
@@ -156,8 +156,8 @@ def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundaryS
         return True
     gap, normal = formulation_of(problem.model).gap(problem, u, target, others)
     facing = may_touch(others, normal, problem.model.finite_strain)
-    for on_contact, share in _TOUCHES.items():
+    for on_contact, tolerance in _TOUCHES.items():
         points = facing & ((others.face == CONTACT) == on_contact)
-        if gap[points].min(initial=np.inf) <= -share * length_scale(problem, Move(target, target)):
+        if gap[points].min(initial=np.inf) <= -tolerance * length_scale(problem, Move(target, target)):
             return False
     return True

@@ -150,10 +150,10 @@ class ObjectBody:
         axes = () if held.is_whole else self.axes
         swap = _SWAPPED if held.is_crosswise else {}
         axes = tuple(swap.get(axis, axis) for axis in axes)
-        made = self._made(held.design, (low_x, high_x, low_z, high_z), held.mesher, axes)
-        cells = reflected(made, 1) if held.is_reflected else made
+        mesh = self._made(held.design, (low_x, high_x, low_z, high_z), held.mesher, axes)
+        cells = reflected(mesh, 1) if held.is_reflected else mesh
         facets = {swap.get(label, label): f for label, f in cells.facets.items()}
-        return Mesh(held.to_scene(made.points), cells.cells, facets)
+        return Mesh(held.to_scene(mesh.points), cells.cells, facets)
 
     def _block(self) -> Mesh:
         """Return a block behind the surface with the length and width of the finger and a flat far face."""

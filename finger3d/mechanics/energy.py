@@ -36,5 +36,5 @@ def frictional_dissipation(problem: Problem, before: ContactState, after: Contac
     slips = after.status == SLIP
     lost = -np.sum(after.force[:, 1:] * (after.accumulated_slip - before.accumulated_slip), axis=1) * slips
     end = after.force[:, 0]
-    share = np.divide(0.5 * (before.force[:, 0] + end), end, out=np.ones_like(end), where=end > 0.0)
-    return problem.symmetry.total(lost * share)
+    ratio = np.divide(0.5 * (before.force[:, 0] + end), end, out=np.ones_like(end), where=end > 0.0)
+    return problem.symmetry.total(lost * ratio)

@@ -26,6 +26,7 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
+from finger3d.fem.directions import rotated_delassus
 from finger3d.fem.finite_contact import DeformedContact
 from finger3d.fem.recover import displacement
 from finger3d.fem.tensors import InvertedError
@@ -36,7 +37,6 @@ from finger3d.mechanics.finite_state import (
     Linearisation,
     contact_of,
     curvature_of,
-    rotated,
 )
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.linear_contact import carried_by_object, transported
@@ -125,8 +125,8 @@ class IncrementEquations:
     def _largest_step(self) -> float:
         """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
         problem = self.problem
-        at = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
-        moved = float(np.abs(carried_by_object(problem, self.move, at)).max(initial=0.0))
+        u = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
+        moved = float(np.abs(carried_by_object(problem, self.move, u)).max(initial=0.0))
         return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
 
     @cached_property
@@ -155,12 +155,12 @@ class IncrementEquations:
     def _extrapolated(self, guess: Float | None) -> Iterator[tuple[Float, Float]]:
         """Yield expected unknowns (N,) and contact forces (c, d)."""
         start = self.start
-        at = start.body.unknowns
+        unknowns = start.body.unknowns
         if start.body.previous is not None:
             before, x = start.body.previous
             ratio = self.move.length_ratio(before)
             if ratio is not None:
-                yield at + ratio * (at - x), start.contact.force if guess is None else guess
+                yield unknowns + ratio * (unknowns - x), start.contact.force if guess is None else guess
 
     def at(self, x: Float) -> Configuration:
         """Return the configuration at unknowns (N,); raises InvertedError."""
@@ -205,9 +205,9 @@ class IncrementEquations:
         condensed = condense(tangent, problem.body.fixed_dofs, rows, replaced=replaced)
         self.workspace.factorizations += condensed.factorizations
         delassus = scatter_to_points(condensed.compliance, active, *force.shape)
-        found = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
-        self.workspace.linearisations[self._has_inclusions] = found
-        return found
+        linearisation = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
+        self.workspace.linearisations[self._has_inclusions] = linearisation
+        return linearisation
 
     def contact(
         self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
@@ -218,10 +218,10 @@ class IncrementEquations:
         """
         problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
-        delassus = rotated(linearisation.delassus, rotation)
+        delassus = rotated_delassus(linearisation.delassus, rotation)
         compliance = problem.system.object_compliance
         if compliance is not None:
-            delassus = delassus + rotated(compliance, bases @ vertical_frame(problem.dim).T)
+            delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
         moved = np.zeros(force.size)
         moved[active] = displacement
         free = self._relative_displacement(now, force)
@@ -259,8 +259,8 @@ class IncrementEquations:
     def _relative_displacement(self, now: Configuration, force: Float) -> Float:
         """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
         problem, bases = self.problem, now.contact.bases
-        at, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
-        increment = at - before - carried_by_object(problem, self.move, at)
+        u, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
+        increment = u - before - carried_by_object(problem, self.move, u)
         out = np.empty_like(force)
         out[:, 0] = now.contact.gap
         compliance = problem.system.object_compliance

@@ -50,14 +50,14 @@ class FiniteIncrement(IncrementEquations):
 
     def solve(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
-        found = self._iterate(guess)
-        if found.outcome.ok or found.detail:
-            return found
+        solution = self._iterate(guess)
+        if solution.outcome.ok or solution.detail:
+            return solution
         damped = self._iterate_damped()
         detail = damped.detail
         if damped.outcome is Outcome.NEWTON:
             detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
-        return replace(damped, iterations=found.iterations + damped.iterations, detail=detail)
+        return replace(damped, iterations=solution.iterations + damped.iterations, detail=detail)
 
     def _iterate(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
@@ -100,11 +100,11 @@ class FiniteIncrement(IncrementEquations):
         for _ in range(_DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
             spent += solution.iterations
-            found = math.inf if after is None else self._error(after, solution.state)
-            if after is None or found > _LARGEST_RISE * error:
+            next_error = math.inf if after is None else self._error(after, solution.state)
+            if after is None or next_error > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
-            now, force, last_error, error = after, solution.state.force, error, found
+            now, force, last_error, error = after, solution.state.force, error, next_error
             if converged(error, last_error):
                 return self.finished(now, solution, error, spent)
             change = error / last_error if math.isfinite(last_error) else 1.0

@@ -20,9 +20,6 @@ from finger3d.objects import Move, ObjectPose
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
 
-_ROUND_OFF = 1e-13
-"""Round-off of directions."""
-
 
 @dataclass(frozen=True)
 class DeformedBody:
@@ -76,15 +73,6 @@ class FiniteStrainWorkspace(Workspace):
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
 
 
-def rotated(delassus: Float, turn: Float) -> Float:
-    """Return a Delassus operator (c, d, c, d) in directions turned point by point by (c, d, d)."""
-    c, d = turn.shape[:2]
-    if np.allclose(turn, np.eye(d), rtol=0.0, atol=_ROUND_OFF):  # as on a plane
-        return delassus
-    half = (turn @ delassus.reshape(c, d, c * d)).reshape(c * d, c, d)
-    return np.asarray((half.transpose(1, 0, 2) @ turn.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(c, d, c, d))
-
-
 def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:
     """Return the contact of a face displaced by u (n, d) with the object in a pose."""
     gap, normal = problem.placed(target).distance(face.samples + face.interpolate @ u)
@@ -107,11 +95,11 @@ def curvature_of(problem: Problem, face: BoundarySurface, u: Float, target: Obje
     if problem.model.object.is_flat:
         return None
     d, placed = problem.dim, problem.placed(target)
-    at = face.samples + face.interpolate @ u
-    tangents = bases_of(placed.distance(at)[1])[:, 1:]
-    out, step = np.zeros((len(at), d, d)), _CURVATURE_STEP * problem.model.mesh.size_mm
+    samples = face.samples + face.interpolate @ u
+    tangents = bases_of(placed.distance(samples)[1])[:, 1:]
+    out, step = np.zeros((len(samples), d, d)), _CURVATURE_STEP * problem.model.mesh.size_mm
     for t in range(d - 1):
-        ahead, behind = (placed.distance(at + sign * step * tangents[:, t])[1] for sign in (1.0, -1.0))
+        ahead, behind = (placed.distance(samples + sign * step * tangents[:, t])[1] for sign in (1.0, -1.0))
         turn = np.einsum("qk,qtk->qt", ahead - behind, tangents) / (2.0 * step)
         out += np.einsum("qs,qsi,qj->qij", turn, tangents, tangents[:, t])
     return 0.5 * (out + np.swapaxes(out, 1, 2))

@@ -57,8 +57,8 @@ class FiniteStrain:
 
     def _material(self, problem: Problem) -> Hyperelastic:
         mesh, plane_stress = problem.mesh, problem.model.domain == "plane-stress"
-        found = problem.model.materials(mesh.part_labels)
-        linear = [material.isotropic("effects.large_deformation") for material in found]
+        materials = problem.model.materials(mesh.part_labels)
+        linear = [material.isotropic("effects.large_deformation") for material in materials]
         if mesh.part is None:
             law = self.law.with_shear(linear[0].E_MPa / (2.0 * (1.0 + linear[0].nu)))
             return Hyperelastic.of(law, linear[0].nu, plane_stress)
@@ -112,12 +112,12 @@ class FiniteStrain:
             self._increment(problem, state, move, workspace)
             for problem, (state, _) in zip(problems, starts, strict=True)
         ]
-        found = solve_together(increments, [guess for _, guess in starts], leader)
-        solutions = [
+        solutions = solve_together(increments, [guess for _, guess in starts], leader)
+        accepted = [
             one and self._kept_outside(increment, self._remembered(increment, one))
-            for increment, one in zip(increments, found, strict=True)
+            for increment, one in zip(increments, solutions, strict=True)
         ]
-        return [one if one is not None and one.outcome.ok else None for one in solutions]
+        return [one if one is not None and one.outcome.ok else None for one in accepted]
 
     def _increment(
         self,
@@ -133,28 +133,28 @@ class FiniteStrain:
         return FiniteIncrement(problem, body, state, move, workspace)
 
     def _kept_outside(
-        self, increment: FiniteIncrement, found: ContactSolution[State[DeformedBody]]
+        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
     ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution, as not converged if the finger or the object passed through the other."""
-        if not found.outcome.ok:
-            return found
+        if not solution.outcome.ok:
+            return solution
         problem, start, move = increment.problem, increment.start, increment.move
-        before, after = (_moved_points(problem, state) for state in (start, found.state))
+        before, after = (_moved_points(problem, state) for state in (start, solution.state))
         through = passes_through(problem, move, before, after, start.contact.gap)
-        if through or pulls(problem, start.contact, found.state.contact, move):
-            return replace(found, state=start, outcome=Outcome.PASSED_THROUGH)
-        return found
+        if through or pulls(problem, start.contact, solution.state.contact, move):
+            return replace(solution, state=start, outcome=Outcome.PASSED_THROUGH)
+        return solution
 
     def _remembered(
-        self, increment: FiniteIncrement, found: ContactSolution[State[DeformedBody]]
+        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
     ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution with the internal variables at the end of the increment."""
-        before, after = increment.start.body, found.state.body
-        if not found.outcome.ok or self.relaxation is None or before.memory is None:
-            return found
+        before, after = increment.start.body, solution.state.body
+        if not solution.outcome.ok or self.relaxation is None or before.memory is None:
+            return solution
         strained = increment.body.relaxing_variables(after.unknowns, self.relaxation.bulk)
         memory = Step(self.relaxation.prony, increment.move.duration_s).after(before.memory, strained)
-        return replace(found, state=replace(found.state, body=replace(after, memory=memory)))
+        return replace(solution, state=replace(solution.state, body=replace(after, memory=memory)))
 
     def unknowns(self, problem: Problem, states: Sequence[State[DeformedBody]]) -> Iterator[Float]:
         """Yield all unknowns (N,) of each state."""
@@ -164,7 +164,7 @@ class FiniteStrain:
         """Return the readings in the deformed configuration; foils read the strain of their bars."""
         model, body, memory = problem.model, problem.meshed_body, state.body.memory
         u, forces = displacement(problem.mesh, state.body.unknowns), self._nodal_forces(problem, state.body)
-        found = {
+        values = {
             name: float(number)
             for reading in model.readings
             for name, number in zip(
@@ -175,8 +175,8 @@ class FiniteStrain:
         if bars is not None:
             yielded = memory.elastic[-len(bars.stiffness) :] if memory else bars.yielded(u)
             strains = problem.inclusions.gauge_weights @ bars.strain(u, yielded)
-            found |= {gauge.name: float(strain) for gauge, strain in zip(model.gauges, strains, strict=True)}
-        return found
+            values |= {gauge.name: float(strain) for gauge, strain in zip(model.gauges, strains, strict=True)}
+        return values
 
     def _nodal_forces(self, problem: Problem, state: DeformedBody) -> Float:
         """Return the internal nodal forces (n, d) of the present stress; only taxels read them."""

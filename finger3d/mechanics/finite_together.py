@@ -128,7 +128,7 @@ def solve_together(
     -------
     Solution of each press, None where the iteration does not converge, or would converge faster with another tangent.
     """
-    found: list[ContactSolution[State[DeformedBody]] | None] = [None] * len(increments)
+    solutions: list[ContactSolution[State[DeformedBody]] | None] = [None] * len(increments)
     trials = [
         _Trial(n, increment, increment.initial(guess))
         for n, (increment, guess) in enumerate(zip(increments, guesses, strict=True))
@@ -150,7 +150,7 @@ def solve_together(
                 if trial.has_converged:
                     assert trial.solution is not None
                     one = trial.equations.finished(trial.now, trial.solution, trial.error, trial.spent)
-                    found[trial.number] = one if one.outcome.ok else None
+                    solutions[trial.number] = one if one.outcome.ok else None
             active = [trial for trial in active if not trial.has_converged]
             ahead = sum(max(trial.remaining - _NEW_TANGENT, 0.0) for trial in active)
             if first in active and (first.remaining > _TOO_SLOW if factors else ahead > _FACTOR_COST):
@@ -160,7 +160,7 @@ def solve_together(
                         trial.begin()
             elif factors or first not in active:
                 active = [trial for trial in active if trial is first or not trial.lags()]
-    return found
+    return solutions
 
 
 def _advanced(trials: list[_Trial], linearisation: Linearisation, pool: ThreadPoolExecutor) -> list[_Trial]:

@@ -123,15 +123,15 @@ def _surroundings(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Isotropic:
     Finger3dError
         If they lie in several parts: each foil must be surrounded by the material that unloads it.
     """
-    materials, found = model.materials(mesh.part_labels), dict[int, str]()
+    materials, gauge_of_part = model.materials(mesh.part_labels), dict[int, str]()
     part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
     for gauge in model.gauges:
         for place in (gauge.middle, *gauge.ends):
             inside, _ = reflect_into_part(place, np.ones(3), axes, mesh.dim)
             for cell, _ in cells_at(mesh, inside):
-                found.setdefault(int(part[cell]), gauge.name)
-    if len(found) > 1:
-        first, second = list(found.values())[:2]
+                gauge_of_part.setdefault(int(part[cell]), gauge.name)
+    if len(gauge_of_part) > 1:
+        first, second = list(gauge_of_part.values())[:2]
         where = (
             f'gauge "{first}" crosses an interface' if first == second else f'gauges "{first}" and "{second}" do not'
         )
@@ -139,7 +139,7 @@ def _surroundings(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Isotropic:
             f"effects.embedded_gauge: all foils must lie in one part of the finger, and {where}; move them, or press "
             "with the foils of one part at a time"
         )
-    return materials[next(iter(found), 0)].isotropic("effects.embedded_gauge")
+    return materials[next(iter(gauge_of_part), 0)].isotropic("effects.embedded_gauge")
 
 
 def _infinite_body_compliance(model: Model, material: Isotropic, foils: list[FoilPatches]) -> Float:
@@ -157,14 +157,14 @@ def _insert(
 
     Returns the numbers (bars,) of all of the foil's bars.
     """
-    ends, known, numbers = foil.centres, {}, []
+    ends, point_rows, numbers = foil.centres, {}, []
     order = {key: i for i, key in enumerate(bars)}
 
     def displacement(point: Float) -> sp.csr_matrix:
-        if tuple(point) not in known:
+        if tuple(point) not in point_rows:
             inside, signs = reflect_into_part(point, np.ones(3), axes, mesh.dim)
-            known[tuple(point)] = displacement_rows(mesh, inside, signs)
-        return known[tuple(point)]
+            point_rows[tuple(point)] = displacement_rows(mesh, inside, signs)
+        return point_rows[tuple(point)]
 
     for a, b in zip(ends[:-1].reshape(-1, 3), ends[1:].reshape(-1, 3), strict=True):
         key = _key(a, b, axes, mesh.dim)

@@ -153,8 +153,8 @@ class DepthSearch:
         trial = self._sorted_in(depth)
         if not trial.ok or trial.force > 0.0 or depth <= self.start or self.good[:-1]:
             return trial
-        for share in _NEARER:
-            nearer = self._sorted_in(self.start + share * (depth - self.start))
+        for fraction in _NEARER:
+            nearer = self._sorted_in(self.start + fraction * (depth - self.start))
             if nearer.ok and nearer.force > 0.0:
                 self.good.remove(trial)
                 self.failed.append(_passed_through(trial))
@@ -219,7 +219,14 @@ class DepthSearch:
         return float(barycentric_interpolate(forces, depths, self.wanted))
 
     def _extreme(self) -> str:
-        """Return the force found that is nearest to the one wanted, with its depth."""
+        """Return the force found that is nearest to the one wanted, with its depth, and at how many there was none."""
+        cycles = sum(trial.solution.outcome.is_cycle for trial in self.failed)
+        if cycles:
+            rule = f"the paper's rule has no answer at {cycles} of the depths tried; use [contact] rule = 'projection'"
+            return f"{self._nearest()}; {rule}"
+        return self._nearest()
+
+    def _nearest(self) -> str:
         if not self.good:
             return f"{self.wanted:.6g} N asked; no depth that was tried gave a solution"
         forces = [trial.force for trial in self.good]
@@ -253,9 +260,9 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         indexing="ij",
     )
     plan = 4.0 * way.half_length_mm * half_width / x.size
-    touch = first_contact_height(way.top, way.object, way.half_length_mm, way.half_width_mm, way.landmarks)
+    first_contact_mm = first_contact_height(way.top, way.object, way.half_length_mm, way.half_width_mm, way.landmarks)
     level = np.zeros_like(z) if way.half_width_mm == 0.0 else z
-    gap = PlacedObject.of(way.object, touch, ObjectPose(0.0)).height(x, level) - way.top(x, level)
+    gap = PlacedObject.of(way.object, first_contact_mm, ObjectPose(0.0)).height(x, level) - way.top(x, level)
     gap = np.where(np.isfinite(gap), gap, np.inf)
     modulus = material.E_MPa / (1.0 - material.nu**2)
 
@@ -265,7 +272,7 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         half = 0.5 * float(np.ptp(inside)) if len(inside) else 0.0
         return modulus * float(overlap.sum()) * plan / max(min(height, half), 1e-3 * height)
 
-    most = deepest(way.object, touch, height)
+    most = deepest(way.object, first_contact_mm, height)
     depth = brentq(lambda depth: pressed(depth) - force, 0.0, most) if pressed(most) > force else most
     return float(f"{depth:.4g}")
 

@@ -22,6 +22,7 @@ from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
 from finger3d.meshing.bisection import refined
+from finger3d.meshing.grading import SizedPlaces
 from finger3d.meshing.limits import check_count
 from finger3d.meshing.report import MeshReport, mesh_report
 
@@ -64,21 +65,14 @@ def edge_lengths_at_gauges(model: Model, mesh: Mesh, axes: tuple[str, ...] = ())
     """Return the longest edges (n,) mm that the gauges of a model allow at points (n, d), as a function of these."""
     options = model.mesh
     shortest = options.size_mm / options.gauge_refinement
-    # places, the edge length there, and the distance up to which it holds
-    zones: list[tuple[cKDTree, float, float]] = []
+    zones: list[SizedPlaces] = []
     for gauge in model.gauges:
         if not options.refined_gauges or gauge.name in options.refined_gauges:
-            line = cKDTree(_places_along(gauge, shortest, axes, mesh.dim))
-            places, edge = _places_on_face(mesh, line, shortest)
-            zones += [(line, shortest, _AROUND_GAUGE * shortest), (cKDTree(places), edge, edge)]
-
-    def size(points: Float) -> Float:
-        out = np.full(len(points), np.inf)
-        for tree, edge, reach in zones:
-            out = np.minimum(out, edge + _RATE * np.maximum(tree.query(points)[0] - reach, 0.0))
-        return out
-
-    return size
+            line = _places_along(gauge, shortest, axes, mesh.dim)
+            zones.append(SizedPlaces(line, shortest, _RATE, _AROUND_GAUGE * shortest))
+            places, edge = _places_on_face(mesh, zones[-1].tree, shortest)
+            zones.append(SizedPlaces(places, edge, _RATE, edge))
+    return lambda points: np.min([np.full(len(points), np.inf), *(zone.at(points) for zone in zones)], axis=0)
 
 
 def _places_along(gauge: Gauge, spacing: float, axes: tuple[str, ...], dim: int) -> Float:

@@ -191,7 +191,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "slide_z_mm": target.slide_z_mm,
         **{f"turn_{axis}_deg": round(math.degrees(turn), 12) for axis, turn in zip("xyz", target.turns, strict=True)},
         "time_s": target.time_s,
-        "normal_force_N": -float(world[:, 1].sum()),
+        "normal_force_N": 0.0 - float(world[:, 1].sum()),  # 0, not -0, without contact
         "tangential_force_x_N": float(friction[:, 0].sum()),
         "tangential_force_z_N": float(friction[:, 2].sum()),
         "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),

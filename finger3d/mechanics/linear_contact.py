@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
@@ -21,6 +20,7 @@ from finger3d.contact.friction import OPEN
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
+from finger3d.fem.directions import rotated_delassus
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
@@ -31,7 +31,7 @@ from finger3d.objects import DistanceTracker, Move, vertical_frame
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
-_ITERATIONS = 30
+_MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
@@ -69,21 +69,6 @@ class LinearBody:
         return np.asarray(moved @ frame)
 
 
-def turned_delassus(delassus: Float, rotations: Float, points: NDArray[np.intp]) -> Float:
-    """Return the Delassus operator (k, d, k, d) of some points along their own directions.
-
-    Parameters
-    ----------
-    delassus : (c, d, c, d) mm/N, in the directions of an upright object
-    rotations : (k, d, d) from these directions
-    points : (k,)
-    """
-    k, d = len(points), rotations.shape[-1]
-    own = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
-    half = (rotations @ own.reshape(k, d, k * d)).reshape(k * d, k, d)
-    return (half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d)
-
-
 def solve_increment(
     problem: Problem,
     state: State[Float],
@@ -105,18 +90,18 @@ def solve_increment(
     if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
         return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
     flat = problem.model.object.is_flat
-    at = (
+    expansion_point = (
         np.zeros_like(body.past)
         if flat
         else body.displacement(state.contact.force if guess is None else guess, state.contact.own_bases)
     )
-    geometry = increment.geometry(at)
-    held = np.zeros(len(at), dtype=bool)
+    geometry = increment.geometry(expansion_point)
+    held = np.zeros(len(expansion_point), dtype=bool)
     spent, error, start = 0, np.inf, guess
     tried: list[Float] = []
-    found: list[Float] = []
-    for iteration in range(1, _ITERATIONS + 1):
-        solution = increment.solve(geometry, at, start)
+    displacements: list[Float] = []
+    for iteration in range(1, _MOST_SOLUTIONS + 1):
+        solution = increment.solve(geometry, expansion_point, start)
         spent += solution.iterations
         if not (solution.outcome.ok or solution.outcome.is_cycle):
             return replace(solution.with_state(state), iterations=spent)
@@ -132,14 +117,14 @@ def solve_increment(
         if iteration >= _HOLD_FROM:
             change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
             held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
-        tried, found = [*tried, at][-_MEMORY:], [*found, displacement][-_MEMORY:]
-        at = _extrapolated(tried, found)
-        following = after if at is displacement else increment.geometry(at)
+        tried, displacements = [*tried, expansion_point][-_MEMORY:], [*displacements, displacement][-_MEMORY:]
+        expansion_point = _extrapolated(tried, displacements)
+        following = after if expansion_point is displacement else increment.geometry(expansion_point)
         geometry = following.holding(held, geometry)
     if error > TOLERANCE:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
     gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
-    after_state = increment.reached(geometry, at, displacement, solution.state, gap)
+    after_state = increment.reached(geometry, expansion_point, displacement, solution.state, gap)
     through = passes_through(problem, move, state.body, displacement, gap_before)
     if through or pulls(problem, state.contact, after_state.contact, move):
         return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
@@ -155,24 +140,24 @@ def solve_linearised(
     """
     if problem.contact_geometry is None or move.end not in problem.contact_geometry:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
-    geometry, at = problem.contact_geometry[move.end]
+    geometry, expansion_point = problem.contact_geometry[move.end]
     increment = _Increment(problem, state, move, body, DistanceTracker())
-    solution = increment.solve(geometry, at, guess)
+    solution = increment.solve(geometry, expansion_point, guess)
     if not solution.outcome.ok:
         return solution.with_state(state)
     displacement = body.displacement(solution.state.force, geometry.bases)
-    return solution.with_state(increment.reached(geometry, at, displacement, solution.state, None))
+    return solution.with_state(increment.reached(geometry, expansion_point, displacement, solution.state, None))
 
 
-def _extrapolated(tried: list[Float], found: list[Float]) -> Float:
+def _extrapolated(tried: list[Float], results: list[Float]) -> Float:
     """Return the next displacement from those tried and those found from them, by Anderson's method."""
     if len(tried) == 1:
-        return found[-1]
-    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, found, strict=True)])
+        return results[-1]
+    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, results, strict=True)])
     change = residuals[1:] - residuals[:-1]
-    moved = np.stack([(b - a).ravel() for a, b in zip(found, found[1:], strict=False)])
+    moved = np.stack([(b - a).ravel() for a, b in zip(results, results[1:], strict=False)])
     weights = np.linalg.lstsq(change.T, residuals[-1], rcond=1e-10)[0]
-    return np.asarray(found[-1] - (weights @ moved).reshape(found[-1].shape))
+    return np.asarray(results[-1] - (weights @ moved).reshape(results[-1].shape))
 
 
 @dataclass(frozen=True)
@@ -191,19 +176,21 @@ class _Increment:
         It is exact for points nearer to the object than `within`, over the depth.
         """
         problem, reach = self.problem, within * length_scale(self.problem, self.move)
-        placed, share = problem.placed(self.move.end), problem.system.object_share
+        placed, object_share = problem.placed(self.move.end), problem.system.object_share
 
         def distance(points: Float) -> tuple[Float, Float]:
             return self.tracker.distance(placed, points, reach)
 
-        return contact_geometry(distance, problem.surface, displacement, problem.axes, share)
+        return contact_geometry(distance, problem.surface, displacement, problem.axes, object_share)
 
-    def solve(self, geometry: ContactGeometry, at: Float, guess: Float | None) -> ContactSolution[ContactState]:
+    def solve(
+        self, geometry: ContactGeometry, expansion_point: Float, guess: Float | None
+    ) -> ContactSolution[ContactState]:
         """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
         start = transported(self.state.contact, bases)
-        free = self._relative(geometry, at, self.body.past @ vertical_frame(d))
+        free = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
         rule, law = RULES[problem.model.rule], problem.model.contact_law
@@ -212,41 +199,49 @@ class _Increment:
             return rule(ContactProblem.of(start, free, self.body.delassus, law, scale, area=area), guess)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
-        delassus = turned_delassus(self.body.delassus, rotations[near], near)
+        delassus = rotated_delassus(self.body.delassus, rotations[near], near)
         contact = ContactProblem.of(start.of_points(near), free[near], delassus, law, scale, area=area[near])
         part = rule(contact, expected[near])
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
         return replace(part, state=replace(start, force=force, status=status))
 
-    def _relative(self, geometry: ContactGeometry, at: Float, displacement: Float) -> Float:
-        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one, `at`."""
+    def _relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
+        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one."""
         bases = geometry.bases
-        out: Float = np.einsum("cak,ck->ca", bases, displacement - at)
+        out: Float = np.einsum("cak,ck->ca", bases, displacement - expansion_point)
         out[:, 0] += geometry.gap
-        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, at)
+        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, expansion_point)
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
         return out
 
-    def error(self, after: ContactGeometry, turned: Float, displacement: Float, found: ContactState) -> float:
+    def error(self, after: ContactGeometry, turned: Float, displacement: Float, contact: ContactState) -> float:
         """Return the largest violation by gaps at the displacement found, and by directions that have turned.
 
         Gaps are divided by the depth; turns (c,) rad count by the force of their point over the largest.
         """
         scale = length_scale(self.problem, self.move)
-        closed = found.status != OPEN
+        closed = contact.status != OPEN
         gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
-        size = np.linalg.norm(found.force, axis=1)
+        size = np.linalg.norm(contact.force, axis=1)
         return float(max(gap.max(initial=0.0), (turned * size).max(initial=0.0) / (size.max(initial=0.0) or 1.0)))
 
     def reached(
-        self, geometry: ContactGeometry, at: Float, displacement: Float, found: ContactState, gap: Float | None
+        self,
+        geometry: ContactGeometry,
+        expansion_point: Float,
+        displacement: Float,
+        contact: ContactState,
+        gap: Float | None,
     ) -> State[Float]:
-        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement, `at`."""
-        start, relative = transported(self.state.contact, geometry.bases), self._relative(geometry, at, displacement)
+        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement."""
+        start, relative = (
+            transported(self.state.contact, geometry.bases),
+            self._relative(geometry, expansion_point, displacement),
+        )
         if gap is not None:
             relative[:, 0] = gap
-        after = next_state(start, found.force, relative, found.status)
+        after = next_state(start, contact.force, relative, contact.status)
         return State(replace(after, bases=geometry.bases), displacement)
 
 
@@ -266,14 +261,14 @@ def transported(state: ContactState, bases: Float) -> ContactState:
     )
 
 
-def carried_by_object(problem: Problem, move: Move, at: Float) -> Float:
-    """Return how far (c, d) mm the object moves where the points are, displaced by `at` (c, d).
+def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Float:
+    """Return how far (c, d) mm the object moves where the points are, displaced by `displacement` (c, d).
 
     The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
     """
-    d, start, end = at.shape[1], move.start, move.end
+    d, start, end = displacement.shape[1], move.start, move.end
     if start.turns == end.turns:
-        return np.broadcast_to((end.displacement - start.displacement)[:d], at.shape)
-    points = np.zeros((len(at), 3))
-    points[:, :d] = problem.surface.centroids + at
+        return np.broadcast_to((end.displacement - start.displacement)[:d], displacement.shape)
+    points = np.zeros((len(displacement), 3))
+    points[:, :d] = problem.surface.centroids + displacement
     return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]

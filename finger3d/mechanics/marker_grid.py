@@ -79,19 +79,19 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
     """
     named = problem.model.markers
     grid = MarkerGrid.of(problem, spacing_mm) if spacing_mm else None
-    at = [m.place[: problem.dim] for m in named] + ([] if grid is None else list(grid.places))
-    count = len(at) - len(named)
+    positions = [m.place[: problem.dim] for m in named] + ([] if grid is None else list(grid.places))
+    count = len(positions) - len(named)
     moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
     if grid is not None:
         unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps])
         fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
     columns: Tree = {
-        "step": np.repeat(np.arange(1, len(steps) + 1), len(at)),
-        **{key: np.repeat([value(step.target) for step in steps], len(at)) for key, value in _POSE.items()},
+        "step": np.repeat(np.arange(1, len(steps) + 1), len(positions)),
+        **{key: np.repeat([value(step.target) for step in steps], len(positions)) for key, value in _POSE.items()},
         "marker": [*(m.name for m in named), *(f"grid_{k + 1}" for k in range(count))] * len(steps),
     }
-    places, displacements = np.tile(_in_space(np.array(at)), (len(steps), 1)), _in_space(np.vstack(moved))
+    places, displacements = np.tile(_in_space(np.array(positions)), (len(steps), 1)), _in_space(np.vstack(moved))
     columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
     return columns | {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
 

@@ -207,9 +207,9 @@ class Model:
     @property
     def stresses_scale_with_modulus(self) -> bool:
         """Whether all stresses at given displacements are proportional to Young's modulus of the finger."""
-        own, parts = self.material, [material for _, material in self.parts]
+        finger, parts = self.material, [material for _, material in self.parts]
         rigid = all(
-            isinstance(own, Isotropic) and isinstance(part, Isotropic) and part.E_MPa == RIGID_RATIO * own.E_MPa
+            isinstance(finger, Isotropic) and isinstance(part, Isotropic) and part.E_MPa == RIGID_RATIO * finger.E_MPa
             for part in parts
         )
         return rigid and self.inclusions is None and self.object_compliance is None
@@ -242,11 +242,11 @@ def contact_path(
 
     An elastic object, which is not `rigid`, touches the contact face only.
     """
-    at, poses = ObjectPose(0.0), list[ObjectPose]()
+    pose, poses = ObjectPose(0.0), list[ObjectPose]()
     for leg in legs:
-        end = leg.end(at)
-        poses += [Move(at, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
-        at = end
+        end = leg.end(pose)
+        poses += [Move(pose, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
+        pose = end
     return ContactPath(
         top=design.top,
         object=obj,

@@ -47,15 +47,15 @@ def map_parallel(
         Number of contact rows from which presses run at once; `_ROWS_FOR_THREADS` unless given.
     """
     formulation = formulation_of(problem.model)
-    known: tuple[Result, ...] = ()
+    last_results: tuple[Result, ...] = ()
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
     least = _ROWS_FOR_THREADS if threads_from is None else threads_from
     if len(problem.system.active_dofs) < least or at_once < 2 or problem.model.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
-            known = (*known, press(variant, known, workspace, cancel))[-2:]
-            yield known[-1]
+            last_results = (*last_results, press(variant, last_results, workspace, cancel))[-2:]
+            yield last_results[-1]
         return
     waiting = iter(variants)
     # The limit on threads is set once around the pool: a limit set by a press would undo that of another.
@@ -63,16 +63,16 @@ def map_parallel(
 
         def submitted(count: int) -> list[Future[Result]]:
             return [
-                pool.submit(press, variant, known, formulation.workspace(), cancel)
+                pool.submit(press, variant, last_results, formulation.workspace(), cancel)
                 for variant in islice(waiting, count)
             ]
 
         running = deque(submitted(at_once))
         try:
             while running:
-                known = (*known, running.popleft().result())[-2:]
+                last_results = (*last_results, running.popleft().result())[-2:]
                 running.extend(submitted(1))
-                yield known[-1]
+                yield last_results[-1]
         finally:
             cancel.set()
             pool.shutdown(cancel_futures=True)

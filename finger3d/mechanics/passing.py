@@ -88,14 +88,14 @@ def passes_through(problem: Problem, move: Move, before: Float, after: Float, ga
     if ((value <= touches) | (outside <= touches)).any():
         return True
     start, length, touches = start[near], length[near], touches
-    along, at = path[near] / length[:, None], np.zeros(len(near))
+    along, distance = path[near] / length[:, None], np.zeros(len(near))
     for _ in range(_TRACED):  # no surface is nearer than the distance, so that no step passes one
-        at += value
-        moving = at < length
+        distance += value
+        moving = distance < length
         if not moving.any():
             return False
-        start, length, touches, along, at = (v[moving] for v in (start, length, touches, along, at))
-        value = thing.distance(start + at[:, None] * along)[0]
+        start, length, touches, along, distance = (v[moving] for v in (start, length, touches, along, distance))
+        value = thing.distance(start + distance[:, None] * along)[0]
         if (value <= touches).any():
             return True
     return True

@@ -38,15 +38,15 @@ class Station:
 def stations(legs: tuple[Leg, ...]) -> list[Station]:
     """Return the stations at the ends of all increments of the legs, in order."""
     out: list[Station] = []
-    at = ObjectPose(0.0)
+    start = ObjectPose(0.0)
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
-        end = leg.end(at)
-        poses = [Move(at, end).at(k / count) for k in range(1, count)] + [end]
+        end = leg.end(start)
+        poses = [Move(start, end).at(k / count) for k in range(1, count)] + [end]
         for k, pose in enumerate(poses, 1):
             load = None if leg.force_N is None else Load(leg.force_N, k / count, k == 1)
             out.append(Station(pose, load))
-        at = end
+        start = end
     return out
 
 

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._cost import PressSize
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
@@ -178,6 +179,11 @@ class Problem:
         return self.body.condensed.factorizations + self.system.object_factorizations
 
     @property
+    def size(self) -> PressSize:
+        """Size of the meshed part, from which times are modelled."""
+        return PressSize(self.dim, self.body.stiffness.upper.shape[0], len(self.surface.nodes))
+
+    @property
     def origin(self) -> ObjectPose:
         """Pose at first touch, where every path begins."""
         return ObjectPose(0.0)
@@ -185,10 +191,10 @@ class Problem:
     @property
     def last_pose(self) -> ObjectPose:
         """Pose at the end of the path."""
-        at = self.origin
+        pose = self.origin
         for leg in self.model.legs:
-            at = leg.end(at)
-        return at
+            pose = leg.end(pose)
+        return pose
 
     @property
     def dim(self) -> int:
@@ -218,10 +224,10 @@ class Problem:
     def coupling(self) -> float:
         """Largest mu |K_tt^-1 K_tn| over points; above 1 a contact state need not be the only one."""
         c = len(self.system.delassus)
-        own = self.system.delassus[np.arange(c), :, np.arange(c)]
+        blocks = self.system.delassus[np.arange(c), :, np.arange(c)]
         last = PlacedObject.of(self.model.object, self.system.first_contact_mm, self.last_pose)
         turned = contact_geometry(last.distance, self.surface, axes=self.axes).from_reference
-        return uniqueness(np.full(c, self.model.friction.largest), turned @ own @ turned.transpose(0, 2, 1))
+        return uniqueness(np.full(c, self.model.friction.largest), turned @ blocks @ turned.transpose(0, 2, 1))
 
     def read(self, force: Float) -> dict[str, float]:
         """Readings by name under contact forces (c, d), through the condensed rows."""
@@ -282,9 +288,9 @@ def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int
 
     A point on a symmetry plane cannot move across it: that direction is not coupled, and its force is always zero.
     """
-    own = rows[: len(kept), : len(kept)]
-    out = np.diag(np.full(count * dim, np.diagonal(own).max()))
-    out[np.ix_(kept, kept)] = own
+    block = rows[: len(kept), : len(kept)]
+    out = np.diag(np.full(count * dim, np.diagonal(block).max()))
+    out[np.ix_(kept, kept)] = block
     return out.reshape(count, dim, count, dim)
 
 
@@ -296,5 +302,5 @@ def object_share(surface: BoundarySurface, finger: Float, thing: Float) -> Float
     finger, thing : (c, d, c, d) mm/N
         Compliance of the two bodies at the surface's points.
     """
-    own, other = (np.einsum("ij,j->i", w[:, 0, :, 0], surface.area) for w in (finger, thing))
-    return np.asarray(np.clip(other / (own + other), 0.0, 1.0))
+    own_compliance, other = (np.einsum("ij,j->i", w[:, 0, :, 0], surface.area) for w in (finger, thing))
+    return np.asarray(np.clip(other / (own_compliance + other), 0.0, 1.0))

@@ -16,20 +16,20 @@ from finger3d.mechanics.model import Model
 Box = tuple[float, float, float, float]
 
 
-def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = None) -> BoundarySurface:
+def regular_points(model: Model, box: Box, size_mm: float, middle: Float | None = None) -> BoundarySurface:
     """Return a regular grid of contact points over a box.
 
     Parameters
     ----------
     box : (x_min, x_max, z_min, z_max), mm
     size_mm : distance of the points
-    at : (2,) array, mm
+    middle : (2,) array, mm
         Place in the middle of four points; by default the origin.
     """
     design, solid = model.design, model.domain == "solid"
     half = (design.half_length_mm, 0.5 * design.width_mm)
-    at = np.zeros(2) if at is None else at
-    lines = [_lines(box[2 * k : 2 * k + 2], half[k], size_mm, at[k]) for k in range(2 if solid else 1)]
+    middle = np.zeros(2) if middle is None else middle
+    lines = [_lines(box[2 * k : 2 * k + 2], half[k], size_mm, middle[k]) for k in range(2 if solid else 1)]
     hats = [_hats(line) for line in lines]
     places, means = [h[0] for h in hats], [h[1] for h in hats]
     samples = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(lines))
@@ -56,11 +56,11 @@ def regular_points(model: Model, box: Box, size_mm: float, at: Float | None = No
     )
 
 
-def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
+def _lines(box: Sequence[float], half: float, size: float, middle: float) -> Float:
     """Return the coordinates of contact points along one axis, with the ends of the finger."""
     low, high = max(box[0] - size, -half), min(box[1] + size, half)
-    first, last = math.ceil((low - at) / size - 0.5), math.floor((high - at) / size - 0.5)
-    inner = at + (np.arange(first, last + 1) + 0.5) * size
+    first, last = math.ceil((low - middle) / size - 0.5), math.floor((high - middle) / size - 0.5)
+    inner = middle + (np.arange(first, last + 1) + 0.5) * size
     ends = [v for v in (low, high) if abs(v) == half]
     line = np.unique(np.concatenate([inner, ends]))
     return line if len(line) > 1 else np.array([low, high])
@@ -69,12 +69,12 @@ def _lines(box: Sequence[float], half: float, size: float, at: float) -> Float:
 def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
     """Return quadrature points (q,) between coordinates (n,), and the mean of samples over each hat function (n, q)."""
     x, w = np.polynomial.legendre.leggauss(4)
-    share = 0.5 * (x + 1.0)
+    weight = 0.5 * (x + 1.0)
     steps = np.diff(line)
-    places = (line[:-1, None] + share * steps[:, None]).ravel()
+    places = (line[:-1, None] + weight * steps[:, None]).ravel()
     mean = np.zeros((len(line), len(steps), 4))
     number = np.arange(len(steps))
-    mean[number, number] = (1.0 - share) * w * steps[:, None]
-    mean[number + 1, number] = share * w * steps[:, None]
+    mean[number, number] = (1.0 - weight) * w * steps[:, None]
+    mean[number + 1, number] = weight * w * steps[:, None]
     rows = mean.reshape(len(line), -1)
     return places, sp.csr_matrix(rows / rows.sum(axis=1, keepdims=True))

@@ -80,14 +80,14 @@ class UnresolvedOverlap:
 
     Attributes
     ----------
-    share : largest unresolved overlap over the depth of the press
+    ratio : largest unresolved overlap over the depth of the press
     in_contact : whether the object reaches any contact point
     depth_mm : the unresolved overlap, mm
     target : the pose where it is largest
     place : (2,) array, where it is largest, along x and z, mm
     """
 
-    share: float
+    ratio: float
     in_contact: bool
     depth_mm: float
     target: ObjectPose
@@ -114,19 +114,19 @@ def unresolved_overlap(
     nearest = tree.query(_horizontal(face.samples), k=count)[1].reshape(-1, count)
     path = targets(tuple(replace(leg, steps=_STATIONS) for leg in model.legs))
     deepest = max(t.depth_mm for t in path)
-    found = UnresolvedOverlap(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
+    unresolved = UnresolvedOverlap(0.0, deepest <= 0.0, 0.0, path[-1], np.zeros(2))
     # at a given slide the unresolved overlap is largest at the largest depth
     poses = [t for t in sorted(path, key=lambda t: t.depth_mm) if t.depth_mm > 0.0]
     deepest_at = {(t.slide_x_mm, t.slide_z_mm, *t.turns): t for t in poses}
     for slide, target in deepest_at.items():
         overlap = _mean_overlap(model, face, touch_mm, target)
         placed = PlacedObject.of(model.object, touch_mm, target)
-        at = np.zeros((0, d)) if landmarks is None else _surface_points(model, _over(placed, landmarks, d), d)
-        mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(at)), _horizontal(at))
+        points = np.zeros((0, d)) if landmarks is None else _surface_points(model, _over(placed, landmarks, d), d)
+        mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(points)), _horizontal(points))
         near = tree.query(mirrored, k=count)[1]
-        places, around = np.vstack([face.samples, at]), np.vstack([nearest, near.reshape(-1, count)])
+        places, around = np.vstack([face.samples, points]), np.vstack([nearest, near.reshape(-1, count)])
         vertical = _overlap(model, places, touch_mm, target)
-        if not found.in_contact:
+        if not unresolved.in_contact:
             under = face.average @ (vertical[: len(face.samples)] > 0.0) > 0.0  # no other can be inside
             # an object deeper than it is thick has left the finger at rest behind
             shallow = min(target.depth_mm, _MOST_CHORD * model.object.mean_chord(-placed.turned[1]))
@@ -135,15 +135,15 @@ def unresolved_overlap(
                 for pose in (target, replace(target, depth_mm=shallow))
                 for part in (restrict(face, under), beside)
             )
-            found = replace(found, in_contact=touched)
+            unresolved = replace(unresolved, in_contact=touched)
         missed = vertical - overlap[around].max(axis=1)
         worst, depth = _worst(model, free, placed, places, vertical, missed, _WARN_ABOVE * deepest)
         if landmarks is None and not any(slide):  # the overlap is largest at first touch, wherever that is
             depth = max(depth, target.depth_mm - float(overlap.max()))
-        if depth > found.depth_mm:
+        if depth > unresolved.depth_mm:
             place = np.append(_horizontal(places[worst]), np.zeros(3 - d))
-            found = UnresolvedOverlap(depth / deepest, found.in_contact, depth, target, place)
-    return found
+            unresolved = UnresolvedOverlap(depth / deepest, unresolved.in_contact, depth, target, place)
+    return unresolved
 
 
 def _worst(
@@ -181,21 +181,21 @@ def _along_normals(
     ----------
     overlap, missed : (k,) mm, vertical overlaps, and what of them is not resolved
     """
-    wide, found = np.flatnonzero(np.isfinite(overlap)), np.full(len(places), -np.inf)
-    for share in _COLUMN:
-        at = places[wide] - np.outer((1.0 - share) * overlap[wide], np.eye(places.shape[1])[1])
-        value, gradient = placed.distance(at)
-        inwards = np.maximum(np.minimum(share * overlap[wide], _WIDE * model.mesh.size_mm) + value, 0.0)
+    wide, unresolved = np.flatnonzero(np.isfinite(overlap)), np.full(len(places), -np.inf)
+    for fraction in _COLUMN:
+        points = places[wide] - np.outer((1.0 - fraction) * overlap[wide], np.eye(places.shape[1])[1])
+        value, gradient = placed.distance(points)
+        inwards = np.maximum(np.minimum(fraction * overlap[wide], _WIDE * model.mesh.size_mm) + value, 0.0)
         touching = value < _GRAZES * model.mesh.size_mm
-        thin = touching & (placed.distance(at - inwards[:, None] * gradient)[0] >= 0.0)
+        thin = touching & (placed.distance(points - inwards[:, None] * gradient)[0] >= 0.0)
         inside = touching & ~thin
         if inside.any():
-            unseen = -value[inside] - _seen(free, placed, at[inside])
-            found[wide[inside]] = np.maximum(found[wide[inside]], unseen)
+            unseen = -value[inside] - _seen(free, placed, points[inside])
+            unresolved[wide[inside]] = np.maximum(unresolved[wide[inside]], unseen)
         wide = wide[~thin]
-    known = wide[np.isfinite(found[wide])]
+    flanks = wide[np.isfinite(unresolved[wide])]
     out = missed.copy()
-    out[known] = np.minimum(missed[known], found[known])
+    out[flanks] = np.minimum(missed[flanks], unresolved[flanks])
     return out
 
 
@@ -237,18 +237,18 @@ def check(
         It names the edge length that resolves the object.
     """
     landmarks = landmarks_of(model, touch_mm, place)
-    found = unresolved_overlap(model, free, touch_mm, landmarks, axes)
-    if found.share > REFUSE_ABOVE or not found.in_contact:
-        size = resolving_size(model, touch_mm, found, landmarks)
-        raise UnresolvedError(_refusal(model, found, size), size)
+    unresolved = unresolved_overlap(model, free, touch_mm, landmarks, axes)
+    if unresolved.ratio > REFUSE_ABOVE or not unresolved.in_contact:
+        size = resolving_size(model, touch_mm, unresolved, landmarks)
+        raise UnresolvedError(_refusal(model, unresolved, size), size)
 
 
 def warnings(problem: Problem) -> list[str]:
     """Return warnings about an object that the contact points do not resolve."""
-    model, touch = problem.model, problem.system.first_contact_mm
-    landmarks = landmarks_of(model, touch, problem.system.place_mm)
-    found = unresolved_overlap(model, problem.surface, touch, landmarks, problem.axes)
-    return _messages(model, touch, landmarks, found)
+    model, touch_mm = problem.model, problem.system.first_contact_mm
+    landmarks = landmarks_of(model, touch_mm, problem.system.place_mm)
+    unresolved = unresolved_overlap(model, problem.surface, touch_mm, landmarks, problem.axes)
+    return _messages(model, touch_mm, landmarks, unresolved)
 
 
 def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
@@ -258,24 +258,24 @@ def warnings_before_meshing(model: Model, axes: tuple[str, ...]) -> list[str]:
     (x0, x1, z0, z1), (x, z) = contact.contact_box, contact.place
     box = (max(x0, x - reach), min(x1, x + reach), max(z0, z - reach), min(z1, z + reach))
     # a mesh has points on its symmetry planes
-    at = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", contact.place, strict=True)])
-    touch, points = contact.first_contact_mm, regular_points(model, box, size, at)
-    landmarks = landmarks_of(model, touch, contact.place)
+    middle = np.array([0.5 * size if axis in axes else place for axis, place in zip("xz", contact.place, strict=True)])
+    touch_mm, points = contact.first_contact_mm, regular_points(model, box, size, middle)
+    landmarks = landmarks_of(model, touch_mm, contact.place)
     if landmarks is not None:
-        landmarks = _within(landmarks, PlacedObject.of(model.object, touch), box, points.points.shape[1])
-    return _messages(model, touch, landmarks, unresolved_overlap(model, points, touch, landmarks))
+        landmarks = _within(landmarks, PlacedObject.of(model.object, touch_mm), box, points.points.shape[1])
+    return _messages(model, touch_mm, landmarks, unresolved_overlap(model, points, touch_mm, landmarks))
 
 
-def _messages(model: Model, touch_mm: float, landmarks: Float | None, found: UnresolvedOverlap) -> list[str]:
+def _messages(model: Model, touch_mm: float, landmarks: Float | None, unresolved: UnresolvedOverlap) -> list[str]:
     messages = unresolved_details(model)
-    if found.share > _WARN_ABOVE or not found.in_contact:
-        messages.append(_refusal(model, found, resolving_size(model, touch_mm, found, landmarks)))
+    if unresolved.ratio > _WARN_ABOVE or not unresolved.in_contact:
+        messages.append(_refusal(model, unresolved, resolving_size(model, touch_mm, unresolved, landmarks)))
     return messages
 
 
 def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
     """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
-    model, face, touch = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
+    model, face, touch_mm = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
     missed: list[float] = []
     for frame in frames:
         end = frame.target
@@ -284,7 +284,7 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
         slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
         if (rigid_gap(problem.placed(end), problem.surface) < 0.0).any():  # the finger has not followed yet
             continue
-        if not slid or (_overlap(model, face.samples, touch, end) > 0.0).any():
+        if not slid or (_overlap(model, face.samples, touch_mm, end) > 0.0).any():
             missed.append(end.depth_mm)
     if not missed:
         return []
@@ -294,7 +294,9 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
     ]
 
 
-def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, landmarks: Float | None) -> float | None:
+def resolving_size(
+    model: Model, touch_mm: float, unresolved: UnresolvedOverlap, landmarks: Float | None
+) -> float | None:
     """Return the edge length at which a regular patch of contact points resolves the object.
 
     The patch is where the unresolved overlap is largest.  The length is None if there is none of use, or if the surface
@@ -302,20 +304,20 @@ def resolving_size(model: Model, touch_mm: float, found: UnresolvedOverlap, land
     """
     if landmarks is None:
         return None
-    at, end, size = found.place, found.target, model.mesh.size_mm
+    place, end, size = unresolved.place, unresolved.target, model.mesh.size_mm
     # the object does not move: only its shape near the place counts
     leg = Leg(end.depth_mm, end.slide_x_mm, end.slide_z_mm, 1, None, *end.turns)
     placed = PlacedObject.of(model.object, touch_mm, end)
     for _ in range(_TRIES):
         size *= _FINER
         reach = _PATCH * size
-        box = (at[0] - reach, at[0] + reach, at[1] - reach, at[1] + reach)
-        points = regular_points(model, box, size, at)
+        box = (place[0] - reach, place[0] + reach, place[1] - reach, place[1] + reach)
+        points = regular_points(model, box, size, place)
         landmarks = _within(landmarks, placed, box, points.points.shape[1])
         there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
         seen = unresolved_overlap(there, points, touch_mm, landmarks)
-        if seen.in_contact and seen.share <= _RESOLVED:
-            return _rounded(min(size, _resolving(model.object)))
+        if seen.in_contact and seen.ratio <= _RESOLVED:
+            return _rounded_down(min(size, _resolving(model.object)))
     return None
 
 
@@ -330,38 +332,37 @@ def _horizontal(points: Float) -> Float:
     return points[..., ::2] if points.shape[-1] == 3 else points[..., :1]
 
 
-def _overlap(model: Model, at: Float, touch: float, target: ObjectPose) -> Float:
+def _overlap(model: Model, points: Float, touch_mm: float, target: ObjectPose) -> Float:
     """Return the vertical overlap (n,), mm, of the object with points (n, d) of the finger; -inf outside the object."""
-    z = at[:, 2] if at.shape[1] == 3 else np.zeros(len(at))
-    height = PlacedObject.of(model.object, touch, target).height(at[:, 0], z)
-    return np.nan_to_num(at[:, 1] - height, nan=-np.inf)
+    z = points[:, 2] if points.shape[1] == 3 else np.zeros(len(points))
+    return PlacedObject.of(model.object, touch_mm, target).overlap(points[:, 0], points[:, 1], z)
 
 
-def _mean_overlap(model: Model, face: BoundarySurface, touch: float, target: ObjectPose) -> Float:
+def _mean_overlap(model: Model, face: BoundarySurface, touch_mm: float, target: ObjectPose) -> Float:
     """Return the vertical overlap (c,), mm, that contact points see at rest: the mean over what the object covers.
 
     It is 0 for a point of whose hat function the object covers less than half.
     """
-    overlap = _overlap(model, face.samples, touch, target)
+    overlap = _overlap(model, face.samples, touch_mm, target)
     covered = np.isfinite(overlap)
-    share = np.asarray(face.average @ covered)
-    mean = np.asarray(face.average @ np.where(covered, overlap, 0.0)) / np.maximum(share, _COVERED)
-    return np.where(share < _COVERED, 0.0, np.maximum(mean, 0.0))
+    fraction = np.asarray(face.average @ covered)
+    mean = np.asarray(face.average @ np.where(covered, overlap, 0.0)) / np.maximum(fraction, _COVERED)
+    return np.where(fraction < _COVERED, 0.0, np.maximum(mean, 0.0))
 
 
 def _surface_points(model: Model, places: Float, dim: int) -> Float:
     """Return the points (n, d), mm, of the surface of the finger at places (k, 2), without those outside it."""
     half = np.array([model.design.half_length_mm, 0.5 * model.design.width_mm])
-    at = places[np.all(np.abs(places) <= half, axis=1)]
-    y = model.design.top(at[:, 0], at[:, 1])
-    return np.stack([at[:, 0], y, at[:, 1]], axis=1)[np.isfinite(y)][:, :dim]
+    inside = places[np.all(np.abs(places) <= half, axis=1)]
+    y = model.design.top(inside[:, 0], inside[:, 1])
+    return np.stack([inside[:, 0], y, inside[:, 1]], axis=1)[np.isfinite(y)][:, :dim]
 
 
-def _refusal(model: Model, found: UnresolvedOverlap, size: float | None) -> str:
-    depth, now = found.target.depth_mm, f"mesh.size_mm = {model.mesh.size_mm:g}"
-    if found.in_contact:
-        what = f"at a depth of {depth:.4g} mm the object is up to {found.depth_mm:.2g} mm deeper between the contact "
-        what += "points than they see"
+def _refusal(model: Model, unresolved: UnresolvedOverlap, size: float | None) -> str:
+    depth, now = unresolved.target.depth_mm, f"mesh.size_mm = {model.mesh.size_mm:g}"
+    if unresolved.in_contact:
+        deeper = f"{unresolved.depth_mm:.2g} mm deeper between the contact points than they see"
+        what = f"at a depth of {depth:.4g} mm the object is up to {deeper}"
     else:
         what = f"at a depth of {depth:.4g} mm the object is between the contact points and reaches none of them"
     if size is not None:
@@ -378,12 +379,12 @@ def unresolved_details(model: Model) -> list[str]:
         return []
     return [
         f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; mesh.size_mm = {_rounded(largest):g} resolves it"
+        f"averages of it; mesh.size_mm = {_rounded_down(largest):g} resolves it"
     ]
 
 
-def _rounded(size: float) -> float:
-    """Round down to two significant digits."""
+def _rounded_down(size: float) -> float:
+    """Return an edge length rounded down to two digits."""
     unit = 10.0 ** (math.floor(math.log10(size)) - 1)
     return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 

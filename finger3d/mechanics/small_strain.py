@@ -67,8 +67,8 @@ class SmallStrain:
 
 def at_rest(problem: Problem) -> ContactState:
     """Return the contact state without forces, with the gaps at rest."""
-    distance, share = problem.placed(problem.origin).distance, problem.system.object_share
-    geometry = contact_geometry(distance, problem.surface, axes=problem.axes, share=share)
+    distance, object_share = problem.placed(problem.origin).distance, problem.system.object_share
+    geometry = contact_geometry(distance, problem.surface, axes=problem.axes, object_share=object_share)
     return replace(ContactState.at_rest(geometry.gap, problem.dim), bases=geometry.bases)
 
 

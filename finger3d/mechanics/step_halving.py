@@ -18,13 +18,14 @@ from dataclasses import asdict, dataclass, field, replace
 from threading import Event
 from typing import TypeAlias
 
+from finger3d._cost import AUTOMATIC_S, PressSize
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.path import AUTO_START, stations
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 
@@ -148,21 +149,28 @@ def increment_error(counts: Sequence[int], values: Sequence[float], count: int) 
 
 
 def refine(
-    problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
+    problem: Problem,
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+    advanced: Callable[[int, int, StepResult], None] = lambda done, total, step: None,
 ) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Yield the results of runs with more and more increments, each with its estimate; the first run has none.
 
     The iteration ends when the tolerances are met or the largest number of increments is reached.  A run that fails is
-    omitted if one with fewer increments converged or one with twice as many does.  `workspace` and `cancel` are
-    arguments of `march`.
+    omitted if one with fewer increments converged or one with twice as many does.
+
+    Parameters
+    ----------
+    problem, workspace, cancel : see `march`
+    advanced : function, optional
+        Called after every increment of a run with the number of those solved, of all in the run, and its result.
     """
     workspace = workspace or formulation_of(problem.model).workspace()
-    steps, last = limits(problem.model, problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
+    steps, last = limits(problem.model, problem.size)
     runs: list[Run] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
-        trial = with_steps(problem, steps)
-        results = tuple(march(trial, workspace=workspace, cancel=cancel))
+        results = _run(with_steps(problem, steps), workspace, cancel, advanced)
         if not results[-1].outcome.ok:
             if runs:
                 return
@@ -180,6 +188,16 @@ def refine(
         yield failed, None
 
 
+def _run(
+    problem: Problem, workspace: Workspace, cancel: Event | None, advanced: Callable[[int, int, StepResult], None]
+) -> tuple[StepResult, ...]:
+    total, results = len(stations(problem.model.legs)), list[StepResult]()
+    for step in march(problem, workspace=workspace, cancel=cancel):
+        results.append(step)
+        advanced(len(results), total, step)
+    return tuple(results)
+
+
 def march_automatic(
     problem: Problem, workspace: Workspace | None = None, cancel: Event | None = None
 ) -> tuple[tuple[StepResult, ...], StepEstimate | None]:
@@ -193,33 +211,17 @@ def march_automatic(
     return last
 
 
-def limits(model: Model, dofs: float, contact_points: float) -> tuple[int, int]:
+def limits(model: Model, size: PressSize) -> tuple[int, int]:
     """Smallest and largest number of automatic increments in a leg; they depend on the size of the problem only."""
     if model.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
-    dim = 3 if model.domain == "solid" else 2
-    if dim == 3 and model.refactorises:
+    if size.dim == 3 and model.refactorises:
         return _FIRST, 4 * _FIRST  # a condensation for each length of the increments
-    budget = WORTH_S[dim] + condensation_s(dofs, dim)
-    most = budget / contact_s(contact_points, dim) / len(model.legs)
+    most = (AUTOMATIC_S + size.condensation_s) / size.contact_s / len(model.legs)
     steps = 4 * _FIRST
     while steps < _LARGEST and 2.0 * (2 * steps) <= most:
         steps *= 2
     return _FIRST, steps
-
-
-WORTH_S = {2: 4.0, 3: 4.0}
-"""Modelled seconds that automatic increments may take in addition to those of the condensation, by dimension."""
-
-
-def contact_s(points: float, dim: int) -> float:
-    """Seconds of an increment with this number of contact points of the meshed part, calibrated on 2 cores."""
-    return float(0.0025 + (0.065 * (points / 680.0) ** 2.4 if dim == 3 else 0.038 * (points / 700.0) ** 2.75))
-
-
-def condensation_s(dofs: float, dim: int) -> float:
-    """Seconds of the condensation, calibrated on 2 cores."""
-    return 6.0 * (dofs / 85_000.0) ** 1.75 if dim == 3 else 0.004 + 8e-6 * dofs
 
 
 def _leg_ends(problem: Problem, results: tuple[StepResult, ...]) -> tuple[StepResult, ...]:

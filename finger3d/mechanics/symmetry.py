@@ -148,15 +148,15 @@ def unfold_points(
     facets = {label: mesh.facets[label] for label in labels}
     shape, parent_all, sign_all = unfold(Mesh(mesh.points, mesh.cells[:0], facets), numbers)
     images = [_images(face, label, shape, parent_all, d) for label in labels]
-    nodes, parent = (np.concatenate([found[k] for found in images]) for k in (0, 1))
-    before = np.cumsum([0] + [len(found[0]) for found in images])
+    nodes, parent = (np.concatenate([image[k] for image in images]) for k in (0, 1))
+    before = np.cumsum([0] + [len(image[0]) for image in images])
     world_sign = sign_all[nodes]
     planes = np.zeros(len(nodes))
     for i in numbers:
         planes += face.points[parent][:, i] == 0.0
     multiplicity = 2.0**planes
-    at = np.zeros((len(nodes), 3))
-    at[:, :d] = face.points[parent] * world_sign
+    coordinates = np.zeros((len(nodes), 3))
+    coordinates[:, :d] = face.points[parent] * world_sign
     symmetric = Symmetry(
         axes=axes,
         image_of=parent,
@@ -166,12 +166,12 @@ def unfold_points(
     points = ContactPoints(
         nodes=nodes,
         face=face.face[parent],
-        points=at,
+        points=coordinates,
         area=face.area[parent] * multiplicity,
         basis=vertical_frame(d),
         half_width_mm=model.design.width_mm / 2.0,
         band_mm=_BAND * model.mesh.size_mm,
-        edges=np.vstack([found[2] + first for found, first in zip(images, before, strict=False)]),
+        edges=np.vstack([image[2] + first for image, first in zip(images, before, strict=False)]),
     )
     return symmetric, points
 
@@ -194,8 +194,8 @@ def _images(
     """
     corners = whole.facets[label][:, :dim]
     number = np.full(image_of.max() + 1, -1)
-    own = np.flatnonzero(face.face == FREE_FACES.index(label))
-    number[face.nodes[own]] = own
+    rows = np.flatnonzero(face.face == FREE_FACES.index(label))
+    number[face.nodes[rows]] = rows
     on_face = np.unique(corners)
     nodes = on_face[number[image_of[on_face]] >= 0]
     return nodes, number[image_of[nodes]], _edges(corners, nodes)

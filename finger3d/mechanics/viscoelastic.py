@@ -82,11 +82,11 @@ class Viscoelastic:
         """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
         memory, step = state.body.memory, Step(self.relaxation.prony, move.duration_s)
         body = self._body(problem).respond(step, memory, workspace)
-        own, springs = body.compliance, problem.inclusions.bar_stiffness
-        first = len(own) - len(springs)
+        condensed, springs = body.compliance, problem.inclusions.bar_stiffness
+        first = len(condensed) - len(springs)
         moved = body.moved
         if len(springs):
-            moved = moved + own[:, first:] @ spring_forces(own, springs, moved)
+            moved = moved + condensed[:, first:] @ spring_forces(condensed, springs, moved)
         c, d = len(problem.surface.nodes), problem.dim
         past = np.zeros(c * d)
         past[problem.system.active_dofs] = moved[: len(problem.system.active_dofs)]
@@ -94,17 +94,17 @@ class Viscoelastic:
         rest = problem.delassus - scatter_to_points(
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
-        compliance = scatter_to_points(stiffened(own, springs), problem.system.active_dofs, c, d) + rest
+        compliance = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
         before = State(state.contact, state.body.displacement)
-        found = solve_increment(problem, before, move, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
-        if found.state is before:
-            return found.with_state(state)
-        contact = found.state.contact
+        solution = solve_increment(problem, before, move, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
+        if solution.state is before:
+            return solution.with_state(state)
+        contact = solution.state.contact
         rows = problem.row_forces(problem.upright_force(contact))
         if len(springs):
-            rows[first:] = spring_forces(own, springs, body.moved + own @ rows)
-        after = State(contact, ViscousBody(found.state.body, step.after(memory, body.shape(rows))))
-        return found.with_state(after)
+            rows[first:] = spring_forces(condensed, springs, body.moved + condensed @ rows)
+        after = State(contact, ViscousBody(solution.state.body, step.after(memory, body.shape(rows))))
+        return solution.with_state(after)
 
     def unknowns(self, problem: Problem, states: Sequence[State[ViscousBody]]) -> Iterator[Float]:
         """Yield the unknowns of each state from its internal variables."""
@@ -114,12 +114,12 @@ class Viscoelastic:
         """Return the readings from the internal variables by their rows; pressures are those of the relaxed stress."""
         first, body, memory = len(problem.system.active_dofs), self._body(problem), state.body.memory
         rows = body.read(memory.elastic)[first:]
-        found = dict(zip(problem.model.reading_names, map(float, rows), strict=False))
+        values = dict(zip(problem.model.reading_names, map(float, rows), strict=False))
         if problem.model.taxels:
             forces = body.nodal_forces(self.relaxation.prony, memory)
             meshed, u = problem.meshed_body, np.zeros((0, problem.dim))
-            found |= {t.name: float(t.at_finite_strain(meshed, u, forces)[0]) for t in problem.model.taxels}
-        return found
+            values |= {t.name: float(t.at_finite_strain(meshed, u, forces)[0]) for t in problem.model.taxels}
+        return values
 
     def loads(self, problem: Problem, state: State[ViscousBody], pose: ObjectPose) -> Loads:
         """Return the forces of the points, at their centroids at rest."""

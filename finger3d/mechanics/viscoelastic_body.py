@@ -34,14 +34,14 @@ class RelaxationWorkspace(Workspace):
 
     def condensation(self, alpha: float, make: Callable[[], Condensation]) -> Condensation:
         """Return the condensation for alpha, made unless it is one of the last few."""
-        found = self._condensations.pop(alpha, None)
-        if found is None:
-            found = make()
-            self.factorizations += found.factorizations
-        self._condensations[alpha] = found
+        condensation = self._condensations.pop(alpha, None)
+        if condensation is None:
+            condensation = make()
+            self.factorizations += condensation.factorizations
+        self._condensations[alpha] = condensation
         if len(self._condensations) > _FACTORS_KEPT:
             self._condensations.pop(next(iter(self._condensations)))
-        return found
+        return condensation
 
 
 @dataclass(frozen=True)
@@ -180,10 +180,10 @@ class ConstantBulkModulus:
         moved[first:] += problem.inclusions.subgrid_compliance @ past[self._own :] / alpha
 
         def shape(rows: Float) -> Float:
-            found = settled + body.unknowns(rows)
+            unknowns = settled + body.unknowns(rows)
             if problem.body.elastic.mixed:
-                found[problem.mesh.points.size :] *= problem.body.stiffness.pressure_scale / self._lame(alpha)
-            return np.concatenate([found, (rows[first:] + past[self._own :]) / alpha])
+                unknowns[problem.mesh.points.size :] *= problem.body.stiffness.pressure_scale / self._lame(alpha)
+            return np.concatenate([unknowns, (rows[first:] + past[self._own :]) / alpha])
 
         return Response(compliance, moved, shape)
 

@@ -42,13 +42,13 @@ def zone_ends(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return where contact and stick begin and end (mm) along a line; twice the same place for an empty zone."""
     order = np.argsort(x, kind="stable")
-    at, own = x[order], points[order]
-    status = state.status[own]
-    pressure = state.force[own, 0] / area[own]
-    shear = np.linalg.norm(state.force[own, 1:], axis=1) / area[own]
+    places, numbers = x[order], points[order]
+    status = state.status[numbers]
+    pressure = state.force[numbers, 0] / area[numbers]
+    shear = np.linalg.norm(state.force[numbers, 1:], axis=1) / area[numbers]
     return (
-        _ends(at, status != OPEN, lambda beyond: pressure),
-        _ends(at, status == STICK, lambda beyond: _to_limit(pressure, shear, status, beyond)),
+        _ends(places, status != OPEN, lambda beyond: pressure),
+        _ends(places, status == STICK, lambda beyond: _to_limit(pressure, shear, status, beyond)),
     )
 
 

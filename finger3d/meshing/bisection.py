@@ -18,7 +18,7 @@ from finger3d._types import Float, Int
 from finger3d.fem.elements import EDGES
 from finger3d.fem.simplex import Mesh, quadratic
 
-_TOO_LONG = 1.8
+TOO_LONG = 1.8
 """Longest edge of a cell over the wanted edge length above which the cell is halved; the diagonal of a cube is 1.73."""
 
 _DIGITS = 9
@@ -121,7 +121,7 @@ def _edges_to_halve(
     pairs = _pairs(cells.shape[1])
     length = np.linalg.norm(corners[:, pairs[:, 0]] - corners[:, pairs[:, 1]], axis=2).max(axis=1)
     halved = np.zeros(len(ranks), dtype=bool)
-    halved[longest[length > _TOO_LONG * size(corners.mean(axis=1))]] = True
+    halved[longest[length > TOO_LONG * size(corners.mean(axis=1))]] = True
     while not halved[needed := longest[halved[number].any(axis=1)]].all():
         halved[needed] = True
     return halved

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._ranges import four_digits
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.elements import EDGES
@@ -18,11 +19,13 @@ from finger3d.fem.simplex import FACETS, Mesh, quadratic, signed_volumes
 from finger3d.geometry.files import content, welded
 from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
 from finger3d.geometry.surface import Triangles
-from finger3d.meshing.bisection import refined
+from finger3d.meshing.bisection import TOO_LONG, refined
+from finger3d.meshing.grading import SizedPlaces
 from finger3d.meshing.limits import check_count
 from finger3d.meshing.mesh_files import MeshContents, read_contents
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
+from finger3d.meshing.sizing import RATE
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -40,8 +43,6 @@ _CUTS = ("symmetry_x", "symmetry_z")
 _LEVEL = 1e-6  # largest distance of the base from its plane, over the size
 _STRAIGHT = 1e-9  # largest distance of a node from the middle of its edge on a straight facet, over the size
 _PIECES = 4  # straight pieces of the edge of a curved facet: their sagitta is a sixteenth of that of one
-_RATE = 0.3  # growth of the edge length per distance from the zone, that of unstructured meshes
-_TOO_LONG = 1.8  # as in finger3d.meshing.bisection: longest edge of a cell over the edge length wanted there
 _SAME = 1e-3  # relative difference of edge lengths that are the same; scenes keep four digits
 
 
@@ -96,12 +97,12 @@ class GivenMesh(FileDesign):
     @cached_property
     def size_mm(self) -> float:
         """Mean edge length of the contact facets, mm, four digits."""
-        return _rounded(_mean_edge(self.mesh.points, self.mesh.facets["contact"]))
+        return four_digits(_mean_edge(self.mesh.points, self.mesh.facets["contact"]))
 
     @cached_property
     def base_size_mm(self) -> float:
         """Mean edge length of all cells, mm, four digits; at least that of the contact facets."""
-        return max(_rounded(_mean_edge(self.mesh.points, self.mesh.cells)), self.size_mm)
+        return max(four_digits(_mean_edge(self.mesh.points, self.mesh.cells)), self.size_mm)
 
 
 def given_mesh(path: str | Path) -> GivenMesh:
@@ -149,22 +150,18 @@ def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> C
 
     mesh, facets = design.mesh, design.mesh.facets["contact"][:, :3]
     corners = mesh.points[mesh.cells[:, :4]]
-    longest = np.linalg.norm(corners[:, EDGES[3][:, 0]] - corners[:, EDGES[3][:, 1]], axis=2).max(axis=1) / _TOO_LONG
+    longest = np.linalg.norm(corners[:, EDGES[3][:, 0]] - corners[:, EDGES[3][:, 1]], axis=2).max(axis=1) / TOO_LONG
     centroids = cKDTree(corners.mean(axis=1))
     middle = mesh.points[facets].mean(axis=1)
     x0, x1, z0, z1 = zone
     inside = (middle[:, 0] >= x0) & (middle[:, 0] <= x1) & (middle[:, 2] >= z0) & (middle[:, 2] <= z1)
-    touched = cKDTree(mesh.points[np.unique(facets[inside] if inside.any() else facets)])
+    touched = SizedPlaces(mesh.points[np.unique(facets[inside] if inside.any() else facets)], 0.0, RATE)
 
     def wanted(points: Float) -> Float:
         own = longest[centroids.query(points)[1]]
-        return np.asarray(np.minimum(everywhere * own, finer * own + _RATE * touched.query(points)[0]))
+        return np.asarray(np.minimum(everywhere * own, finer * own + touched.at(points)))
 
     return wanted
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def _mean_edge(points: Float, simplices: Int) -> float:

@@ -4,28 +4,13 @@ from __future__ import annotations
 
 import math
 
+from finger3d._cost import MAX_TETS, MEMORY_SHARE, mesh_gb, rows_gb
 from finger3d._machine import memory_bytes
 from finger3d._ranges import at_most
 from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design
 from finger3d.meshing.options import MeshSizes
-
-MAX_TETS = 1_000_000
-"""Largest number of tets for pytetwild, which takes minutes below and hours above."""
-
-_DOFS_PER_TET = 4.5  # measured: 1.5 nodes a tet in quadratic meshes
-_DOFS_PER_TRIANGLE = 4.1  # measured
-_MEMORY_SHARE = 0.8  # largest share of the machine's memory that a solution may need
-
-
-def memory_gb(cells: float, dim: int) -> float:
-    """Estimate the memory of a solution, GB.
-
-    Measured: 8.4 GB for 522 540 unknowns in 3D, 19.8 GB for 1 009 778, 7 % above the estimate; about 2 kB each in 2D.
-    """
-    if dim == 2:
-        return 2e-6 * _DOFS_PER_TRIANGLE * cells
-    return 8.4 * math.pow(_DOFS_PER_TET * cells / 522_540.0, 1.2)
+from finger3d.meshing.sizing import Sizing, count_cells
 
 
 def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
@@ -50,13 +35,13 @@ def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
 
 def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:
     """Raise a Finger3dError for a mesh estimated to need too much memory or more than `cap` cells."""
-    need, have = memory_gb(cells, dim), _machine_gb()
-    if need <= _MEMORY_SHARE * have and cells <= cap:
+    need, have = mesh_gb(cells, dim), _machine_gb()
+    if need <= MEMORY_SHARE * have and cells <= cap:
         return
     kind = "triangles" if dim == 2 else "tetrahedra"
     limit = (
-        f"at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
-        if need > _MEMORY_SHARE * have
+        f"at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
+        if need > MEMORY_SHARE * have
         else f"at most {cap:.0f} {kind}"
     )
     raise Finger3dError(
@@ -65,28 +50,30 @@ def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.in
     )
 
 
-def rows_gb(rows: float) -> float:
-    """Estimate the memory of the dense compliance of `rows` condensed rows and its copies, GB."""
-    return 40e-9 * rows**2
+def checked_tets(design: Design, field: Sizing, options: MeshSizes) -> float:
+    """Return the estimated number of tets of an unstructured mesh; raise a Finger3dError if these are too many."""
+    cells = count_cells(design, field)
+    check_count(cells, 3, options, MAX_TETS)
+    return cells
 
 
 def check_rows(contact: int, readings: int) -> None:
     """Raise a Finger3dError if the dense compliance of the condensed rows is estimated to need too much memory."""
     need, have = rows_gb(contact + readings), _machine_gb()
-    if need > _MEMORY_SHARE * have:
+    if need > MEMORY_SHARE * have:
         cure = "fewer gauges and markers" if readings > contact else "a larger mesh.size_mm"
         raise Finger3dError(
             f"mesh.size_mm: {contact} rows of contact points and {readings} of readings are condensed to, forecast "
-            f"{need:.2g} GB; allowed: at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
+            f"{need:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
         )
 
 
 def check_memory(need_gb: float, what: str) -> None:
     """Raise a Finger3dError if a press is estimated to need too much memory."""
     have = _machine_gb()
-    if need_gb > _MEMORY_SHARE * have:
+    if need_gb > MEMORY_SHARE * have:
         raise Finger3dError(
-            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {_MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
+            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
             "choose a larger mesh.size_mm, fewer steps or fewer gauges"
         )
 

@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._cost import netgen_limit_s
 from finger3d._extras import require
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import _meshers
-from finger3d.meshing.limits import MAX_TETS, check_count
+from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.sizing import RATE, Sizing, forecast, sizing
+from finger3d.meshing.sizing import RATE, Sizing, sizing
 from finger3d.meshing.solids import (
     box,
     check_volume,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 _EDGE_SHARE = 0.88  # netgen's size over the mean edge length; measured 1 / 1.13 to 1 / 1.19 on Fig. 9 and a hemisphere
 _CHORD_ERROR = 2e-4  # of the triangles, over the diagonal; nodes are moved onto the surfaces themselves
 _MOST_POINTS = 2_000_000  # of the size field
-_SECONDS_A_TET = 8e-4  # measured 4e-4 on a loaded machine
 
 
 def new_mesh(
@@ -53,18 +53,17 @@ def new_mesh(
     start = time.perf_counter()
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
-    check_count(forecast(design, field), 3, options, MAX_TETS)
+    checked_tets(design, field, options)
     report.say("building the CAD solid")
     glued = glued_solids(design, symmetry)
     body = tessellated(design, glued, _CHORD_ERROR * float(np.linalg.norm(high - low)))
     check_volume(design, body, symmetry)
     field = finer_in_layers(field, body)
-    cells = forecast(design, field)
-    check_count(cells, 3, options, MAX_TETS)
+    cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
     report.say(f"meshing by netgen, about {cells:.0f} tetrahedra")
     try:
-        points, tets = run_child(glued, field, 60.0 + 5.0 * _SECONDS_A_TET * cells)
+        points, tets = run_child(glued, field, netgen_limit_s(cells))
         return on_cad(points, tets, body, "netgen"), design.volume_mm3, cad_seconds
     except UnusableMeshError as error:  # the same again
         raise Finger3dError(

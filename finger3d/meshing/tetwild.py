@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._cost import meshing_limit_s
 from finger3d._extras import require
 from finger3d._ranges import at_least
 from finger3d._types import Float, Int
@@ -19,9 +20,9 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import _meshers
-from finger3d.meshing.limits import MAX_TETS, check_count
+from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.sizing import Sizing, forecast, sizing
+from finger3d.meshing.sizing import Sizing, sizing
 from finger3d.meshing.solids import (
     box,
     check_volume,
@@ -60,20 +61,18 @@ def new_mesh(
     start = time.perf_counter()
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
-    cells = forecast(design, field)
-    check_count(cells, 3, options, MAX_TETS)
+    cells = checked_tets(design, field, options)
     report.say("building the CAD solid")
     body, epsilon = _body(design, symmetry, field)
     if body.part_labels:
         field = finer_in_layers(field, body)
-        cells = forecast(design, field)
-        check_count(cells, 3, options, MAX_TETS)
+        cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.surface)
     check_volume(design, body, symmetry)
     report.say(f"meshing, about {cells:.0f} tetrahedra")
     reasons = []
-    limit = _limit_seconds(cells, len(body.triangles))
+    limit = meshing_limit_s(cells, len(body.triangles))
     for _ in range(ATTEMPTS):
         try:
             points, tets = run_child(body.points, body.triangles, field, epsilon, limit, bool(body.part_labels))
@@ -157,15 +156,6 @@ def surface_defect(points: Float, triangles: Int) -> str:
     if not surface.is_winding_consistent or not surface.volume > 0.0:
         return "its triangles do not all face outward"
     return ""
-
-
-def _limit_seconds(cells: float, triangles: int) -> float:
-    """Return five times the duration measured on a loaded machine of two cores.
-
-    With a coarse surface: 6 s for 4 700 tets, 149 s for 219 000. With few tets: 27 s for 5 500
-    triangles, 197 s for 34 000.
-    """
-    return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
 
 
 def run_child(

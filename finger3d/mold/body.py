@@ -53,8 +53,8 @@ class Body:
         """Lowest and highest corner (3,), mm."""
         if self.cad is None:
             return self.surface.low, self.surface.high
-        found = self.cad.bounding_box(optimal=True)
-        return np.array([*found.min]), np.array([*found.max])
+        bounds = self.cad.bounding_box(optimal=True)
+        return np.array([*bounds.min]), np.array([*bounds.max])
 
     def scaled(self, factor: float) -> Body:
         """Return the body enlarged about the middle of its base."""

@@ -49,11 +49,6 @@ class Keys:
     neck_mm: float
     head_mm: float
 
-    @property
-    def neck_area_mm2(self) -> float:
-        """Area of all necks, which holds the silicone."""
-        return len(self.places) * math.pi * self.neck_mm**2 / 4.0
-
     def volume_mm3(self, cover_mm: float) -> float:
         """Return the volume of the holes in a carrier of this thickness."""
         a, b = self.neck_mm / 2.0, self.head_mm / 2.0
@@ -104,19 +99,19 @@ def _ticks(low: float, high: float, pitch: float, margin: float) -> np.ndarray:
     return 0.5 * (low + high) + (np.arange(count) - 0.5 * (count - 1)) * (room / max(count - 1, 1))
 
 
-def key_solids(found: Keys, x: float, options: MoldOptions) -> list[Solid]:
+def key_solids(holes: Keys, x: float, options: MoldOptions) -> list[Solid]:
     """Return the holes of the cavity at `x` as solids through the carrier."""
     cover = options.carrier_mm
-    straight, slope = _heights(found, cover)
-    made = []
-    for kx, kz in found.places:
-        at = kx + x
-        made += [
-            cylinder((at, -straight, kz), found.neck_mm, straight, "y"),
-            cone((at, -straight - slope, kz), found.head_mm, found.neck_mm, slope, "y"),
-            cylinder((at, -cover, kz), found.head_mm, cover - straight - slope, "y"),
+    straight, slope = _heights(holes, cover)
+    solids = []
+    for kx, kz in holes.places:
+        middle = kx + x
+        solids += [
+            cylinder((middle, -straight, kz), holes.neck_mm, straight, "y"),
+            cone((middle, -straight - slope, kz), holes.head_mm, holes.neck_mm, slope, "y"),
+            cylinder((middle, -cover, kz), holes.head_mm, cover - straight - slope, "y"),
         ]
-    return made
+    return solids
 
 
 def finger_on_carrier(solid: Solid, carrier: Solid, rods: Sequence[Solid], cover_mm: float) -> Mapping[str, Solid]:

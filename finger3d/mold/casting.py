@@ -72,11 +72,11 @@ def silicone_lines(silicone: Silicone | None, volume_ml: float, hole: PourHole, 
             '  With [material] silicone = "NAME" in the scene there are grams, mix ratio and times here; names are in',
             "  docs/materials.md.",
         ]
-    found = youngs_modulus(silicone)
+    modulus = youngs_modulus(silicone)
     hardness = f"Shore A {silicone.shore:g}" if silicone.scale == "A" else f"Shore 00-{silicone.shore:g}"
-    spread = 100.0 * (found.spread or 0.0)
+    spread = 100.0 * (modulus.spread or 0.0)
     return [
-        f"  {silicone.name:<19} {silicone.maker}, {hardness}, E = {found.E_MPa:.3g} MPa +- {spread:.0f} %",
+        f"  {silicone.name:<19} {silicone.maker}, {hardness}, E = {modulus.E_MPa:.3g} MPa +- {spread:.0f} %",
         *_components(silicone, volume_ml),
         cup,
         *_pouring(silicone, volume_ml, hole),
@@ -96,10 +96,11 @@ def _components(silicone: Silicone, volume_ml: float) -> list[str]:
     )
     if silicone.mix is None:
         return [f"{mixed}; mix ratio: {_SHEET}"]
-    share = silicone.mix.share_a
+    fraction_a = silicone.mix.share_a
     if "weight" in silicone.mix.by:
-        return [f"{mixed}: {share * grams:.1f} g of A and {(1.0 - share) * grams:.1f} g of B ({silicone.mix})"]
-    parts = f"{share * volume_ml:.1f} ml of A and {(1.0 - share) * volume_ml:.1f} ml of B"
+        parts = f"{fraction_a * grams:.1f} g of A and {(1.0 - fraction_a) * grams:.1f} g of B"
+        return [f"{mixed}: {parts} ({silicone.mix})"]
+    parts = f"{fraction_a * volume_ml:.1f} ml of A and {(1.0 - fraction_a) * volume_ml:.1f} ml of B"
     return [f"  measure             {volume_ml:.1f} ml in all: {parts} ({silicone.mix})"]
 
 

@@ -66,16 +66,16 @@ def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Draft:
     Finger3dError
         If the body has an undercut deeper than `options.undercut_mm`, and than a printer resolves.
     """
-    found = draft(finger, options.split, options.split_mm)
-    if found.undercut_mm <= max(options.undercut_mm, _LEAST_UNDERCUT_MM):
-        return found
+    opening = draft(finger, options.split, options.split_mm)
+    if opening.undercut_mm <= max(options.undercut_mm, _LEAST_UNDERCUT_MM):
+        return opening
     other = "x" if options.split == "z" else "z"
     free = (may_turn or other == "z") and draft(finger, other, 0.0).undercut_mm <= _LEAST_UNDERCUT_MM
     advice = f"--split {other} would do" if free else "a mold of two halves cannot be taken off; change the body"
     raise Finger3dError(
-        f"--split {options.split} --split-mm {options.split_mm:g}: {found.where}, an undercut of "
-        f"{found.undercut_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(found.undercut_mm)} if the silicone can "
-        "be stretched over it"
+        f"--split {options.split} --split-mm {options.split_mm:g}: {opening.where}, an undercut of "
+        f"{opening.undercut_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(opening.undercut_mm)} if the silicone "
+        "can be stretched over it"
     )
 
 
@@ -148,16 +148,16 @@ def undercut_depth(half: Triangles, axis: int, sign: float) -> float:
     return deepest
 
 
-def _reach(shadow: CrossSection, locked: CrossSection, known: float) -> float:
+def _reach(shadow: CrossSection, locked: CrossSection, least: float) -> float:
     """Return the largest distance of the points of a region from the outline of another that holds it, mm."""
 
     def reaches(distance: float) -> bool:
         return float((shadow.offset(-distance) ^ locked).area()) > 1e-9 * float(shadow.area())
 
-    if not reaches(max(known, 1e-6)):
-        return known
+    if not reaches(max(least, 1e-6)):
+        return least
     x0, y0, x1, y1 = shadow.bounds()
-    low, high = max(known, 1e-6), 0.5 * float(max(x1 - x0, y1 - y0)) + 1e-6
+    low, high = max(least, 1e-6), 0.5 * float(max(x1 - x0, y1 - y0)) + 1e-6
     while high - low > _DEPTH_TOLERANCE * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if reaches(middle) else (low, middle)

@@ -107,10 +107,10 @@ def export(
     else:
         solid = design.solid()
         body = shell(solid, tolerance_mm, design.name)
-    made = None
+    assembly = None
     if mold is not None:
         report.stage("mold")
-        made = _mold(scene, triangles if solid is None else solid, mold)
+        assembly = _mold(scene, triangles if solid is None else solid, mold)
     with claimed(out):
         _clear(out)
         files, remarks = [], []
@@ -122,11 +122,11 @@ def export(
         write_stl(out / "finger.stl", body.surface, text)
         files.append(out / "finger.stl")
         silicone = None
-        if made is not None:
-            written, told = _write_mold(scene, made, body, solid, out, text, report)
+        if assembly is not None:
+            written, told = _write_mold(scene, assembly, body, solid, out, text, report)
             files += written
             remarks += told
-            silicone = made.silicone_mm3 / 1e3
+            silicone = assembly.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
     )

@@ -38,9 +38,9 @@ class Extras:
     remarks: tuple[str, ...]
 
 
-def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
+def extra_parts(scene: Scene, mold: Mold, out: Path) -> Extras:
     """Return the coupon and the mold of the button, if the options ask for them."""
-    o, remarks = made.options, []
+    o, remarks = mold.options, []
     solids: dict[str, Solid] = {}
     if o.coupon:
         solids |= coupon(o)
@@ -49,7 +49,7 @@ def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
             f"coupon: holes with 1, 2, ... notches have gaps of {gaps} mm; give the least that fits as --clearance-mm"
         )
     if o.button:
-        button = button_for(made.silicone_mm3)
+        button = button_for(mold.silicone_mm3)
         solids |= button_parts(button, o)
         E = scene.constants.E_MPa
         remarks.append(
@@ -60,7 +60,7 @@ def extra_parts(scene: Scene, made: Mold, out: Path) -> Extras:
     return Extras({name: shell(solid, tolerance, name, _ANGLE) for name, solid in solids.items()}, tuple(remarks))
 
 
-def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tuple[list[Path], list[str]]:
+def write_extras(scene: Scene, mold: Mold, solid: Solid | None, out: Path) -> tuple[list[Path], list[str]]:
     """Write the button's STEP file and scene, and the finger on its carrier; returns files and remarks.
 
     Parameters
@@ -68,66 +68,66 @@ def write_extras(scene: Scene, made: Mold, solid: Solid | None, out: Path) -> tu
     solid : the finger by CAD; None for a finger of triangles
     """
     files, remarks = [], []
-    if made.options.button:
-        button, material = button_for(made.silicone_mm3), scene.constants
+    if mold.options.button:
+        button, material = button_for(mold.silicone_mm3), scene.constants
         write_step(out / "button.step", button_solid(button))
         with atomic(out / "button.toml") as temporary:
             text = tree.written(button_scene(button, scene.title, material.E_MPa, material.nu))
             temporary.write_text(text, encoding="utf-8")
         files += [out / "button.step", out / "button.toml"]
-    if made.options.carrier and solid is not None:
+    if mold.options.carrier and solid is not None:
         path = out / "finger_on_carrier.step"
-        write_step(path, _labelled(made, solid))
+        write_step(path, _labelled(mold, solid))
         with atomic(out / "finger_on_carrier.toml") as temporary:
-            text = tree.written(carrier_scene(scene.given, made.options.carrier_mm))
+            text = tree.written(carrier_scene(scene.given, mold.options.carrier_mm))
             temporary.write_text(text, encoding="utf-8")
         files += [path, out / "finger_on_carrier.toml"]
         remarks.append(
             "finger_on_carrier.toml: the scene with the finger on its carrier, which is rigid; y of gauges and markers "
-            f"is {made.options.carrier_mm:g} mm larger there"
+            f"is {mold.options.carrier_mm:g} mm larger there"
         )
     return files, remarks
 
 
-def carrier_scene(given: TreeView, cover_mm: float) -> Tree:
+def carrier_scene(tables: TreeView, cover_mm: float) -> Tree:
     """Return a scene whose finger stands on its rigid carrier, readings moved up with the silicone.
 
     Parameters
     ----------
-    given : the scene, as the user wrote it
+    tables : the scene, as the user wrote it
     cover_mm : thickness of the carrier
     """
-    made = tree.plain(given)
-    made["finger"] = {"geometry": "finger_on_carrier.step"}
+    scene = tree.plain(tables)
+    scene["finger"] = {"geometry": "finger_on_carrier.step"}
     for kind in ("gauge", "marker"):
-        made[kind] = [{**one, "y_mm": one["y_mm"] + cover_mm} for one in made.get(kind, [])]
-        if not made[kind]:
-            del made[kind]
-    made["parts"] = {**made.get("parts", {}), CARRIER: {"rigid": True}}
-    if "mesh" in made:  # a STEP file has no structured mesh
-        made["mesh"] = {key: value for key, value in made["mesh"].items() if key != "mesher"}
-    return made
+        scene[kind] = [{**one, "y_mm": one["y_mm"] + cover_mm} for one in scene.get(kind, [])]
+        if not scene[kind]:
+            del scene[kind]
+    scene["parts"] = {**scene.get("parts", {}), CARRIER: {"rigid": True}}
+    if "mesh" in scene:  # a STEP file has no structured mesh
+        scene["mesh"] = {key: value for key, value in scene["mesh"].items() if key != "mesher"}
+    return scene
 
 
-def _labelled(made: Mold, solid: Solid):  # type: ignore[no-untyped-def]  # a build123d compound
+def _labelled(mold: Mold, solid: Solid):  # type: ignore[no-untyped-def]  # a build123d compound
     """Return silicone and carrier as one labelled compound, in the axes of the finger."""
     from build123d import Compound, Rot
 
-    back = Rot(0, 90 if made.options.split == "x" else 0, 0)
-    rods = [back * rod for rod in _silicone_in_carrier(made)]
-    found = finger_on_carrier(solid, back * made.parts["carrier"], rods, made.options.carrier_mm)
+    back = Rot(0, 90 if mold.options.split == "x" else 0, 0)
+    rods = [back * rod for rod in _silicone_in_carrier(mold)]
+    solids = finger_on_carrier(solid, back * mold.parts["carrier"], rods, mold.options.carrier_mm)
     children = []
-    for label, one in found.items():
+    for label, one in solids.items():
         one.label = label or "SOLID"  # which names nothing: the main body
         children.append(one)
     return Compound(label="finger on carrier", children=children)
 
 
-def _silicone_in_carrier(made: Mold) -> Sequence[Solid]:
+def _silicone_in_carrier(mold: Mold) -> Sequence[Solid]:
     """Return the silicone in the keyed holes and in the pour hole; the riser is cut off."""
-    assert made.keys is not None
-    keyed = key_solids(made.keys, 0.0, made.options)
-    if made.ports.riser is None:
-        return [*keyed, *openings(made.ports, 0.0, made.options)]
-    x, z = made.ports.pour
-    return [*keyed, cylinder((x, -made.options.carrier_mm, z), made.ports.pour_mm, made.options.carrier_mm, "y")]
+    assert mold.keys is not None
+    keyed = key_solids(mold.keys, 0.0, mold.options)
+    if mold.ports.riser is None:
+        return [*keyed, *openings(mold.ports, 0.0, mold.options)]
+    x, z = mold.ports.pour
+    return [*keyed, cylinder((x, -mold.options.carrier_mm, z), mold.ports.pour_mm, mold.options.carrier_mm, "y")]

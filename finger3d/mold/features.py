@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 class Feature:
     """Solids that are added to parts, and solids that are then cut from parts, both by the name of the part.
 
-    Parts are half_a, half_b and lid; `own` are further parts of the feature's own.
+    Parts are half_a, half_b and lid; `parts` are further ones of the feature itself.
     """
 
     add: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
     cut: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
-    own: Mapping[str, Solid] = field(default_factory=dict)
+    parts: Mapping[str, Solid] = field(default_factory=dict)
 
 
 def added(features: Iterable[Feature], name: str) -> list[Solid]:

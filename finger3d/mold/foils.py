@@ -63,10 +63,10 @@ def foils(
     section_mm : thickness and width of every foil, from the scene; None for those of the options
     """
     thickness, width = section_mm or (options.foil_thickness_mm, options.foil_width_mm)
-    found: dict[tuple[float, ...], list[Gauge]] = {}
+    groups: dict[tuple[float, ...], list[Gauge]] = {}
     for g in gauges:
         key = (g.x_mm, g.y_mm, g.angle % np.pi, g.length_mm)
-        found.setdefault(tuple(round(v, 9) for v in key), []).append(g)
+        groups.setdefault(tuple(round(v, 9) for v in key), []).append(g)
 
     def strip(on: list[Gauge]) -> FoilSlot:
         g, length = on[0], on[0].length_mm or options.foil_length_mm
@@ -81,7 +81,7 @@ def foils(
             width_mm=width,
         )
 
-    return tuple(strip(on) for on in found.values())
+    return tuple(strip(on) for on in groups.values())
 
 
 def strip_solid(
@@ -94,26 +94,26 @@ def strip_solid(
     return at * Rot(0, 0, float(np.degrees(foil.angle))) * Box(length, thickness, z_high - z_low)
 
 
-def slot(foil: FoilSlot, at: Layout, options: MoldOptions, x: float) -> Solid:
+def slot(foil: FoilSlot, layout: Layout, options: MoldOptions, x: float) -> Solid:
     """Return the strip with its gaps through both walls."""
     gap = 2.0 * options.slot_gap_mm
-    ends = float(at.outer_low[2]), float(at.outer_high[2])
+    ends = float(layout.outer_low[2]), float(layout.outer_high[2])
     return strip_solid(foil, options.scale, foil.length_mm + gap, foil.thickness_mm + gap, *ends, x)
 
 
-def plugs(found: Sequence[FoilSlot], at: Layout, options: MoldOptions) -> Feature:
+def plugs(foils: Sequence[FoilSlot], layout: Layout, options: MoldOptions) -> Feature:
     """Return plugs in pockets of the outer faces; a slit lets each be pushed over its strip from one end of it."""
-    if not options.plugs or not found:
+    if not options.plugs or not foils:
         return Feature()
     from build123d import Box, Pos, Rot
 
     pockets: dict[str, list[Solid]] = {"half_a": [], "half_b": []}
-    own: dict[str, Solid] = {}
+    parts: dict[str, Solid] = {}
     gap, rim = options.gap_mm, options.rim_mm
-    for x, (i, foil) in itertools.product(at.places, enumerate(found, 1)):
+    for x, (i, foil) in itertools.product(layout.places, enumerate(foils, 1)):
         slit = foil.length_mm + 2.0 * options.slot_gap_mm, foil.thickness_mm + 2.0 * options.slot_gap_mm
         size = slit[0] + 4.0 * rim, slit[1] + 4.0 * rim
-        for side, z, sign in (("half_a", at.outer_high[2], 1.0), ("half_b", at.outer_low[2], -1.0)):
+        for side, z, sign in (("half_a", layout.outer_high[2], 1.0), ("half_b", layout.outer_low[2], -1.0)):
             place = (
                 Pos(foil.x_mm * options.scale + x, foil.y_mm * options.scale, float(z))
                 * Rot(0, 0, float(np.degrees(foil.angle)))
@@ -123,18 +123,18 @@ def plugs(found: Sequence[FoilSlot], at: Layout, options: MoldOptions) -> Featur
             middle = sign * (height / 2.0 - PLUG_MM)
             block = Box(size[0] - 2.0 * gap, size[1] - 2.0 * gap, height)
             cut = Pos(size[0] / 2.0, 0, 0) * Box(slit[0] + size[0], slit[1], height)
-            number = f"{i}" if len(at.places) == 1 else f"{at.places.index(x) + 1}_{i}"
-            own[f"plug_{number}{side[-1]}"] = (place * Pos(0, 0, middle) * (block - cut)).solids()[0]
-    return Feature(cut=pockets, own=own)
+            number = f"{i}" if len(layout.places) == 1 else f"{layout.places.index(x) + 1}_{i}"
+            parts[f"plug_{number}{side[-1]}"] = (place * Pos(0, 0, middle) * (block - cut)).solids()[0]
+    return Feature(cut=pockets, parts=parts)
 
 
-def check_foils(body: Body, found: Sequence[FoilSlot], options: MoldOptions) -> None:
+def check_foils(body: Body, foils: Sequence[FoilSlot], options: MoldOptions) -> None:
     """Raise a Finger3dError if a foil is not covered by silicone, or two slots or their plugs are too close."""
     gap = 2.0 * options.slot_gap_mm
     low, high = body.box
     slots = []
     beside = 4.0 * options.rim_mm if options.plugs else 0.0
-    for foil in found:
+    for foil in foils:
         name = f'gauge "{foil.names[0]}"'
         for z in foil.z_mm:
             ends = z * options.scale - foil.width_mm / 2.0, z * options.scale + foil.width_mm / 2.0
@@ -152,19 +152,19 @@ def check_foils(body: Body, found: Sequence[FoilSlot], options: MoldOptions) -> 
         if apart < options.rim_mm:
             what, further = ("plug", "leave out the plugs (--no-plugs), ") if beside else ("strip", "")
             raise Finger3dError(
-                f'gauge "{found[j].names[0]}": its {what} is {apart:.3g} mm from that of gauge "{found[i].names[0]}", '
+                f'gauge "{foils[j].names[0]}": its {what} is {apart:.3g} mm from that of gauge "{foils[i].names[0]}", '
                 f"must be {options.rim_mm:g} mm away or more; {further}move one, or choose shorter foils"
             )
 
 
-def strips(found: Sequence[FoilSlot], at: Layout, options: MoldOptions) -> Triangles | None:
+def strips(foils: Sequence[FoilSlot], layout: Layout, options: MoldOptions) -> Triangles | None:
     """Return the strips of all gauges, longer than the mold, for a picture; None without gauges."""
-    if not found:
+    if not foils:
         return None
-    low, high = float(at.outer_low[2]), float(at.outer_high[2])
+    low, high = float(layout.outer_low[2]), float(layout.outer_high[2])
     out = 0.25 * (high - low)
     points, faces, count = [], [], 0
-    for x, f in itertools.product(at.places, found):
+    for x, f in itertools.product(layout.places, foils):
         strip = strip_solid(f, options.scale, f.length_mm, f.thickness_mm, low - out, high + out, x)
         p, t, _ = triangulated(strip, list(strip.faces()), 1.0, 0.5)
         points.append(p)

@@ -37,7 +37,7 @@ class Layout:
         return float(self.outer_high[1])
 
 
-def layout(low: Float, high: Float, options: MoldOptions) -> Layout:
+def layout_of(low: Float, high: Float, options: MoldOptions) -> Layout:
     """Place the cavities in a row along x, the walls around them, and rows of pegs clear of the pegs of the lid.
 
     Parameters

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import math
+import functools
 import re
-from collections.abc import Collection
-from dataclasses import dataclass, fields
-from typing import Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.printers import PRINTERS, Printer, PrinterName
 from finger3d.mold.screws import SCREWS, Screw, ScrewName
+from finger3d.scene.messages import described
 
 BAND_DEPTH_MM = 1.5
 """Depth of the grooves for rubber bands."""
@@ -26,13 +29,6 @@ CORD_SQUEEZE, CORD_GROOVE = 0.8, 1.3
 the groove is three quarters full."""
 
 _LEAST_WALL_MM = 8.0  # where nothing needs a thicker one
-
-_LARGEST_MM = {
-    "wall_mm": 200.0, "peg_mm": 50.0, "lid_mm": 100.0, "foil_length_mm": 500.0, "foil_thickness_mm": 10.0,
-    "foil_width_mm": 500.0, "pour_mm": 100.0, "vent_mm": 50.0, "band_mm": 50.0, "cord_mm": 20.0, "carrier_mm": 100.0,
-    "key_mm": 100.0,
-}  # fmt: skip
-"""Largest value of each length: several times what molds of large printers have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +61,8 @@ class MoldOptions:
     vent_mm
         Diameter of the vents; None chooses 0.1 times the base's shorter side, at most 2.
     riser
-        Volume of the riser, a cup on the lid from which silicone flows as bubbles rise, over that of the cavity.
+        Volume of the riser, a cup on the lid from which silicone flows as bubbles rise, over that of the cavity; 0.03
+        to 0.05 is usual.
     fasten
         Screws with nuts through the halves, grooves for rubber bands around them, or none.
     screw
@@ -112,65 +109,50 @@ class MoldOptions:
     """
 
     printer: PrinterName = "fdm-0.4"
-    wall_mm: float | None = None
-    clearance_mm: float | None = None
-    shrinkage: float = 0.0
+    wall_mm: Annotated[float, Gt(0), Le(200)] | None = None
+    clearance_mm: Annotated[float, Ge(0)] | None = None
+    shrinkage: Annotated[float, Ge(0), Lt(0.2)] = 0.0
     split: Literal["z", "x"] = "z"
     split_mm: float = 0.0
-    undercut_mm: float = 0.0
-    peg_mm: float = 4.0
-    lid_mm: float = 4.0
-    pour_mm: float | None = None
-    vent_mm: float | None = None
-    riser: float = 0.04
+    undercut_mm: Annotated[float, Ge(0), Le(10)] = 0.0
+    peg_mm: Annotated[float, Gt(0), Le(50)] = 4.0
+    lid_mm: Annotated[float, Gt(0), Le(100)] = 4.0
+    pour_mm: Annotated[float, Gt(0), Le(100)] | None = None
+    vent_mm: Annotated[float, Gt(0), Le(50)] | None = None
+    riser: Annotated[float, Ge(0), Le(0.5)] = 0.04
     fasten: Literal["screws", "bands", "none"] = "screws"
     screw: ScrewName = "M3"
-    band_mm: float = 5.0
+    band_mm: Annotated[float, Gt(0), Le(50)] = 5.0
     seal: Literal["tongue", "cord", "none"] = "tongue"
-    cord_mm: float = 2.0
+    cord_mm: Annotated[float, Gt(0), Le(20)] = 2.0
     plugs: bool = True
     pry: bool = True
     carrier: bool = False
-    carrier_mm: float = 5.0
-    key_mm: float = 3.0
+    carrier_mm: Annotated[float, Gt(0), Le(100)] = 5.0
+    key_mm: Annotated[float, Gt(0), Le(100)] = 3.0
     parts: bool = False
     pour_order: str | None = None
     inserts: str | None = None
-    cavities: int = 1
+    cavities: Annotated[int, Ge(1), Le(20)] = 1
     coupon: bool = False
     button: bool = False
-    foil_length_mm: float = 5.0
-    foil_thickness_mm: float = 0.1
-    foil_width_mm: float = 3.0
-    slot_gap_mm: float = 0.15
+    foil_length_mm: Annotated[float, Gt(0), Le(500)] = 5.0
+    foil_thickness_mm: Annotated[float, Gt(0), Le(10)] = 0.1
+    foil_width_mm: Annotated[float, Gt(0), Le(500)] = 3.0
+    slot_gap_mm: Annotated[float, Ge(0), Le(1)] = 0.15
     bed: str | None = None
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, (int, float)) and not math.isfinite(value):
-                raise _refused(f.name, value, "a number")
-        choices: dict[str, Collection[str]] = {
-            "printer": PRINTERS, "screw": SCREWS, "split": "zx",
-            "seal": ("tongue", "cord", "none"), "fasten": ("screws", "bands", "none"),
-        }  # fmt: skip
-        for name, known in choices.items():
-            if getattr(self, name) not in known:
-                raise _refused(name, getattr(self, name), " or ".join(known))
-        for name, most in _LARGEST_MM.items():
-            if getattr(self, name) is not None:
-                self._within(name, 0.0, most, f"above 0, and at most {most:g}", open_low=True)
-        if not 0.0 <= self.shrinkage < 0.2:
-            raise _refused("shrinkage", self.shrinkage, "a share from 0 up to 0.2: 0.001 is a tenth of a percent")
-        self._within("riser", 0.0, 0.5, "a share of the cavity from 0 to 0.5; 0.03 to 0.05 is usual")
-        self._within("undercut_mm", 0.0, 10.0, "from 0 to 10")
-        self._within("cavities", 1, 20, "from 1 to 20")
+        for name, (hint, adapter) in _adapters().items():
+            try:
+                adapter.validate_python(getattr(self, name))
+            except ValidationError:
+                raise _refused(name, getattr(self, name), described(hint)) from None
         # With more clearance a full peg would fit the thin peg's hole.
-        if self.clearance_mm is not None:
-            allowed = f"from 0 to a tenth of the peg, {self.peg_mm / 10:g}"
-            self._within("clearance_mm", 0.0, self.peg_mm / 10.0, allowed)
-        self._within("slot_gap_mm", 0.0, 1.0, "from 0 to 1")
-        self._within("lid_mm", 2.0 * self.rim_mm, math.inf, f"at least {2.0 * self.rim_mm:g}, or the lid bends")
+        if self.clearance_mm is not None and self.clearance_mm > self.peg_mm / 10.0:
+            raise _refused("clearance_mm", self.clearance_mm, f"from 0 to a tenth of the peg, {self.peg_mm / 10:g}")
+        if self.lid_mm < 2.0 * self.rim_mm:
+            raise _refused("lid_mm", self.lid_mm, f"at least {2.0 * self.rim_mm:g}, or the lid bends")
         least = self.least_wall_mm
         if self.wall_mm is not None and self.wall_mm < least - 1e-9:
             raise _refused(
@@ -193,11 +175,6 @@ class MoldOptions:
         for other, chosen in (("--carrier", self.carrier), ("--cavities", self.cavities > 1)):
             if self.parts and chosen:
                 raise Finger3dError(f"--parts {other}: are not made together; leave one of them out")
-
-    def _within(self, name: str, low: float, high: float, allowed: str, open_low: bool = False) -> None:
-        value = getattr(self, name)
-        if not low <= value <= high or (open_low and value == low):
-            raise _refused(name, value, allowed)
 
     @property
     def machine(self) -> Printer:
@@ -260,8 +237,8 @@ class MoldOptions:
     def bed_mm(self) -> tuple[float, float, float]:
         """Length, width and height of the printer."""
         text = self.machine.bed if self.bed is None else self.bed
-        found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
-        sizes = tuple(float(size) for size in found.groups()) if found else (0.0,)
+        match = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*[x*]\s*(\d+(?:\.\d*)?)\s*", text)
+        sizes = tuple(float(size) for size in match.groups()) if match else (0.0,)
         if min(sizes) <= 0.0:
             raise _refused("bed", text, "three sizes in mm, such as 220x220x250")
         return sizes[0], sizes[1], sizes[2]
@@ -280,6 +257,14 @@ class MoldOptions:
     def cover_mm(self) -> float:
         """Thickness of the lid or the carrier."""
         return self.carrier_mm if self.carrier else self.lid_mm
+
+
+@functools.cache
+def _adapters() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
+    """Return the type of every option, and its check."""
+    config = ConfigDict(strict=True, allow_inf_nan=False)
+    hints = get_type_hints(MoldOptions, include_extras=True)
+    return {name: (hint, TypeAdapter(hint, config=config)) for name, hint in hints.items()}
 
 
 def _refused(name: str, value: object, allowed: str) -> Finger3dError:

@@ -56,7 +56,7 @@ def beds(printed: Mapping[str, Shell], bed_mm: tuple[float, float, float]) -> li
     bed_mm : length, width and height of the printer
     """
     left = dict(sorted(printed.items(), key=lambda item: -float(item[1].extent[0] * item[1].extent[1])))
-    found = []
+    packed = []
     while left:
         chosen = _pack(left, bed_mm)
         fits = bool(chosen)
@@ -71,8 +71,8 @@ def beds(printed: Mapping[str, Shell], bed_mm: tuple[float, float, float]) -> li
         if fits:
             middle = np.array([*(0.5 * (np.array(bed_mm[:2]) - high[:2] - low[:2])), 0.0])
             chosen = {name: part.moved(np.eye(3), middle) for name, part in chosen.items()}
-        found.append(Bed(chosen, high - low, fits))
-    return found
+        packed.append(Bed(chosen, high - low, fits))
+    return packed
 
 
 def _pack(parts: Mapping[str, Shell], bed_mm: tuple[float, float, float]) -> dict[str, Shell]:

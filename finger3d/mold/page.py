@@ -36,7 +36,7 @@ class CastingStep:
 
 def mold_page(
     title: str,
-    made: Mold,
+    mold: Mold,
     shells: Mapping[str, Shell],
     printed: Mapping[str, Shell],
     packed: Sequence[Bed],
@@ -54,7 +54,7 @@ def mold_page(
     instructions : text of sheet.txt, repeated at the end
     remarks : warnings, shown at the top
     """
-    steps = _steps(made, shells, packed)
+    steps = _steps(mold, shells, packed)
     pictures = [
         StepPicture(out / f"mold_step_{i}_{step.word}.png", step.parts, step.on_bed) for i, step in enumerate(steps, 1)
     ]
@@ -65,13 +65,13 @@ def mold_page(
     ]
     sections += [
         PageSection("Parts", [_table(printed)]),
-        PageSection("Opening", _opening(made)),
+        PageSection("Opening", _opening(mold)),
         PageSection("sheet.txt", [Code(instructions)], folded=True),
     ]
     page = write_page(
         out,
         f"Mold of {title}",
-        _headline(made),
+        _headline(mold),
         sections,
         [Figure("mold.png", "As it is poured, taken apart")],
         command="export --mold",
@@ -82,36 +82,36 @@ def mold_page(
     return [page, *(picture.path for picture in pictures)]
 
 
-def _headline(made: Mold) -> list[HeadlineRow]:
-    rows = [HeadlineRow("silicone in the cavities", round(made.silicone_mm3 / 1e3, 2), "ml")]
-    for pour in made.pours:
+def _headline(mold: Mold) -> list[HeadlineRow]:
+    rows = [HeadlineRow("silicone in the cavities", round(mold.silicone_mm3 / 1e3, 2), "ml")]
+    for pour in mold.pours:
         if pour.ports is not None and pour.ports.riser is not None:
-            share = 100.0 * pour.ports.riser.volume_mm3 * len(made.at.places) / pour.silicone_mm3
-            named = f" of {pour.name}" if len(made.pours) > 1 else ""
-            rows.append(HeadlineRow(f"riser{named} and its hole", f"{share:.3g} % of the cavity"))
-    if (found := made.bolts) is not None:
-        rows.append(HeadlineRow("screws with nuts", f"{found.number} {made.options.screw} x {found.length_mm:g}"))
+            percent = 100.0 * pour.ports.riser.volume_mm3 * len(mold.layout.places) / pour.silicone_mm3
+            named = f" of {pour.name}" if len(mold.pours) > 1 else ""
+            rows.append(HeadlineRow(f"riser{named} and its hole", f"{percent:.3g} % of the cavity"))
+    if (bolts := mold.bolts) is not None:
+        rows.append(HeadlineRow("screws with nuts", f"{bolts.number} {mold.options.screw} x {bolts.length_mm:g}"))
     return rows
 
 
-def _steps(made: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> list[CastingStep]:
+def _steps(mold: Mold, shells: Mapping[str, Shell], packed: Sequence[Bed]) -> list[CastingStep]:
     surfaces = {name: part.surface for name, part in shells.items()}
     halves = {name: surfaces[name] for name in HALVES}
-    steps = [_printing(made, bed, len(packed)) for bed in packed[:1]]
-    steps.append(_preparing(made, halves))
+    steps = [_printing(mold, bed, len(packed)) for bed in packed[:1]]
+    steps.append(_preparing(mold, halves))
     closed = dict(halves)
-    if made.foils:
-        steps.append(_threading(made, halves, surfaces))
+    if mold.foils:
+        steps.append(_threading(mold, halves, surfaces))
         closed |= {name: part for name, part in surfaces.items() if kind(name) == "plug"}
-    steps.append(CastingStep("close", "Close the halves", close_lines(made), standing(closed)))
-    for i, pour in enumerate(made.pours):
-        steps.append(_pouring(made, i, pour, closed, surfaces))
-    steps.append(_opening_step(made, surfaces))
+    steps.append(CastingStep("close", "Close the halves", close_lines(mold), standing(closed)))
+    for i, pour in enumerate(mold.pours):
+        steps.append(_pouring(mold, i, pour, closed, surfaces))
+    steps.append(_opening_step(mold, surfaces))
     return steps
 
 
-def _printing(made: Mold, bed: Bed, beds: int) -> CastingStep:
-    o, parts = made.options, {name: part.surface for name, part in bed.placed.items()}
+def _printing(mold: Mold, bed: Bed, beds: int) -> CastingStep:
+    o, parts = mold.options, {name: part.surface for name, part in bed.placed.items()}
     size = o.bed_mm
     parts["bed"] = _box((0.0, 0.0, -_BED_THICKNESS_MM), (size[0], size[1], 0.0))
     lines = [
@@ -125,25 +125,25 @@ def _printing(made: Mold, bed: Bed, beds: int) -> CastingStep:
     return CastingStep("print", "Print the parts", lines, parts, on_bed=True)
 
 
-def _preparing(made: Mold, halves: Mapping[str, Triangles]) -> CastingStep:
+def _preparing(mold: Mold, halves: Mapping[str, Triangles]) -> CastingStep:
     shifts = separations({name: (part.low, part.high) for name, part in halves.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in halves.items()}
-    return CastingStep("prepare", "Prepare the halves", prepare_lines(made), standing(apart))
+    return CastingStep("prepare", "Prepare the halves", prepare_lines(mold), standing(apart))
 
 
-def _threading(made: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> CastingStep:
-    laid = strips(made.foils, made.at, made.options)
+def _threading(mold: Mold, halves: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]) -> CastingStep:
+    laid = strips(mold.foils, mold.layout, mold.options)
     assert laid is not None
     plugs = {name: part for name, part in surfaces.items() if kind(name) == "plug"}
     parts = {"half_b": halves["half_b"], **{n: p for n, p in plugs.items() if n.endswith("b")}, "strips": laid}
-    return CastingStep("gauges", "Thread the strips of the gauges", thread_lines(made), standing(parts))
+    return CastingStep("gauges", "Thread the strips of the gauges", thread_lines(mold), standing(parts))
 
 
 def _pouring(
-    made: Mold, i: int, pour: Pour, closed: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]
+    mold: Mold, i: int, pour: Pour, closed: Mapping[str, Triangles], surfaces: Mapping[str, Triangles]
 ) -> CastingStep:
-    several = len(made.pours) > 1
-    own = {name: surfaces[name] for name in pour.others if name in surfaces}
+    several = len(mold.pours) > 1
+    pour_parts = {name: surfaces[name] for name in pour.others if name in surfaces}
     high = max(float(part.high[1] - part.low[1]) for part in closed.values())
     parts: dict[str, Triangles] = dict(closed)
     for k, body in enumerate(pour.cast):
@@ -153,30 +153,30 @@ def _pouring(
             parts.update({f"sensor_{j}": b.surface for j, b in enumerate(pour.cast[1:], 2)})
             break
     if pour.ports is None:  # the lid is pushed in after the silicone
-        own = {n: Triangles(p.points - [0.0, 0.8 * high, 0.0], p.faces) for n, p in own.items()}
-    parts |= own
-    named = f" {i + 1} of {len(made.pours)}: {pour.name}" if several else ""
+        pour_parts = {n: Triangles(p.points - [0.0, 0.8 * high, 0.0], p.faces) for n, p in pour_parts.items()}
+    parts |= pour_parts
+    named = f" {i + 1} of {len(mold.pours)}: {pour.name}" if several else ""
     return CastingStep(
-        f"pour_{pour.name}" if several else "pour", f"Pour{named}", pour_lines(made, pour), standing(parts)
+        f"pour_{pour.name}" if several else "pour", f"Pour{named}", pour_lines(mold, pour), standing(parts)
     )
 
 
-def _opening_step(made: Mold, surfaces: Mapping[str, Triangles]) -> CastingStep:
-    last = made.pours[-1]
-    names = [*HALVES, *last.others] if len(made.pours) > 1 else list(surfaces)
+def _opening_step(mold: Mold, surfaces: Mapping[str, Triangles]) -> CastingStep:
+    last = mold.pours[-1]
+    names = [*HALVES, *last.others] if len(mold.pours) > 1 else list(surfaces)
     parts = {name: surfaces[name] for name in names if name in surfaces}
-    for i, body in enumerate(made.bodies):
+    for i, body in enumerate(mold.bodies):
         parts["sensor" if i == 0 else f"sensor_{i + 1}"] = body.surface
     shifts = separations({name: (part.low, part.high) for name, part in parts.items()})
     apart = {name: Triangles(part.points + shifts[name], part.faces) for name, part in parts.items()}
     apart.update({name: part for name, part in parts.items() if kind(name) == "insert"})  # they stay in the finger
-    if made.options.carrier:
+    if mold.options.carrier:
         apart["carrier"] = parts["carrier"]
-    return CastingStep("open", "Open the mold", open_lines(made), standing(apart))
+    return CastingStep("open", "Open the mold", open_lines(mold), standing(apart))
 
 
-def _opening(made: Mold) -> list[str | Table]:
-    d = made.draft
+def _opening(mold: Mold) -> list[str | Table]:
+    d = mold.draft
     lines: list[str | Table] = [
         Table(
             ("least draft", "walls below 1 degree", "their length along the opening", "deepest undercut"),

@@ -31,7 +31,7 @@ from finger3d.mold.demould import Draft, check_opening, undercut_depth
 from finger3d.mold.fasteners import Bolts, band_grooves, bolts, pry_notches, screws
 from finger3d.mold.features import Feature, added, cuts
 from finger3d.mold.foils import FoilSlot, check_foils, plugs, slot
-from finger3d.mold.layout import Layout, layout
+from finger3d.mold.layout import Layout, layout_of
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.pegs import Pegs, carrier_pins, half_pegs, lid_pegs
 from finger3d.mold.ports import Ports, base_region, openings, ports, riser_cup
@@ -84,7 +84,7 @@ class Mold:
     Attributes
     ----------
     body : what one cavity casts: the finger enlarged by the shrinkage
-    at : places of cavities, walls and pegs
+    layout : places of cavities, walls and pegs
     parts : half_a (z above the split), half_b (below, with the pegs), lid or carrier, riser, plugs, pins; without the
         cavities where the body has no CAD, see `shell`
     pours : in their order
@@ -96,7 +96,7 @@ class Mold:
 
     options: MoldOptions
     body: Body
-    at: Layout
+    layout: Layout
     parts: dict[str, Solid]
     pours: tuple[Pour, ...]
     slots: tuple[Solid, ...]
@@ -109,7 +109,7 @@ class Mold:
     @property
     def bodies(self) -> tuple[Body, ...]:
         """What the cavities cast, in place."""
-        return tuple(self.body.at(x) for x in self.at.places)
+        return tuple(self.body.at(x) for x in self.layout.places)
 
     @property
     def silicone_mm3(self) -> float:
@@ -119,7 +119,7 @@ class Mold:
     @property
     def openings_mm3(self) -> float:
         """Volume of pour holes, risers, vents and keyed holes, of all pours."""
-        cover, cavities = self.options.cover_mm, len(self.at.places)
+        cover, cavities = self.options.cover_mm, len(self.layout.places)
         held = sum(pour.ports.volume_mm3(cover) for pour in self.pours if pour.ports is not None)
         return cavities * (held + (self.keys.volume_mm3(cover) if self.keys else 0.0))
 
@@ -132,20 +132,20 @@ class Mold:
     @property
     def bolts(self) -> Bolts | None:
         """Screws that hold the halves together; None without."""
-        return bolts(self.at, self.options)
+        return bolts(self.layout, self.options)
 
     @property
     def outline(self) -> tuple[Float, Float]:
         """Low and high corner (3,), mm, of the two halves together, without lugs."""
-        return self.at.outer_low, self.at.outer_high
+        return self.layout.outer_low, self.layout.outer_high
 
     def shell(self, name: str, tolerance_mm: float, angle: float) -> Shell:
         """Return a part as closed triangles, the cavities cut out."""
-        made = shell(self.parts[name], tolerance_mm, name, angle)
+        part = shell(self.parts[name], tolerance_mm, name, angle)
         if self.body.cad is None and name in HALVES:
             for body in self.bodies:
-                made = body.cut_from(made)
-        return made
+                part = body.cut_from(part)
+        return part
 
 
 def mold(shape: Solid | Triangles, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
@@ -167,9 +167,9 @@ def mold(shape: Solid | Triangles, gauges: Sequence[FoilSlot], options: MoldOpti
     draft = check_opening(filled(finger, options), options, may_turn=not gauges)
     body = finger.scaled(options.scale).opening_along_z(options.split)
     check_foils(body, gauges, options)
-    made = _assembled(body, tuple(gauges), options, draft)
-    check_parts(made)
-    return made
+    assembled = _assembled(body, tuple(gauges), options, draft)
+    check_parts(assembled)
+    return assembled
 
 
 def recesses(body: Body) -> list[Solid]:
@@ -195,11 +195,10 @@ def filled(finger: Body, options: MoldOptions) -> Body:
     for filling in fillings:
         depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
         if depth > max(options.undercut_mm, tolerance):
-            at = filling.center()
+            center = ", ".join(f"{coordinate:.4g}" for coordinate in filling.center())
             raise Finger3dError(
-                f"mold: the recess in the base near ({at.X:.4g}, {at.Y:.4g}, {at.Z:.4g}) mm widens inside, an undercut "
-                f"of {depth:.2g} mm: the lid, which fills it, cannot be pulled out; change the body, or allow it with "
-                "--undercut-mm"
+                f"mold: the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm: the "
+                "lid, which fills it, cannot be pulled out; change the body, or allow it with --undercut-mm"
             )
     return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
@@ -208,82 +207,82 @@ def halves_and_features(
     body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions
 ) -> tuple[Layout, list[Feature], Pegs, tuple[Solid, ...]]:
     """Return the places, all features but those of the lid's openings, the pegs of the halves, and the slots."""
-    at = layout(*body.box, options)
-    cast = [body.at(x) for x in at.places]
-    pegs = half_pegs(at, options)
-    slots = tuple(slot(foil, at, options, x) for x in at.places for foil in foils)
+    layout = layout_of(*body.box, options)
+    cast = [body.at(x) for x in layout.places]
+    pegs = half_pegs(layout, options)
+    slots = tuple(slot(foil, layout, options, x) for x in layout.places for foil in foils)
     fillings = [recesses(b) for b in cast]
     cavities = [solid for b, own in zip(cast, fillings, strict=True) if b.cad is not None for solid in (b.cad, *own)]
     features = [
-        screws(at, options),
-        band_grooves(at, options),
-        pry_notches(at, options),
-        seal([b.surface for b in cast], at, options),
-        plugs(foils, at, options),
+        screws(layout, options),
+        band_grooves(layout, options),
+        pry_notches(layout, options),
+        seal([b.surface for b in cast], layout, options),
+        plugs(foils, layout, options),
         Feature(add={"half_b": pegs.pegs}, cut={"half_a": pegs.holes}),
         Feature(add={"lid": list(itertools.chain(*fillings))}),
         Feature(cut={name: [*slots, *cavities] for name in HALVES}),
     ]
-    return at, features, pegs, slots
+    return layout, features, pegs, slots
 
 
 def part(name: str, base: Solid, features: Sequence[Feature], label: str) -> Solid:
     """Return a part: a box, with what features add to it, without what they cut from it."""
     whole = base + added(features, name) if added(features, name) else base
     tools = cuts(features, name)
-    made = one(whole - tools if tools else whole, label)
-    made.label = label
-    return made
+    solid = one(whole - tools if tools else whole, label)
+    solid.label = label
+    return solid
 
 
-def halves(at: Layout, features: Sequence[Feature]) -> dict[str, Solid]:
+def halves(layout: Layout, features: Sequence[Feature]) -> dict[str, Solid]:
     """Return both halves."""
-    front = between([at.outer_low[0], 0.0, at.split], at.outer_high)
-    back = between(at.outer_low, [at.outer_high[0], at.top, at.split])
+    front = between([layout.outer_low[0], 0.0, layout.split], layout.outer_high)
+    back = between(layout.outer_low, [layout.outer_high[0], layout.top, layout.split])
     return {name: part(name, box, features, name) for name, box in zip(HALVES, (front, back), strict=True)}
 
 
-def cover(at: Layout, options: MoldOptions) -> Solid:
+def cover(layout: Layout, options: MoldOptions) -> Solid:
     """Return the plate of a lid or a carrier."""
-    low, high = at.outer_low, at.outer_high
+    low, high = layout.outer_low, layout.outer_high
     return between([low[0], -options.cover_mm, low[2]], [high[0], 0.0, high[2]])
 
 
 def _assembled(body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions, draft: Draft) -> Mold:
-    at, features, pegs, slots = halves_and_features(body, foils, options)
+    layout, features, pegs, slots = halves_and_features(body, foils, options)
     base = base_region(body.surface)
-    found = ports(base, body.volume_mm3, options, vented=not options.carrier)
-    gripped = keys(base, found, options) if options.carrier else None
-    upright = None if options.carrier else lid_pegs(at, options)
+    lid_ports = ports(base, body.volume_mm3, options, vented=not options.carrier)
+    gripped = keys(base, lid_ports, options) if options.carrier else None
+    upright = None if options.carrier else lid_pegs(layout, options)
     if upright is None:
-        features.append(carrier_pins(at, options))
+        features.append(carrier_pins(layout, options))
     else:
         features.append(Feature(add={"lid": upright.pegs}, cut=dict.fromkeys(HALVES, upright.holes)))
-    holes = [solid for x in at.places for solid in openings(found, x, options)]
+    holes = [solid for x in layout.places for solid in openings(lid_ports, x, options)]
     if gripped is not None:
-        holes += [solid for x in at.places for solid in key_solids(gripped, x, options)]
+        holes += [solid for x in layout.places for solid in key_solids(gripped, x, options)]
     features.append(Feature(cut={"lid": holes}))
     name = "carrier" if options.carrier else "lid"
-    parts = {**halves(at, features), name: part("lid", cover(at, options), features, name)}
-    if found.riser is not None:
-        for i, x in enumerate(at.places, 1):
-            parts[_numbered("riser", i, at)] = riser_cup(found, x, options)
+    parts = {**halves(layout, features), name: part("lid", cover(layout, options), features, name)}
+    if lid_ports.riser is not None:
+        for i, x in enumerate(layout.places, 1):
+            parts[_numbered("riser", i, layout)] = riser_cup(lid_ports, x, options)
     for feature in features:
-        parts.update(feature.own)
+        parts.update(feature.parts)
     for label, solid in parts.items():
         solid.label = label
     return Mold(
         options=options,
         body=body,
-        at=at,
+        layout=layout,
         parts=parts,
         pours=(
             Pour(
                 "",
                 name,
-                body.volume_mm3 * len(at.places),
-                found,
-                tuple(body.at(x) for x in at.places),
+                body.volume_mm3 * len(layout.places),
+                lid_ports,
+                tuple(body.at(x) for x in layout.places),
                 tuple(part for part in parts if part not in HALVES),
             ),
         ),
@@ -296,8 +295,8 @@ def _assembled(body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions, dr
     )
 
 
-def _numbered(name: str, i: int, at: Layout) -> str:
-    return name if len(at.places) == 1 else f"{name}_{i}"
+def _numbered(name: str, i: int, layout: Layout) -> str:
+    return name if len(layout.places) == 1 else f"{name}_{i}"
 
 
 # --- refusals ---------------------------------------------------------------------------------------------------------
@@ -314,34 +313,34 @@ def check_split(finger: Body, options: MoldOptions) -> None:
         )
 
 
-def overlaps(made: Mold) -> dict[str, float]:
+def overlaps(mold: Mold) -> dict[str, float]:
     """Return the common volume (mm3) of each pair of parts in the assembled position, the cast bodies included.
 
     Parts of different pours are never in the mold together.
     """
     boxes = {}
-    for name, solid in made.parts.items():
-        found = solid.bounding_box()
-        boxes[name] = np.array([*found.min]), np.array([*found.max])
+    for name, solid in mold.parts.items():
+        box = solid.bounding_box()
+        boxes[name] = np.array([*box.min]), np.array([*box.max])
     shared: dict[str, float] = {}
-    for pour in made.pours:
-        own = [name for name in made.parts if name in pour.others or not any(name in p.others for p in made.pours)]
-        for a, b in itertools.combinations(own, 2):
+    for pour in mold.pours:
+        names = [name for name in mold.parts if name in pour.others or not any(name in p.others for p in mold.pours)]
+        for a, b in itertools.combinations(names, 2):
             apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
             if f"{a}, {b}" not in shared:
-                shared[f"{a}, {b}"] = 0.0 if apart else common(made.parts[a], made.parts[b])
-        for name in own:
+                shared[f"{a}, {b}"] = 0.0 if apart else common(mold.parts[a], mold.parts[b])
+        for name in names:
             if pour.cast[0].cad is None and name in HALVES:
                 continue  # cut from each other by a boolean of triangles
-            found = sum(body.shared(made.parts[name]) for body in pour.cast)
-            shared[f"{name}, sensor"] = max(found, shared.get(f"{name}, sensor", 0.0))
+            volume = sum(body.shared(mold.parts[name]) for body in pour.cast)
+            shared[f"{name}, sensor"] = max(volume, shared.get(f"{name}, sensor", 0.0))
     return shared
 
 
-def check_parts(made: Mold) -> None:
+def check_parts(mold: Mold) -> None:
     """Raise a Finger3dError if two parts overlap, or a part and what is cast."""
-    tolerance = _OVERLAP_TOLERANCE if made.body.cad is not None else _MESH_OVERLAP_TOLERANCE
-    bad = {pair: v for pair, v in overlaps(made).items() if v > tolerance * made.silicone_mm3}
+    tolerance = _OVERLAP_TOLERANCE if mold.body.cad is not None else _MESH_OVERLAP_TOLERANCE
+    bad = {pair: v for pair, v in overlaps(mold).items() if v > tolerance * mold.silicone_mm3}
     if bad:
         pair = max(bad, key=lambda p: bad[p])
         raise Finger3dError(f"mold: {pair} would overlap by {bad[pair]:.3g} mm3; choose other sizes of wall or pegs")

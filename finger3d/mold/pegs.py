@@ -29,10 +29,12 @@ class Pegs:
     holes: tuple[Solid, ...]
 
 
-def half_pegs(at: Layout, options: MoldOptions) -> Pegs:
+def half_pegs(layout: Layout, options: MoldOptions) -> Pegs:
     """Return the pegs of half B and their holes in half A."""
     away = options.peg_distance_mm
-    places = [(x, y, at.split) for y in at.rows for x in (float(at.low[0]) - away, float(at.high[0]) + away)]
+    places = [
+        (x, y, layout.split) for y in layout.rows for x in (float(layout.low[0]) - away, float(layout.high[0]) + away)
+    ]
     sizes = [options.peg_mm * THIN] + [options.peg_mm] * (len(places) - 1)
     return Pegs(
         tuple(peg(p, d, options.peg_mm, "z") for p, d in zip(places, sizes, strict=True)),
@@ -43,32 +45,33 @@ def half_pegs(at: Layout, options: MoldOptions) -> Pegs:
     )
 
 
-def _corners(at: Layout, options: MoldOptions) -> list[tuple[tuple[float, float, float], float]]:
+def _corners(layout: Layout, options: MoldOptions) -> list[tuple[tuple[float, float, float], float]]:
     """Return the places of the pegs of the lid, and their diameters."""
     away = options.peg_distance_mm
     ends = itertools.product(
-        (float(at.low[0]) - away, float(at.high[0]) + away), (float(at.low[2]) - away, float(at.high[2]) + away)
+        (float(layout.low[0]) - away, float(layout.high[0]) + away),
+        (float(layout.low[2]) - away, float(layout.high[2]) + away),
     )
     sizes = [options.peg_mm * THIN] + [options.peg_mm] * 3
     return [((x, 0.0, z), d) for (x, z), d in zip(ends, sizes, strict=True)]
 
 
-def lid_pegs(at: Layout, options: MoldOptions) -> Pegs:
+def lid_pegs(layout: Layout, options: MoldOptions) -> Pegs:
     """Return the pegs of the lid and their holes in both halves."""
-    found = _corners(at, options)
+    corners = _corners(layout, options)
     return Pegs(
-        tuple(peg(p, d, options.peg_mm, "y") for p, d in found),
-        tuple(cylinder(p, d + 2.0 * options.gap_mm, options.hole_depth_mm, "y") for p, d in found),
+        tuple(peg(p, d, options.peg_mm, "y") for p, d in corners),
+        tuple(cylinder(p, d + 2.0 * options.gap_mm, options.hole_depth_mm, "y") for p, d in corners),
     )
 
 
-def carrier_pins(at: Layout, options: MoldOptions) -> Feature:
+def carrier_pins(layout: Layout, options: MoldOptions) -> Feature:
     """Return loose pins with heads, which align a carrier, and the holes for them in carrier and halves.
 
     The carrier has no pegs of its own: its holes serve to mount the finger. The thin pin is at one corner.
     """
     holes, through, pins = [], [], {}
-    for i, ((x, _, z), d) in enumerate(_corners(at, options)):
+    for i, ((x, _, z), d) in enumerate(_corners(layout, options)):
         outside = -options.carrier_mm
         hole = d + 2.0 * options.gap_mm
         holes.append(cylinder((x, 0.0, z), hole, options.hole_depth_mm, "y"))
@@ -76,4 +79,4 @@ def carrier_pins(at: Layout, options: MoldOptions) -> Feature:
         head = cylinder((x, outside, z), _HEAD * d, 2.0 * options.rim_mm, "-y")
         pin = peg((x, outside, z), d, options.carrier_mm + options.peg_mm, "y")
         pins[f"pin_{i + 1}"] = (head + pin).solids()[0]
-    return Feature(cut={"half_a": holes, "half_b": holes, "lid": through}, own=pins)
+    return Feature(cut={"half_a": holes, "half_b": holes, "lid": through}, parts=pins)

@@ -122,12 +122,14 @@ def ports(
             f"--pour-mm {pour:.3g} --vent-mm {vent:.3g}: do not fit on the base, {x1 - x0:.4g} x {z1 - z0:.4g} mm, "
             f"with {options.rim_mm:g} mm between them; must be smaller"
         )
-    at = nearest(allowed, (0.0, 0.0))
-    room = min([math.dist(at, v) - vent / 2.0 - options.rim_mm for v in vents] + [0.5 * (x1 - x0), 0.5 * size + 4.0])
+    middle = nearest(allowed, (0.0, 0.0))
+    room = min(
+        [math.dist(middle, v) - vent / 2.0 - options.rim_mm for v in vents] + [0.5 * (x1 - x0), 0.5 * size + 4.0]
+    )
     # The funnel and the cup stand outside: they may be wider than the base, but must not cover a vent.
     funnel = max(pour, min(2.0 * pour, 2.0 * room, size))
     riser = _riser(pour, cavity_mm3, room, options) if options.riser else None
-    return Ports(pour, at, funnel, vent, vents, riser)
+    return Ports(pour, middle, funnel, vent, vents, riser)
 
 
 def _allowed(
@@ -182,29 +184,29 @@ def _riser(pour: float, cavity_mm3: float, room: float, options: MoldOptions) ->
     return Riser(radius, slope + above, _SPIGOT * cover, wall, total)
 
 
-def openings(found: Ports, x: float, options: MoldOptions) -> list[Solid]:
+def openings(ports: Ports, x: float, options: MoldOptions) -> list[Solid]:
     """Return the pour hole and the vents of the cavity at `x` as solids through the lid."""
     cover = options.cover_mm
-    px, pz = found.pour[0] + x, found.pour[1]
-    cut = [cylinder((vx + x, -cover, vz), found.vent_mm, cover, "y") for vx, vz in found.vents]
-    if found.riser is None:
-        return [cone((px, -cover, pz), found.funnel_mm, found.pour_mm, cover, "y"), *cut]
-    socket = found.pour_mm + 2.0 * found.riser.wall_mm + 2.0 * options.gap_mm
+    px, pz = ports.pour[0] + x, ports.pour[1]
+    cut = [cylinder((vx + x, -cover, vz), ports.vent_mm, cover, "y") for vx, vz in ports.vents]
+    if ports.riser is None:
+        return [cone((px, -cover, pz), ports.funnel_mm, ports.pour_mm, cover, "y"), *cut]
+    socket = ports.pour_mm + 2.0 * ports.riser.wall_mm + 2.0 * options.gap_mm
     return [
-        cylinder((px, -cover, pz), found.pour_mm, cover, "y"),
-        cylinder((px, -cover, pz), socket, found.riser.spigot_mm, "y"),
+        cylinder((px, -cover, pz), ports.pour_mm, cover, "y"),
+        cylinder((px, -cover, pz), socket, ports.riser.spigot_mm, "y"),
         *cut,
     ]
 
 
-def riser_cup(found: Ports, x: float, options: MoldOptions) -> Solid:
+def riser_cup(ports: Ports, x: float, options: MoldOptions) -> Solid:
     """Return the cup of the cavity at `x`, its spigot in the lid."""
-    r = found.riser
+    r = ports.riser
     assert r is not None
-    a, outer, spigot = found.pour_mm / 2.0, r.radius_mm + r.wall_mm, found.pour_mm / 2.0 + r.wall_mm
+    a, outer, spigot = ports.pour_mm / 2.0, r.radius_mm + r.wall_mm, ports.pour_mm / 2.0 + r.wall_mm
     # The collar rests on the lid; a tube without collar rests on the bottom of its socket.
     length = r.spigot_mm - (options.gap_mm if outer > spigot + 1e-6 else 0.0)
     profile = [(a, -length), (spigot, -length), (spigot, 0.0), (outer, 0.0), (outer, r.height_mm),
                (r.radius_mm, r.height_mm), (r.radius_mm, r.radius_mm - a), (a, 0.0)]  # fmt: skip
     profile = [p for i, p in enumerate(profile) if math.dist(p, profile[i - 1]) > 1e-6]
-    return revolved(profile, (found.pour[0] + x, -options.cover_mm, found.pour[1]), "-y")
+    return revolved(profile, (ports.pour[0] + x, -options.cover_mm, ports.pour[1]), "-y")

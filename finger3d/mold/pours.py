@@ -76,10 +76,10 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
         for label, solid in solids.items()
     }
     check_foils(body, gauges, options)
-    at, features, pegs, slots = halves_and_features(body, tuple(gauges), options)
-    upright = lid_pegs(at, options)
+    layout, features, pegs, slots = halves_and_features(body, tuple(gauges), options)
+    upright = lid_pegs(layout, options)
     features.append(Feature(add={"lid": upright.pegs}, cut=dict.fromkeys(HALVES, upright.holes)))
-    parts = halves(at, features)
+    parts = halves(layout, features)
     pours: list[Pour] = []
     poured: list[Body] = []
     steps = [label for label in order if label not in inserts]
@@ -87,21 +87,25 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
         poured.append(cast[label])
         later = order[order.index(label) + 1 :]
         placed = [] if label != steps[-1] else [name for name in later if name in inserts]
-        positive = _positive([cast[name] for name in later if name not in placed], body, at, options, label)
-        own, found = _lid(label, cast[label], positive, [(name, cast[name]) for name in placed], at, features, options)
-        _check_strips(gauges, cast, label, positive, at, options)
-        parts.update(own)
-        pours.append(Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, found, tuple(poured), tuple(own)))
+        positive = _positive([cast[name] for name in later if name not in placed], body, layout, options, label)
+        lid_parts, lid_ports = _lid(
+            label, cast[label], positive, [(name, cast[name]) for name in placed], layout, features, options
+        )
+        _check_strips(gauges, cast, label, positive, layout, options)
+        parts.update(lid_parts)
+        pours.append(
+            Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, lid_ports, tuple(poured), tuple(lid_parts))
+        )
     if pours[-1].ports is None:
         raise Finger3dError(f"mold: {pours[-1].name} has no base to pour it through; choose another --pour-order")
     for feature in features:
-        parts.update(feature.own)
+        parts.update(feature.parts)
     for name, solid in parts.items():
         solid.label = name
-    made = Mold(
+    assembled = Mold(
         options=options,
         body=body,
-        at=at,
+        layout=layout,
         parts=parts,
         pours=tuple(pours),
         slots=slots,
@@ -111,27 +115,29 @@ def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot]
         keys=None,
         draft=draft,
     )
-    check_parts(made)
-    return made
+    check_parts(assembled)
+    return assembled
 
 
 def pour_order(solids: Mapping[str, Solid], options: MoldOptions) -> tuple[list[str], list[str]]:
     """Return the labels in the order of their pours, the highest first, and the labels that are printed."""
-    known = {label or MAIN: label for label in solids}
+    label_of = {label or MAIN: label for label in solids}
     if len(solids) < 2:
         raise Finger3dError("--parts: the finger is one solid; leave --parts out, or choose a body of several solids")
 
     def labels(option: str, text: str) -> list[str]:
         names = [name.strip() for name in text.split(",")]
-        if unknown := [name for name in names if name not in known]:
-            raise Finger3dError(f"--{option} {text}: there is no solid {unknown[0]}; the finger has {', '.join(known)}")
-        return [known[name] for name in names]
+        if unknown := [name for name in names if name not in label_of]:
+            raise Finger3dError(
+                f"--{option} {text}: there is no solid {unknown[0]}; the finger has {', '.join(label_of)}"
+            )
+        return [label_of[name] for name in names]
 
     order = sorted(solids, key=lambda label: -float(solids[label].center().Y))
     if options.pour_order:
         order = labels("pour-order", options.pour_order)
         if sorted(order) != sorted(solids):
-            raise Finger3dError(f"--pour-order {options.pour_order}: must name each once: {', '.join(known)}")
+            raise Finger3dError(f"--pour-order {options.pour_order}: must name each once: {', '.join(label_of)}")
     inserts = labels("inserts", options.inserts) if options.inserts else []
     first = [label for label in order if label not in inserts]
     if not first:
@@ -144,7 +150,7 @@ def pour_order(solids: Mapping[str, Solid], options: MoldOptions) -> tuple[list[
     return order, inserts
 
 
-def _positive(later: list[Body], body: Body, at: Layout, options: MoldOptions, label: str) -> Solid | None:
+def _positive(later: list[Body], body: Body, layout: Layout, options: MoldOptions, label: str) -> Solid | None:
     """Return the solids poured later as one positive, clear of the walls of the cavity; None without any."""
     if not later:
         return None
@@ -158,8 +164,8 @@ def _positive(later: list[Body], body: Body, at: Layout, options: MoldOptions, l
         whole = whole + other.solid
     for shift in ((gap, 0), (-gap, 0), (0, gap), (0, -gap)):
         whole = whole & (Pos(float(shift[0]), 0, float(shift[1])) * body.solid)
-    found = one(whole, name, advice)
-    surface = Body.of(found, options.machine.tolerance_mm, name).surface
+    positive = one(whole, name, advice)
+    surface = Body.of(positive, options.machine.tolerance_mm, name).surface
     if surface.low[1] > _TOUCHING * body.box[1][1]:
         raise Finger3dError(f"mold: {name} does not reach the lid; {advice}")
     depth = undercut_depth(surface, 1, 1.0)
@@ -168,7 +174,7 @@ def _positive(later: list[Body], body: Body, at: Layout, options: MoldOptions, l
             f"mold: {name} has an undercut of {depth:.2g} mm and cannot be pulled out of the silicone; {advice}, or "
             "allow it with --undercut-mm"
         )
-    return found
+    return positive
 
 
 def _lid(
@@ -176,30 +182,30 @@ def _lid(
     cast: Body,
     positive: Solid | None,
     placed: list[tuple[str, Body]],
-    at: Layout,
+    layout: Layout,
     features: Sequence[Feature],
     options: MoldOptions,
 ) -> tuple[dict[str, Solid], Ports | None]:
     """Return the lid of a pour, with its riser and the inserts that stand on it, and its openings."""
     name = f"lid_{label or MAIN}"
-    found = _ports(cast, at, options)
+    lid_ports = _ports(cast, layout, options)
     adds = [positive] if positive is not None else []
-    tools = openings(found, 0.0, options) if found is not None else _channels(cast, positive, at, options)
-    own: dict[str, Solid] = {}
+    tools = openings(lid_ports, 0.0, options) if lid_ports is not None else _channels(cast, positive, layout, options)
+    insert_parts: dict[str, Solid] = {}
     for insert, solid in placed:
         pins, holes = _insert_pegs(insert, solid, options)
         adds += pins
-        own[f"insert_{insert or MAIN}"] = one(solid.solid - holes, insert or MAIN)
-    lid = part("lid", cover(at, options), [*features, Feature(add={"lid": adds}, cut={"lid": tools})], name)
-    made = {name: lid}
-    if found is not None and found.riser is not None:
-        made[f"riser_{label or MAIN}"] = riser_cup(found, 0.0, options)
-    return {**made, **own}, found
+        insert_parts[f"insert_{insert or MAIN}"] = one(solid.solid - holes, insert or MAIN)
+    lid = part("lid", cover(layout, options), [*features, Feature(add={"lid": adds}, cut={"lid": tools})], name)
+    lid_parts = {name: lid}
+    if lid_ports is not None and lid_ports.riser is not None:
+        lid_parts[f"riser_{label or MAIN}"] = riser_cup(lid_ports, 0.0, options)
+    return {**lid_parts, **insert_parts}, lid_ports
 
 
-def _ports(cast: Body, at: Layout, options: MoldOptions) -> Ports | None:
+def _ports(cast: Body, layout: Layout, options: MoldOptions) -> Ports | None:
     """Return the openings over the base of a solid; None where it has no base wide enough for them."""
-    if cast.surface.low[1] > _TOUCHING * at.high[1]:
+    if cast.surface.low[1] > _TOUCHING * layout.high[1]:
         return None
     base = base_region(cast.surface)
     x0, z0, x1, z1 = base.bounds()
@@ -208,17 +214,17 @@ def _ports(cast: Body, at: Layout, options: MoldOptions) -> Ports | None:
     return ports(base, cast.volume_mm3, options)
 
 
-def _channels(cast: Body, positive: Solid | None, at: Layout, options: MoldOptions) -> list[Solid]:
+def _channels(cast: Body, positive: Solid | None, layout: Layout, options: MoldOptions) -> list[Solid]:
     """Return channels along both ends of a positive, through which surplus silicone and air leave."""
     if positive is None:
         return []
-    found = positive.bounding_box()
-    low, high = np.array([*found.min]), np.array([*found.max])
+    bounds = positive.bounding_box()
+    low, high = np.array([*bounds.min]), np.array([*bounds.max])
     wide = min(2.0, 0.1 * float(min(high[0] - low[0], high[2] - low[2])))
     wide = wide if options.vent_mm is None else options.vent_mm
     length = float(high[1]) + options.lid_mm
     return [
-        cylinder((x, -options.lid_mm, at.split), wide, length, "y")
+        cylinder((x, -options.lid_mm, layout.split), wide, length, "y")
         for x in (float(low[0]) + _CHANNEL_INSET * wide, float(high[0]) - _CHANNEL_INSET * wide)
     ]
 
@@ -245,12 +251,12 @@ def _check_strips(
     cast: Mapping[str, Body],
     label: str,
     positive: Solid | None,
-    at: Layout,
+    layout: Layout,
     options: MoldOptions,
 ) -> None:
     """Raise a Finger3dError if the strip of a gauge in this solid runs through the positive of its pour."""
     for foil in gauges:
-        strip = slot(foil, at, options, 0.0)
+        strip = slot(foil, layout, options, 0.0)
         inside = {name: body.shared(strip) for name, body in cast.items()}
         if max(inside, key=lambda name: inside[name]) != label or positive is None:
             continue

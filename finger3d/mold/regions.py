@@ -33,15 +33,15 @@ def manifold(surface: Triangles) -> Manifold:
     """
     from manifold3d import Error, Manifold, Mesh64
 
-    made = Manifold(
+    solid = Manifold(
         # copies: the library refuses arrays that are read-only
         Mesh64(
             np.array(surface.points, dtype=np.float64, order="C"), np.array(surface.faces, dtype=np.uint64, order="C")
         )
     )
-    if made.status() != Error.NoError or made.is_empty():
+    if solid.status() != Error.NoError or solid.is_empty():
         raise Finger3dError("mold: the triangles of the body are not closed; mend it where it was drawn")
-    return made
+    return solid
 
 
 def triangles(solid: Manifold) -> Triangles:
@@ -50,19 +50,19 @@ def triangles(solid: Manifold) -> Triangles:
     return Triangles(np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64))
 
 
-def section(surface: Triangles, axis: Literal["x", "y", "z"], at: float) -> CrossSection:
+def section(surface: Triangles, axis: Literal["x", "y", "z"], coordinate: float) -> CrossSection:
     """Return the plane region in which a body is cut at a coordinate.
 
     Its coordinates are (x, y) for "z", (z, x) for "y" and (y, z) for "x".
     """
     turned = Triangles(surface.points[:, list(_ORDER[axis])], surface.faces)
-    return manifold(turned).slice(at)
+    return manifold(turned).slice(coordinate)
 
 
 def footprint(surface: Triangles, height: float) -> CrossSection:
     """Return the region (x, z) in which a body is cut a little above its base, by `height` times its own height."""
-    found = section(surface, "y", float(surface.low[1] + height * (surface.high[1] - surface.low[1])))
-    return exchanged(found)
+    region = section(surface, "y", float(surface.low[1] + height * (surface.high[1] - surface.low[1])))
+    return exchanged(region)
 
 
 def exchanged(region: CrossSection) -> CrossSection:
@@ -87,11 +87,11 @@ def rectangle(low: Sequence[float], high: Sequence[float]) -> CrossSection:
     return CrossSection.square((high[0] - low[0], high[1] - low[1])).translate((low[0], low[1]))
 
 
-def disc(at: Sequence[float], diameter: float) -> CrossSection:
+def disc(middle: Sequence[float], diameter: float) -> CrossSection:
     """Return a disc."""
     from manifold3d import CrossSection
 
-    return CrossSection.circle(diameter / 2.0, CIRCLE_SEGMENTS).translate((at[0], at[1]))
+    return CrossSection.circle(diameter / 2.0, CIRCLE_SEGMENTS).translate((middle[0], middle[1]))
 
 
 def inside(region: CrossSection, points: Float) -> NDArray[np.bool_]:
@@ -115,8 +115,8 @@ def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]
     for polygon in region.to_polygons():
         a, along = polygon, np.roll(polygon, -1, axis=0) - polygon
         length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-        share = np.clip(np.einsum("ij,ij->i", target - a, along) / length, 0.0, 1.0)
-        feet = a + share[:, None] * along
+        fraction = np.clip(np.einsum("ij,ij->i", target - a, along) / length, 0.0, 1.0)
+        feet = a + fraction[:, None] * along
         off = np.linalg.norm(feet - target, axis=1)
         if off.min() < distance:
             best, distance = feet[int(off.argmin())], float(off.min())
@@ -130,7 +130,7 @@ def prisms(region: CrossSection, axis: Literal["y", "z"], start: float, length: 
     def wire(polygon: Float) -> Wire:
         return Wire(Polyline(*((float(a), float(b)) for a, b in polygon), close=True).edges())
 
-    made = []
+    solids = []
     for piece in region.decompose():
         outlines = sorted(piece.to_polygons(), key=lambda p: -abs(_area(p)))
         face = Face(wire(outlines[0]), [wire(p) for p in outlines[1:]])
@@ -140,8 +140,8 @@ def prisms(region: CrossSection, axis: Literal["y", "z"], start: float, length: 
         low = min(start, start + length)
         # A rotation about x by 90 degrees takes (x, y, h) to (x, -h, y).
         placed = Location((0, 0, low)) if axis == "z" else Location((0, low + abs(length), 0), (90, 0, 0))
-        made.append(solid.moved(placed))
-    return made
+        solids.append(solid.moved(placed))
+    return solids
 
 
 def _area(polygon: Float) -> float:

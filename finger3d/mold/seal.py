@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from manifold3d import CrossSection
 
 
-def seal(bodies: Sequence[Triangles], at: Layout, options: MoldOptions) -> Feature:
+def seal(bodies: Sequence[Triangles], layout: Layout, options: MoldOptions) -> Feature:
     """Return the tongues and grooves of a mold; nothing without a seal.
 
     Parameters
@@ -32,17 +32,19 @@ def seal(bodies: Sequence[Triangles], at: Layout, options: MoldOptions) -> Featu
     width, depth = options.groove_mm
     bases = _union([base_region(body) for body in bodies])
     # The slice lies just beside the plane: a body may have a face on it.
-    cut = _union([section(body, "z", at.split + 1e-6 * float(body.size)) for body in bodies])
+    cut = _union([section(body, "z", layout.split + 1e-6 * float(body.size)) for body in bodies])
     middle = options.rim_mm + width / 2.0
     if options.seal == "cord":
-        upright = prisms(_ring(cut, middle, width) ^ _above(at, 0.0), "z", at.split, depth)
+        upright = prisms(_ring(cut, middle, width) ^ _above(layout, 0.0), "z", layout.split, depth)
         flat = prisms(_ring(bases, middle, width), "y", 0.0, depth)
         return Feature(cut={"half_a": [*upright, *flat], "half_b": flat})
     # With a carrier nothing may stand on it: it becomes the finger's base.
     lid = not options.carrier
     start = depth + options.rim_mm if lid else 0.0
-    tongue = prisms(_ring(cut, middle, TONGUE_MM) ^ _above(at, start + options.gap_mm), "z", at.split, TONGUE_HEIGHT_MM)
-    groove = prisms(_ring(cut, middle, width) ^ _above(at, start), "z", at.split, depth)
+    tongue = prisms(
+        _ring(cut, middle, TONGUE_MM) ^ _above(layout, start + options.gap_mm), "z", layout.split, TONGUE_HEIGHT_MM
+    )
+    groove = prisms(_ring(cut, middle, width) ^ _above(layout, start), "z", layout.split, depth)
     if not lid:
         return Feature(add={"half_b": tongue}, cut={"half_a": groove})
     flat = prisms(_ring(bases, middle, width), "y", 0.0, depth)
@@ -57,8 +59,8 @@ def _ring(region: CrossSection, middle: float, width: float) -> CrossSection:
     return widened(region, middle + width / 2.0) - widened(region, middle - width / 2.0)
 
 
-def _above(at: Layout, y: float) -> CrossSection:
-    low, high = at.outer_low, at.outer_high
+def _above(layout: Layout, y: float) -> CrossSection:
+    low, high = layout.outer_low, layout.outer_high
     return rectangle((float(low[0]), y), (float(high[0]), float(high[1])))
 
 

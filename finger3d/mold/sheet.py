@@ -33,7 +33,7 @@ def oversize(part: Shell, bed: Sizes) -> str:
     return f"{_sizes(part.extent)} mm is too large for {_sizes(bed)} mm"
 
 
-def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, silicone: Silicone | None = None) -> str:
+def sheet(title: str, mold: Mold, printed: Mapping[str, Shell], plate: Sizes, silicone: Silicone | None = None) -> str:
     """Return the instructions.
 
     Parameters
@@ -42,11 +42,11 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
     plate : length, width and height of all parts together, as in the 3MF file
     silicone : that the scene names; None if it names none
     """
-    o = made.options
-    ports = made.openings_mm3
-    cavity = made.silicone_mm3
+    o = mold.options
+    ports = mold.openings_mm3
+    cavity = mold.silicone_mm3
     mixed_ml = SPARE * (cavity + ports) / 1e3
-    hole = casting.PourHole(made.ports.pour_mm, made.ports.outside_mm, o.cover_mm)
+    hole = casting.PourHole(mold.ports.pour_mm, mold.ports.outside_mm, o.cover_mm)
     lines = [
         f"Mold of {title}",
         "",
@@ -78,16 +78,16 @@ def sheet(title: str, made: Mold, printed: Mapping[str, Shell], plate: Sizes, si
         "",
         *casting.surface_lines(o.split),
         *casting.inhibition_lines(),
-        *_gauge_lines(made),
+        *_gauge_lines(mold),
         *casting.mixing_lines(),
         "POUR",
         *_numbered(
             [
-                *prepare_lines(made),
-                *thread_lines(made),
-                *close_lines(made),
-                *(line for pour in made.pours for line in pour_lines(made, pour)),
-                *open_lines(made),
+                *prepare_lines(mold),
+                *thread_lines(mold),
+                *close_lines(mold),
+                *(line for pour in mold.pours for line in pour_lines(mold, pour)),
+                *open_lines(mold),
             ]
         ),
         "",
@@ -103,17 +103,17 @@ def _numbered(steps: Sequence[str]) -> list[str]:
     return lines
 
 
-def _gauge_lines(made: Mold) -> list[str]:
-    if not made.foils:
+def _gauge_lines(mold: Mold) -> list[str]:
+    if not mold.foils:
         return ["GAUGES", "  The scene has none.", ""]
-    low, high = made.outline
-    scale, gap = made.options.scale, 2.0 * made.options.slot_gap_mm
+    low, high = mold.outline
+    scale, gap = mold.options.scale, 2.0 * mold.options.slot_gap_mm
     lines = [
         "GAUGES",
         f"  A strip carries each foil through both walls: {high[2] - low[2]:.4g} mm in the mold, 20 mm at either end.",
         "  Places are those in the mold, x and y as in the scene; z from half B's outer face to the foil's middle.",
     ]
-    for foil in made.foils:
+    for foil in mold.foils:
         for name, z in zip(foil.names, foil.z_mm, strict=True):
             x, y, degrees = foil.x_mm * scale, foil.y_mm * scale, np.degrees(foil.angle)
             lines.append(

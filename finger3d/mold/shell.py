@@ -83,9 +83,9 @@ def volume(solid: Solid) -> float:
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
-    found = GProp_GProps()
-    BRepGProp.VolumePropertiesGK_s(solid.wrapped, found, _QUADRATURE_TOLERANCE)
-    return float(found.Mass())
+    properties = GProp_GProps()
+    BRepGProp.VolumePropertiesGK_s(solid.wrapped, properties, _QUADRATURE_TOLERANCE)
+    return float(properties.Mass())
 
 
 def _triangles(solid: Solid, tolerance_mm: float, angle: float, name: str) -> Triangles:

@@ -80,7 +80,7 @@ def thickness(part: Triangles, rays: int = _RAYS) -> tuple[float, Float]:
 
 def islands(part: Triangles, layer_mm: float) -> Float:
     """Return the middles (n, 3), mm, of the pieces of a layer of which nothing lies on the layer below."""
-    body, found = manifold(part), []
+    body, middles = manifold(part), []
     heights = np.arange(0.5 * layer_mm, float(part.high[2]), layer_mm)
     below = body.slice(float(heights[0]))
     for height in heights[1:]:
@@ -88,6 +88,6 @@ def islands(part: Triangles, layer_mm: float) -> Float:
         for piece in layer.decompose():
             if (piece ^ below).area() <= _LEAST_OVERLAP * piece.area():
                 x0, y0, x1, y1 = piece.bounds()
-                found.append([0.5 * (x0 + x1), 0.5 * (y0 + y1), float(height)])
+                middles.append([0.5 * (x0 + x1), 0.5 * (y0 + y1), float(height)])
         below = layer
-    return np.array(found).reshape(-1, 3)
+    return np.array(middles).reshape(-1, 3)

@@ -36,57 +36,57 @@ def between(low: Sequence[float] | Float, high: Sequence[float] | Float) -> Soli
     return Pos(*map(float, 0.5 * (first + last))) * Box(*map(float, last - first))
 
 
-def cylinder(at: Place, diameter: float, length: float, axis: Axis) -> Solid:
+def cylinder(start: Place, diameter: float, length: float, axis: Axis) -> Solid:
     """Return the cylinder that starts at a point and runs along an axis."""
     from build123d import Align, Cylinder
 
-    return _placed(at, axis) * Cylinder(diameter / 2.0, length, align=(Align.CENTER, Align.CENTER, Align.MIN))
+    return _placed(start, axis) * Cylinder(diameter / 2.0, length, align=(Align.CENTER, Align.CENTER, Align.MIN))
 
 
-def cone(at: Place, first: float, last: float, length: float, axis: Axis) -> Solid:
+def cone(start: Place, first: float, last: float, length: float, axis: Axis) -> Solid:
     """Return the frustum that starts at a point with the diameter `first` and ends with `last`."""
     from build123d import Align, Cone
 
     if abs(first - last) < 1e-9:
-        return cylinder(at, first, length, axis)
-    return _placed(at, axis) * Cone(first / 2.0, last / 2.0, length, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        return cylinder(start, first, length, axis)
+    return _placed(start, axis) * Cone(first / 2.0, last / 2.0, length, align=(Align.CENTER, Align.CENTER, Align.MIN))
 
 
-def peg(at: Place, diameter: float, length: float, axis: Axis) -> Solid:
+def peg(start: Place, diameter: float, length: float, axis: Axis) -> Solid:
     """Return a cylinder whose tip has a lead-in chamfer of 45 degrees."""
     chamfer = LEAD_IN * diameter
-    tip = _along(at, length - chamfer, axis)
+    tip = _along(start, length - chamfer, axis)
     return one(
-        cylinder(at, diameter, length - chamfer, axis) + cone(tip, diameter, 0.7 * diameter, chamfer, axis), "peg"
+        cylinder(start, diameter, length - chamfer, axis) + cone(tip, diameter, 0.7 * diameter, chamfer, axis), "peg"
     )
 
 
-def hexagon(at: Place, flats: float, length: float, axis: Axis) -> Solid:
+def hexagon(start: Place, flats: float, length: float, axis: Axis) -> Solid:
     """Return the hexagonal prism that starts at a point; `flats` is its width across the flats."""
     from build123d import RegularPolygon, extrude
 
     prism = extrude(RegularPolygon(flats / 2.0, 6, major_radius=False), amount=length)
-    return (_placed(at, axis) * prism).solids()[0]
+    return (_placed(start, axis) * prism).solids()[0]
 
 
-def revolved(profile: Sequence[tuple[float, float]], at: Place, axis: Axis) -> Solid:
+def revolved(profile: Sequence[tuple[float, float]], start: Place, axis: Axis) -> Solid:
     """Return the solid of revolution of a closed polygon of radii and heights; the heights run along an axis."""
     from build123d import Axis as Line
     from build123d import Plane, Polyline, make_face, revolve
 
     wire = Polyline(*((r, 0.0, h) for r, h in profile), close=True)
     body = revolve(make_face(Plane.XZ * Plane.XZ.to_local_coords(wire)), Line.Z)
-    return (_placed(at, axis) * body).solids()[0]
+    return (_placed(start, axis) * body).solids()[0]
 
 
-def _placed(at: Place, axis: Axis):  # type: ignore[no-untyped-def]  # a build123d location
+def _placed(start: Place, axis: Axis):  # type: ignore[no-untyped-def]  # a build123d location
     from build123d import Pos, Rot
 
-    return Pos(*map(float, at)) * Rot(*_ROTATIONS[axis])
+    return Pos(*map(float, start)) * Rot(*_ROTATIONS[axis])
 
 
-def _along(at: Place, distance: float, axis: Axis) -> Place:
-    moved = list(at)
+def _along(start: Place, distance: float, axis: Axis) -> Place:
+    moved = list(start)
     moved["xyz".index(axis[-1])] += -distance if axis.startswith("-") else distance
     return moved[0], moved[1], moved[2]
 

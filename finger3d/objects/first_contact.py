@@ -151,7 +151,7 @@ def initial_contact(way: ContactPath) -> InitialContact:
     first_contact_mm, place = _touching(top, obj, half_length, half_width, way.landmarks)
     if first_contact_mm == math.inf:
         raise Finger3dError(
-            "object: in the pose it comes in, it extends downwards without end over the finger, which would start "
+            "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
             "inside it; change its turn_x_deg, turn_y_deg, turn_z_deg"
         )
     if not math.isfinite(first_contact_mm):
@@ -254,8 +254,7 @@ def _box(
 
 def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, pose: ObjectPose) -> Float:
     """Return the overlap (n,), mm, of the object with the finger at rest; -inf outside either of them."""
-    over = top(*at.T) - PlacedObject.of(obj, touch, pose).height(*at.T)
-    return np.nan_to_num(over, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+    return PlacedObject.of(obj, touch, pose).overlap(at[:, 0], top(*at.T), at[:, 1])
 
 
 def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: float) -> None:

@@ -135,6 +135,10 @@ class PlacedObject:
         x, _, z = self.to_scene(self.object.lowest_point(self.turned)[None])[0]
         return float(x), float(z)
 
+    def overlap(self, x: Float, y: Float, z: Float) -> Float:
+        """Return the vertical overlap (n,), mm, of the object with points at heights y; -inf outside the object."""
+        return np.nan_to_num(y - self.height(x, z), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+
     def moved_from(self, before: PlacedObject, points: Float) -> Float:
         """Return how far (n, 3) mm the object's material at points (n, 3) has moved since a pose before."""
         return points - before.to_scene(self.to_own(points))

@@ -14,7 +14,7 @@ from finger3d.objects.rigid import rotation
 class ObjectPose:
     """Pose of the object: depth, slides along x and z, and turns (rad) about its reference point, at a time (s).
 
-    It is turned about x, then y, then z, all fixed axes, from the pose that it comes in.
+    It is turned about x, then y, then z, all fixed axes, from its orientation at the start.
     """
 
     depth_mm: float
@@ -42,7 +42,7 @@ class ObjectPose:
 
     @property
     def turn(self) -> Float:
-        """Rotation (3, 3) from the pose that the object comes in."""
+        """Rotation (3, 3) from the object's orientation at the start."""
         return rotation(*self.turns)
 
     @property

@@ -69,7 +69,7 @@ class RigidObject(ABC):
     Attributes
     ----------
     x_mm, z_mm : where the object's lowest point is
-    turn_x, turn_y, turn_z : pose that it comes in, turned about x, then y, then z, all fixed axes
+    turn_x, turn_y, turn_z : orientation at the start: turned about x, then y, then z, all fixed axes
 
     Constants of the class: `has_section` states whether there is a section at z = 0, `is_face` whether the object is
     the lower face of a body of any height, and `body_mesher` how `held_body` is meshed in 3D.
@@ -125,7 +125,7 @@ class RigidObject(ABC):
 
     @property
     def initial_rotation(self) -> Float:
-        """Rotation (3, 3) of the pose that the object comes in."""
+        """Rotation (3, 3) of the object at the start."""
         return rotation(self.turn_x, self.turn_y, self.turn_z)
 
     @property

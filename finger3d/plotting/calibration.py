@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from finger3d.plotting.layout import sheet, style
+from finger3d.plotting.layout import finish, sheet
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import QUANTITIES, ReadingCurve
 
@@ -22,7 +22,7 @@ def draw(path: Path, calibration: Calibration) -> None:
     """Draw readings, standard deviation of mu, and reductions of its variance against mu; write a PNG file."""
     domain = calibration.about.get("domain", "")
     title = calibration.title if len(calibration.readings) <= _MANY else f"{len(calibration.readings)} readings"
-    made = sheet(1, 3, (5.6, 5.0), (0.8, 0.2, 1.5, 0.15), title + (f", {domain}" if domain else ""))
+    made = sheet(3, 3, (5.6, 5.0), (0.8, 0.2, 1.5, 0.15), title + (f", {domain}" if domain else ""))
     left, middle, right = made.axes
     if len(calibration.readings) == 1:
         curve_panel(left, calibration)
@@ -34,12 +34,14 @@ def draw(path: Path, calibration: Calibration) -> None:
 
 
 def _finish(axes: Axes) -> None:
-    style(axes)
-    axes.set_xlabel("friction coefficient mu")
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(
-            frameon=False, fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, columnspacing=1.0
-        )
+    below: dict[str, Any] = {
+        "fontsize": 9,
+        "loc": "upper center",
+        "bbox_to_anchor": (0.5, -0.13),
+        "ncols": 2,
+        "columnspacing": 1.0,
+    }
+    finish(axes, "friction coefficient mu", **(below if axes.get_legend_handles_labels()[0] else {}))
 
 
 def _shade_trusted(axes: Axes, c: Calibration) -> None:
@@ -95,7 +97,11 @@ def _mu_sd(axes: Axes, c: Calibration) -> None:
 
 
 def _reductions(axes: Axes, c: Calibration) -> None:
-    sds = {t.name: f" ± {t.sd:g}" for one in c.readings for t in one.tolerances}
+    sds = {
+        t.name: f" ± {t.sd:g}" + (" error bar" if t.unit == "error bar" else "")
+        for one in c.readings
+        for t in one.tolerances
+    }
     for name, share in c.reductions(c.grid).items():
         if share.max() >= _LEAST_SHARE:
             axes.plot(c.grid, share, lw=1.4, label=f"{name}{sds.get(name, '')}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.plotting.layout import WIDEST, sheet, style
+from finger3d.plotting.layout import WIDEST, finish, sheet
 from finger3d.results.comparison import FORCE, Case
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 _COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
 _QUANTITIES = {
     FORCE: "force",
-    "contact_length_mm": "contact\nlength",
-    "stick_length_mm": "stick\nlength",
+    "contact_length_mm": "extent of\ncontact",
+    "stick_length_mm": "extent of\nstick",
     "friction_sum_N_per_mm": "sum of\n|friction|",
     "friction_along_x_N_per_mm": "|friction\nalong x|",
     "peak_pressure_MPa": "peak\npressure",
@@ -38,7 +38,7 @@ def draw(path: Path, cases: Sequence[Case], own_width_mm: float, title: str) -> 
     """
     good = [c for c in cases if c.ok]
     own = [c for c in good if c.width_mm == own_width_mm]
-    made = sheet(2, 2, (WIDEST, 4.2), (0.95, 0.15, 0.7, 0.2), f"{title}: 2D against 3D")
+    made = sheet(4, 2, (WIDEST, 4.2), (0.95, 0.15, 0.7, 0.2), f"{title}: 2D against 3D")
     forces, bars, pressure, shear = made.axes
     _forces(forces, good, own)
     _bars(bars, own)
@@ -79,10 +79,7 @@ def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.tick_params(axis="x", which="minor", length=0)
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("width (mm)")
-    axes.set_ylabel("force per width (N/mm)")
-    axes.legend(frameon=False, loc="lower right")
-    style(axes)
+    finish(axes, "width (mm)", "force per width (N/mm)", loc="lower right")
 
 
 def _bars(axes: Axes, own: Sequence[Case]) -> None:
@@ -113,10 +110,8 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
         )
     axes.axhline(1.0, color="#888888", lw=0.8)
     axes.set_xticks(at, [names[k] for k in keys], fontsize=9)
-    axes.set_ylabel("relative to the solid (at z = 0)")
     axes.margins(y=0.18)
-    axes.legend(frameon=False, ncols=3, loc="upper center")
-    style(axes)
+    finish(axes, y="relative to the solid (at z = 0)", ncols=3, loc="upper center")
     axes.grid(False, axis="x")
 
 
@@ -142,7 +137,4 @@ def _along(axes: Axes, own: Sequence[Case], key: str, label: str) -> None:
     if reach > 0.0:
         axes.set_xlim(-reach, reach)
     axes.axhline(0.0, color="#999999", lw=0.8)
-    axes.set_xlabel("x at rest (mm)")
-    axes.set_ylabel(label)
-    axes.legend(frameon=False, fontsize=9)
-    style(axes)
+    finish(axes, "x at rest (mm)", label, fontsize=9)

@@ -1,8 +1,4 @@
-"""Pictures of a press, drawn without a display: the deformed finger, the contact tractions, and force against depth.
-
-Solids are rendered by PyVista in a child process, because VTK aborts the process if no OpenGL driver works. In that
-case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
-"""
+"""Pictures of a press, drawn without a display: the contact tractions, and force against depth."""
 
 from __future__ import annotations
 
@@ -15,82 +11,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.plotting.camera import flat
-from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.layout import WIDEST, save, sheet, style
-from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
-from finger3d.plotting.panels import Marks, highest_of, keys, palette, patches, pressure_colours, sliced, two_panels
-from finger3d.plotting.solid import (
-    BODY,
-    COLOURS,
-    FEATURE,
-    LINE,
-    OBJECT,
-    OBJECT_TINT,
-    REST,
-    Skin,
-    draw_solid,
-    render_solids,
-    skin_of,
-)
+from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.plotting.layout import WIDEST, finish, sheet
+from finger3d.plotting.panels import patches
+from finger3d.plotting.solid import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
 _FEWEST_ON_LINE = 5
+_MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
-
-
-def finger_picture(
-    path: str | Path,
-    mesh: Mesh,
-    displacement: Float,
-    table: Mapping[str, ArrayLike],
-    contact_nodes: ArrayLike,
-    title: str = "",
-    thing: Float | None = None,
-    marks: Sequence[Mark] = (),
-) -> str:
-    """Draw the deformed finger to scale: contact pressure on the left, stick and slip on the right.
-
-    Parameters
-    ----------
-    path : PNG file to write
-    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
-    displacement : (n, d) array, mm
-    table : columns of contact.csv, each (c,); face, pressure_MPa, the shears and status are used
-    contact_nodes : (c,) array
-        Nodes of `mesh` that are the contact points.
-    title : title of the picture
-    thing : (t, 3, 3) array, mm
-        Corners of the object's triangles, drawn half transparent, or in a section as the line z = 0.
-    marks : gauges to draw, from `finger3d.plotting.gauges.marks_of`
-
-    Returns
-    -------
-    str
-        The renderer, ``pyvista`` or ``matplotlib``.
-    """
-    nodes, status = np.asarray(contact_nodes, dtype=np.int64), _status(table)
-    pressure = _column(table, "pressure_MPa")
-    lines = [(mark.label, mark.of(mesh.points + displacement)) for mark in marks]
-    faces = np.array([FREE_FACES.index(name) for name in np.asarray(table["face"]).tolist()], dtype=np.int64)
-    if mesh.dim == 2:
-        line = None if thing is None else sliced(thing)
-        figure = _section(mesh, displacement, pressure, status, nodes, faces, line, title, lines)
-        renderer = "matplotlib"
-    else:
-        shear = np.column_stack([_column(table, f"shear_{axis}_MPa") for axis in "xyz"])
-        skin = skin_of(mesh, displacement, pressure, shear, status, nodes, faces, thing)
-        figure, renderer = _solid(skin, title, lines)
-    save(figure, path)
-    return renderer
 
 
 def middle_line(
@@ -135,7 +70,6 @@ def contact_figure(
     mu: ArrayLike,
     band_mm: float | None = None,
     half_width_mm: float | None = None,
-    title: str = "",
 ) -> None:
     """Draw tractions f_n and f_t and the friction limit mu f_n along x, with stick and slip zones (Maeno 2004, Fig. 4).
 
@@ -150,7 +84,6 @@ def contact_figure(
     band_mm : largest distance from z = 0 of the points that represent that line if the mesh has no points on it;
         default 0.4 times the typical distance of neighbouring points
     half_width_mm : half the width of a solid, which adds a panel for its end z = half_width_mm; None for a 2D model
-    title : title of the picture
     """
     x, z, status = _column(table, "x_mm"), _column(table, "z_mm"), _status(table)
     if band_mm is None:
@@ -165,7 +98,7 @@ def contact_figure(
             lines.append((f"at the end, z = {half_width_mm:g} mm", end[np.argsort(x[end], kind="stable")]))
     fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
     coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
-    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35), title)
+    made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35))
     for axes, (where, on) in zip(made.axes, lines, strict=True):
         _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], coefficient[on])
         axes.set_title(where, fontsize=10, loc="left")
@@ -177,8 +110,8 @@ def contact_figure(
     made.save(path)
 
 
-def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title: str = "") -> None:
-    """Draw forces (N) and the half lengths (mm) of the contact and the stick zone against depth (mm).
+def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> None:
+    """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
 
     If the object slides, the length of its path (mm) since first contact replaces the depth.
 
@@ -186,7 +119,6 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
     ----------
     path : PNG file to write
     steps : the ``steps`` of summary.json
-    title : title of the picture
     """
 
     def values(key: str) -> Float:
@@ -200,20 +132,21 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]], title:
     slides = bool(np.any(at[:, 1:] != 0.0))
     if slides:
         depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
-    made = sheet(1, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15), title)
+    made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
     left, right = made.axes
-    left.plot(depth, values("normal_force_N"), "o-", color="#222222", ms=4, label="normal force")
-    left.plot(depth, values("friction_sum_N"), "s-", color="#c0392b", ms=4, label="sum of |friction|")
+    marked = len(depth) <= _MOST_MARKERS
+    dot, square = ("o-", "s-") if marked else ("-", "-")
+    left.plot(depth, values("normal_force_N"), dot, color="#222222", ms=4, label="normal force")
+    left.plot(depth, values("friction_sum_N"), square, color="#c0392b", ms=4, label="sum of |friction|")
     left.set_ylabel("force (N)")
-    right.plot(depth, values("contact_half_length_mm"), "o-", color="#555555", ms=4, label="contact")
-    right.plot(depth, values("stick_half_length_mm"), "s-", color=COLOURS[STICK], ms=4, label="stick")
-    right.set_ylabel("half length along x, z = 0 (mm)")
+    right.plot(depth, values("contact_half_length_mm"), dot, color="#555555", ms=4, label="contact")
+    right.plot(depth, values("stick_half_length_mm"), square, color=COLOURS[STICK], ms=4, label="stick")
+    right.set_ylabel("half extent along x at z = 0 (mm)")
     for axes in (left, right):
         axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
         axes.set_xlim(left=float(depth.min(initial=0.0)))
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
-        style(axes)
-        axes.legend(frameon=False, loc="upper left")
+        finish(axes, loc="upper left")
     made.save(path)
 
 
@@ -282,89 +215,5 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
         reach = 1.15 * float(np.abs(x[touching]).max()) or float(np.abs(x).max()) or 1.0
         axes.set_xlim(-reach, reach)
     handles += patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
-    axes.legend(
-        handles=handles, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4
-    )
-    style(axes)
+    finish(axes, handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4)
     axes.grid(False, axis="x")
-
-
-# --- 2D models ----------------------------------------------------------------------------------------------------
-
-
-def _section(
-    mesh: Mesh,
-    u: Float,
-    pressure: Float,
-    status: Int,
-    nodes: Int,
-    faces: Int,
-    thing: Float | None,
-    title: str,
-    marks: Marks,
-) -> Figure:
-    """Draw a 2D model, with the pressure and the status along the faces that may touch."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import PathPatch
-
-    moved = mesh.points + u
-    halves, of_half, of_state = [], [], []
-    for k in np.union1d(faces, CONTACT):
-        arc, own = mesh.facets.get(FREE_FACES[k], mesh.facets["contact"][:0]), faces == k
-        value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
-        value[nodes[own]], state[nodes[own]] = pressure[own], status[own]
-        middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
-        # Each facet is drawn in two halves, coloured by the mean pressure of the half and by the status of its end.
-        pairs = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2)
-        halves.append(pairs.reshape(-1, 2, 2))
-        of_half.append((0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel())
-        of_state.append(state[arc[:, :2]].ravel())
-    highest = highest_of(pressure)
-    low, span = moved.min(axis=0), np.ptp(moved, axis=0)
-    limits = low - 0.04 * span, low + 1.08 * span
-    figure, panels = two_panels(span[1] / span[0], title, ticks=True)
-    by_status = palette()[np.concatenate(of_state)]
-    outline, edges, interfaces = (draw(mesh, moved) for draw in (outline_of, edges_of, interfaces_of))
-    for axes, colours in zip(panels, (pressure_colours(np.concatenate(of_half), highest), by_status), strict=True):
-        axes.add_artist(PathPatch(outline, facecolor=BODY, edgecolor=LINE, lw=0.5))
-        axes.add_artist(PathPatch(edges, facecolor="none", edgecolor=LINE, lw=0.25))
-        axes.add_artist(PathPatch(interfaces, facecolor="none", edgecolor=FEATURE, lw=0.9))
-        if thing is not None:
-            axes.add_collection(LineCollection(list(thing), colors=OBJECT, lw=1.2, zorder=2))
-        axes.add_collection(
-            LineCollection(list(np.concatenate(halves)), colors=colours, lw=5, capstyle="butt", zorder=3)
-        )
-        axes.set(xlim=(limits[0][0], limits[1][0]), ylim=(limits[0][1], limits[1][1]))
-        axes.set_xlabel("x (mm)", labelpad=1)
-        axes.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("y (mm)")
-    draw_marks(panels[0], marks)
-    keys(figure, highest, {} if thing is None else {"object": OBJECT})
-    return figure
-
-
-# --- solids -------------------------------------------------------------------------------------------------------
-
-
-def _solid(skin: Skin, title: str, marks: Marks) -> tuple[Figure, str]:
-    """Draw a solid; return the figure and the name of the renderer."""
-    highest = highest_of(skin.pressure)
-    by_pressure = pressure_colours(skin.pressure, highest)
-    by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
-    images, extent = render_solids([(skin, by_pressure, False), (skin, by_status, True)]) or (None, None)
-    aspect = skin.aspect if images is None else images[0].shape[0] / images[0].shape[1]
-    figure, panels = two_panels(aspect, title)
-    for number, (axes, colours) in enumerate(zip(panels, (by_pressure, by_status), strict=True)):
-        if images is not None:
-            axes.imshow(images[number], interpolation="antialiased", extent=extent)
-        else:
-            draw_solid(axes, skin, colours, arrows=number == 1)
-        axes.set_axis_off()
-    draw_marks(panels[0], [(label, flat(line)) for label, line in marks])
-    if marks:
-        panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
-    if skin.largest_shear > 0.0:
-        text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
-        panels[1].set_title(text, fontsize=11)
-    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
-    return figure, "matplotlib" if images is None else "pyvista"

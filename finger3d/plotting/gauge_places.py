@@ -12,14 +12,14 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.design import Design
-from finger3d.plotting.layout import sheet, style
+from finger3d.plotting.layout import finish, sheet
+from finger3d.plotting.outlines import middle_section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLUMNS = 3  # panels beside each other
 _LINE = 4.0  # length of the line that shows a direction, in percent of the width of the section
-_OUTLINE = 200  # points of the upper edge
 _HIGHEST = 0.95  # share of the places within the colour scale
 _CHOSEN, _OTHER = "#c0392b", "#222222"
 
@@ -46,7 +46,7 @@ def draw(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[GaugeMap
     """Draw a map for each gauge, and the standard deviation (m,) of mu; write a PNG file."""
     count = len(maps)
     columns = 2 if count in (1, 3) else _COLUMNS
-    made = sheet(math.ceil((count + 1) / columns), columns, (5.6, 4.6), (0.75, 0.25, 0.6, 0.5))
+    made = sheet(count + 1, columns, (5.6, 4.6), (0.75, 0.25, 0.6, 0.5))
     every = np.concatenate([one.mean_mu_sd for one in maps])
     low, high = float(every.min()), float(np.quantile(every, _HIGHEST))
     for i, (one, axes) in enumerate(zip(maps, made.axes, strict=False)):
@@ -62,7 +62,7 @@ def draw(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[GaugeMap
         )
         label = "mean standard deviation of mu"
         made.figure.colorbar(drawn, ax=axes, label=label, location="bottom", shrink=0.8, aspect=35)
-        _outline(axes, design)
+        axes.plot(*middle_section(design).T, color="#555555", lw=1.0)
         for k, gauge in enumerate(maps):
             _mark(axes, gauge, f"g{k + 1}", _CHOSEN if k == i else _OTHER, design)
         axes.set_title(f"g{i + 1} at each place" + (", beside the others" if count > 1 else ""))
@@ -74,21 +74,8 @@ def draw(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[GaugeMap
         last.semilogy(mus, one.mu_sd_alone, "o-", ms=3, lw=1.0, label=f"g{i + 1} alone")
     if count > 1:
         last.semilogy(mus, mu_sd, "o-", ms=4, lw=2.0, color=_OTHER, label="together")
-    last.set_xlabel("friction coefficient mu")
-    last.set_ylabel("standard deviation of mu")
-    last.legend(frameon=False, fontsize=9)
-    style(last)
-    for axes in made.axes[count + 1 :]:
-        axes.set_axis_off()
+    finish(last, "friction coefficient mu", "standard deviation of mu", fontsize=9)
     made.save(path)
-
-
-def _outline(axes: Axes, design: Design) -> None:
-    """Draw the section of the finger at z = 0."""
-    half = design.half_length_mm
-    x = np.linspace(-half, half, _OUTLINE)
-    top = np.nan_to_num(design.top(x, np.zeros_like(x)))
-    axes.plot([-half, *x, half, -half], [0.0, *top, 0.0, 0.0], color="#555555", lw=1.0)
 
 
 def _mark(axes: Axes, gauge: GaugeMap, name: str, colour: str, design: Design) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.plotting.layout import sheet, style
+from finger3d.plotting.layout import finish, sheet
 
 _MOST = 6  # columns with a panel
 _COLUMNS = 3  # panels beside each other
@@ -41,7 +40,7 @@ def draw(path: Path, index: str, at: Float, curve_at: Float, panels: Sequence[Pa
 
     shown = panels[:_MOST]
     columns = 2 if len(shown) in (1, 3) else _COLUMNS
-    made = sheet(math.ceil((len(shown) + 1) / columns), columns, (5.2, 4.0), (0.9, 0.2, 0.65, 0.45))
+    made = sheet(len(shown) + 1, columns, (5.2, 4.0), (0.9, 0.2, 0.65, 0.45))
     fine = np.linspace(0.0, float(curve_at[-1]), _FINE)
     last = made.axes[len(shown)]
     for panel, axes in zip(shown, made.axes, strict=False):
@@ -58,16 +57,8 @@ def draw(path: Path, index: str, at: Float, curve_at: Float, panels: Sequence[Pa
             color=_MEASURED,
             label="measured, ±2 sd",
         )
-        axes.set_xlabel(index)
-        axes.set_ylabel(panel.name)
-        axes.legend(frameon=False, fontsize=9)
-        style(axes)
+        finish(axes, index, panel.name, fontsize=9)
         last.plot(at, (panel.measured - panel.simulated) / panel.std, "o-", ms=3, lw=0.8, label=panel.name)
     last.axhspan(-2.0, 2.0, color="#888888", alpha=0.15, lw=0)
-    last.set_xlabel(index)
-    last.set_ylabel("measured - simulated, over its sd")
-    last.legend(frameon=False, fontsize=8)
-    style(last)
-    for axes in made.axes[len(shown) + 1 :]:
-        axes.set_axis_off()
+    finish(last, index, "measured - simulated, over its sd", fontsize=8)
     made.save(path)

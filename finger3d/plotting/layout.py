@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from finger3d.io import atomic
 
@@ -44,7 +45,7 @@ def blank(width: float, height: float) -> Figure:
 
 
 def sheet(
-    rows: int, columns: int, cell: tuple[float, float], margins: tuple[float, float, float, float], title: str = ""
+    count: int, columns: int, cell: tuple[float, float], margins: tuple[float, float, float, float], title: str = ""
 ) -> Sheet:
     """Return a figure with axes in cells of equal size.
 
@@ -52,11 +53,12 @@ def sheet(
 
     Parameters
     ----------
-    rows, columns : number of cells
+    count, columns : number of cells, and of those beside each other
     cell : width and height of a cell, in inches
     margins : distances from the left, right, lower and upper edge of a cell to its axes, in inches
     title : title of the whole figure
     """
+    rows = math.ceil(count / columns)
     wide, high = columns * cell[0], rows * cell[1] + (_TITLE_HEIGHT if title else 0.0)
     figure = blank(wide, high)
     left, right, below, above = margins
@@ -69,12 +71,27 @@ def sheet(
                 (cell[1] - below - above) / high,
             )
         )
-        for row in range(rows)
-        for column in range(columns)
+        for row, column in (divmod(number, columns) for number in range(count))
     ]
-    if title:
-        figure.suptitle(title, fontsize=12, y=1.0 - 0.08 / high, va="top")
+    head(figure, title)
     return Sheet(figure, tuple(axes))
+
+
+def head(figure: Figure, title: str, size: float = 12.0, above: float = 0.08) -> None:
+    """Write the title of a figure, if it has one, `above` inches below its upper edge."""
+    if title:
+        figure.suptitle(title, fontsize=size, y=1.0 - above / figure.get_figheight(), va="top")
+
+
+def finish(axes: Axes, x: str = "", y: str = "", **legend: Any) -> None:
+    """Name the axes, apply the style, and draw a legend without a frame if its options are given."""
+    if x:
+        axes.set_xlabel(x)
+    if y:
+        axes.set_ylabel(y)
+    style(axes)
+    if legend:
+        axes.legend(frameon=False, **legend)
 
 
 def style(axes: Axes) -> None:
@@ -84,7 +101,7 @@ def style(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
-def save(figure: Figure, path: str | Path) -> None:
+def save(figure: Figure, path: str | Path, dpi: int = DPI) -> None:
     """Write a figure atomically as a PNG file."""
     with atomic(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, pil_kwargs={"compress_level": 4})
+        figure.savefig(temporary, format="png", dpi=dpi, pil_kwargs={"compress_level": 4})

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finger3d.plotting.layout import sheet, style
+from finger3d.plotting.layout import finish, sheet
 
 _MAGNIFIED = (1.0, 2.0, 5.0)  # times a power of ten
 _LONGEST = 0.12  # of an arrow, over the extent of the markers
@@ -49,11 +49,9 @@ def draw(path: Path, table: Mapping[str, ArrayLike]) -> None:
     axes.plot(x, across, "o", ms=2.0, color="#777777", zorder=2)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
-    axes.set_xlabel("x (mm)")
-    axes.set_ylabel(f"{name} (mm)")
     depth = float(np.asarray(table["depth_mm"], dtype=float)[last][0])
     axes.set_title(f"markers at {depth:.4g} mm, displacements drawn {factor:g} times", fontsize=11)
-    style(axes)
+    finish(axes, "x (mm)", f"{name} (mm)")
     bar = made.figure.colorbar(arrows, ax=axes, fraction=0.04, pad=0.02)
     bar.set_label("displacement along y (mm)")
     made.save(path)

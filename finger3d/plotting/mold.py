@@ -11,9 +11,8 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
-from finger3d.io import atomic
 from finger3d.plotting.camera import viewer_axes
-from finger3d.plotting.layout import blank
+from finger3d.plotting.layout import blank, save
 from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ LABELS = {"half_a": "half A", "half_b": "half B", "strips": "gauge strips"}
 _VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
 _SEPARATION = 0.45  # distance between the parts, relative to their largest extent
-_MARGIN = 1.08  # size of the window over that of the parts
+_WINDOW_OVER_PARTS = 1.08  # size of the window over that of the parts
 _WIDTH, _TITLE_HEIGHT = 10.0, 0.5  # of the figure and of its title, in inches
 _DPI = 130  # pixels per inch
 _LABEL_FACTOR = 1.6  # width of the figure over that of the parts; the rest holds the labels
@@ -152,7 +151,7 @@ def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW, opaque: bool
     axes = viewer_axes(towards)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _MARGIN * 0.5 * (high - low)[:2], opaque)
+    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _WINDOW_OVER_PARTS * 0.5 * (high - low)[:2], opaque)
 
 
 def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
@@ -182,18 +181,13 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
     figure = blank(_WIDTH, high)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
-    if image is None:
-        draw(axes, view)
-    else:
-        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+    show(axes, view, image)
     for name, part in view.parts.items():
         if name in sizes:
             _label(axes, view, name, part, sizes[name])
-    axes.set(xlim=(-_LABEL_FACTOR * width, _LABEL_FACTOR * width), ylim=(-height, height), aspect="equal")
-    axes.set_axis_off()
+    axes.set_xlim(-_LABEL_FACTOR * width, _LABEL_FACTOR * width)
     figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
-    with atomic(path) as temporary:
-        figure.savefig(temporary, dpi=_DPI)
+    save(figure, path, _DPI)
     return "matplotlib" if image is None else "pyvista"
 
 
@@ -216,6 +210,17 @@ def _label(axes: Axes, view: Scenery, name: str, part: Triangles, remark: str) -
         arrowprops=line,
         annotation_clip=False,
     )
+
+
+def show(axes: Axes, view: Scenery, image: Image | None) -> None:
+    """Show the rendered image of a view in its axes, or draw the view with matplotlib."""
+    width, height = view.half
+    if image is None:
+        draw(axes, view)
+    else:
+        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+    axes.set(xlim=(-width, width), ylim=(-height, height), aspect="equal")
+    axes.set_axis_off()
 
 
 def draw(axes: Axes, view: Scenery) -> None:

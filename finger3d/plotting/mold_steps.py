@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from finger3d.geometry.surface import Triangles
-from finger3d.io import atomic
-from finger3d.plotting.layout import blank
-from finger3d.plotting.mold import draw, rendered, scenery
+from finger3d.plotting.layout import blank, save
+from finger3d.plotting.mold import rendered, scenery, show
 
 _STANDING = np.array([0.55, 0.5, 1.0])  # direction towards the viewer, y up
 _LYING = np.array([0.1, 1.0, 0.7])  # of parts on the bed, from above
@@ -43,14 +42,8 @@ def step_pictures(pictures: Sequence[StepPicture]) -> str:
         width, height = view.half
         figure = blank(_WIDTH, float(_WIDTH * height / width))
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        if images is None:
-            draw(axes, view)
-        else:
-            axes.imshow(images[i], extent=(-width, width, -height, height), interpolation="nearest")
-        axes.set(xlim=(-width, width), ylim=(-height, height), aspect="equal")
-        axes.set_axis_off()
-        with atomic(one.path) as temporary:
-            figure.savefig(temporary, dpi=_DPI)
+        show(axes, view, None if images is None else images[i])
+        save(figure, one.path, _DPI)
     return "matplotlib" if images is None else "pyvista"
 
 

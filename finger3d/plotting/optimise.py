@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.plotting.layout import sheet, style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from finger3d.plotting.layout import finish, sheet
 
 _MOST_KEYS = 5  # free keys with a panel
 _ROWS = 2  # of panels, at most
@@ -41,9 +37,7 @@ def draw(
     good = np.isfinite(values)
     at, value = np.array(places, dtype=float)[good], np.array(values, dtype=float)[good]
     best, shown = int(np.argmax(value)), list(keys[:_MOST_KEYS])
-    columns = math.ceil((1 + len(shown)) / _ROWS)
-    rows = math.ceil((1 + len(shown)) / columns)
-    made = sheet(rows, columns, (5.4, 3.9), (0.95, 0.2, 0.6, 0.45))
+    made = sheet(1 + len(shown), math.ceil((1 + len(shown)) / _ROWS), (5.4, 3.9), (0.95, 0.2, 0.6, 0.45))
     first, *others = made.axes
     count = 1 + np.flatnonzero(good)
     first.plot(count, value, "o", ms=3, color=_JUDGED, label="each design")
@@ -55,14 +49,6 @@ def draw(
         axes.plot(at[begin, column], value[begin], "s", ms=6, mfc="none", color=_START, label="start")
         axes.plot(at[best, column], value[best], "*", ms=11, color=_BEST, label="best")
         axes.set_xlabel(key)
-    for axes in made.axes[: 1 + len(shown)]:
-        _finish(axes, objective)
-    for axes in made.axes[1 + len(shown) :]:
-        axes.set_axis_off()
+    for axes in made.axes:
+        finish(axes, y=objective, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     made.save(path)
-
-
-def _finish(axes: Axes, objective: str) -> None:
-    axes.set_ylabel(objective)
-    style(axes)
-    axes.legend(frameon=False, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)

@@ -8,6 +8,7 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.fem.simplex import Mesh
+from finger3d.geometry.design import Design
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
@@ -66,3 +67,10 @@ def outline_of(mesh: Mesh, moved: Float) -> Path:
     while (after := following[int(facets[ring[-1], -1])]) != 0:
         ring.append(after)
     return Path(np.concatenate([moved[facets[ring, :-1]].reshape(-1, 2), moved[facets[:1, 0]]]), closed=True)
+
+
+def middle_section(design: Design, count: int = 201) -> Float:
+    """Return the closed outline (k, 2), mm, of the section of a finger at z = 0, with `count` points on its top."""
+    half = design.half_length_mm
+    x = np.linspace(-half, half, count)
+    return np.column_stack([[-half, *x, half, -half], [0.0, *np.nan_to_num(design.top(x, np.zeros_like(x))), 0.0, 0.0]])

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.plotting.layout import WIDEST, blank
+from finger3d.plotting.layout import WIDEST, blank, head
 from finger3d.plotting.solid import BODY, COLOURS
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ def two_panels(aspect: float, title: str, ticks: bool = False) -> tuple[Figure, 
         axes.set_title(name, fontsize=11)
         axes.set_aspect("equal")
         panels.append(axes)
-    if title:
-        figure.suptitle(title, fontsize=13, y=1.0 - 0.12 / total, va="top")
+    head(figure, title, 13.0, 0.12)
     return figure, panels
 
 
@@ -105,13 +104,13 @@ def palette() -> Float:
     return np.array([to_rgb(COLOURS[s]) for s in (OPEN, STICK, SLIP)])
 
 
-def pressure_colours(values: Float, highest: float) -> Float:
-    """Return RGB colours (..., 3) of pressures (...), in MPa; the colour of the body where the pressure is zero."""
+def pressure_colours(values: Float, highest: float, status: Int) -> Float:
+    """Return RGB colours (..., 3) of pressures (...), in MPa; the colour of the body where the status (...) is open."""
     import matplotlib
     from matplotlib.colors import to_rgb
 
     colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
-    return np.where((values > 0.0)[..., None], colours, np.array(to_rgb(BODY)))
+    return np.where((status != OPEN)[..., None], colours, np.array(to_rgb(BODY)))
 
 
 def highest_of(pressure: Float) -> float:

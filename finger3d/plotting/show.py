@@ -63,11 +63,12 @@ def show(
     Finger3dError
         If the folder or the step does not exist, or a file cannot be written.
     """
-    from finger3d.plotting.animation import frames, write_gif, write_png
+    from finger3d.plotting.animation import frames, write_gif
+    from finger3d.plotting.layout import save
 
     states, title, gauges = found(folder)
     if png is not None:
-        write_png(png, frames(states, [_number(folder, states, step)], title, gauges)[0])
+        save(frames(states, [_number(folder, states, step)], title, gauges)[0], png)
     if gif is not None:
         write_gif(gif, frames(states, range(len(states.step)), title, gauges))
 
@@ -77,7 +78,7 @@ def _number(folder: str | Path, states: States, step: int | None) -> int:
     if step is None:
         return len(kept) - 1
     if step not in kept:
-        raise Finger3dError(f"{folder}: step {step} is not among those kept: {', '.join(map(str, kept))}")
+        raise Finger3dError(f"{folder}: increment {step} is not among the kept ones: {', '.join(map(str, kept))}")
     return kept.index(step)
 
 
@@ -95,7 +96,9 @@ def show_window(folder: str | Path) -> None:
     require("show: a window", "pyvista", instead="add --png FILE for a picture")
     linux = sys.platform.startswith("linux")
     if linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise MissingError("show: there is no display here; add --png FILE for a picture, or --gif FILE for the steps")
+        raise MissingError(
+            "show: there is no display here; add --png FILE for a picture, or --gif FILE for the increments"
+        )
     why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.window", str(Path(folder).resolve())], window=True)
     if why is not None:
         raise MissingError(f"show: no window could be opened: {why}; add --png FILE for a picture")

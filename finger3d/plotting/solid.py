@@ -30,10 +30,9 @@ _ARROW_LENGTH = 0.045  # of the longest arrow, relative to the largest extent of
 _ARROW_SPACINGS = 1.6  # largest length of an arrow, in multiples of the distance between arrows
 _ARROW_COUNT = 100.0  # approximate number of arrows
 
-# A quadratic facet is split into six triangles around its centre (node 6), two for each corner, so that the status of
-# a corner is drawn on the area nearest to it.
-_SIX = np.array([[0, 3, 6], [3, 1, 6], [1, 4, 6], [4, 2, 6], [2, 5, 6], [5, 0, 6]])
-_OWNER = np.array([0, 1, 1, 2, 2, 0])
+# A quadratic facet is split into six triangles: one at each corner, with its status, and three around the centre (node
+# 6), which have the status that most corners have. A boundary of a status is thus straight across a facet.
+_SIX = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 6], [4, 5, 6], [5, 3, 6]])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
 
@@ -78,12 +77,6 @@ class Skin:
     def size(self) -> float:
         """Largest extent along an axis, mm."""
         return float(np.ptp(self.points, axis=0).max())
-
-    @property
-    def aspect(self) -> float:
-        """Height over width of the picture."""
-        width, height = self.frame[1]
-        return float(height / width)
 
     @property
     def arrow_length(self) -> float:
@@ -175,7 +168,21 @@ def _coloured(
     # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
     centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
     points = np.concatenate([rings, centre[:, None]], axis=1)
-    return points[:, _SIX].reshape(-1, 3, 3), seven[:, _SIX].reshape(-1, 3), state[facets[:, _OWNER]].ravel()
+    return (
+        points[:, _SIX].reshape(-1, 3, 3),
+        seven[:, _SIX].reshape(-1, 3),
+        _status_on_six(state[facets[:, :3]]).ravel(),
+    )
+
+
+def _status_on_six(corner: Int) -> Int:
+    """Return the status (m, 6) of the triangles of facets with the status (m, 3) of their corners."""
+    # if all corners differ, each of the three inner triangles has that of the corner beside it
+    inner = np.where((corner[:, [0]] == corner[:, [2]]), corner[:, [0]], corner[:, [1, 2, 0]])
+    pairs = corner[:, 0] == corner[:, 1], corner[:, 1] == corner[:, 2]
+    for equal, of in zip(pairs, (0, 1), strict=True):
+        inner[equal] = corner[equal, of][:, None]
+    return np.concatenate([corner, inner], axis=1)
 
 
 def _six_nodes(facets: Int, points: Float) -> Float:
@@ -344,11 +351,12 @@ def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylin
     )
     parts: list[Polygons | Polylines | Arrows] = [Polygons(*unshared(at), colour) for at, colour in surfaces if len(at)]
     parts += [part for part in lines if part.points.size]
+    before = 0.004 * skin.size * AXES[2]
     for state, colour in ARROWS.items() if arrows else ():
         on = skin.arrow_status == state
         if on.any():
-            before = skin.arrow_at[on] + 0.004 * skin.size * AXES[2]
-            parts.append(Arrows(before, skin.arrow_length * skin.arrow[on], colour))
+            parts.append(Arrows(skin.arrow_at[on] + before, skin.arrow_length * skin.arrow[on], colour))
     if len(skin.thing):
-        parts.append(Polygons(*unshared(skin.thing), OBJECT_TINT, opacity=OBJECT_OPACITY))
+        # before the surface that it touches, with which it would mix in spots
+        parts.append(Polygons(*unshared(skin.thing + before), OBJECT_TINT, opacity=OBJECT_OPACITY))
     return tuple(parts)

@@ -40,7 +40,7 @@ def draw_map(path: Path, found: StrainMap, gauge: Gauge, calibration: Calibratio
     """
     ends = f"mu = {found.mu[0]:g} to {found.mu[-1]:g}"
     title = f"z = {found.z_mm:g} mm, {ends}, noise {float(calibration.noise[0]):g}; circle: gauge {gauge.name}"
-    made = sheet(1, 3, (5.4, 3.9), (0.7, 0.15, 0.2, 0.35), title)
+    made = sheet(3, 3, (5.4, 3.9), (0.7, 0.15, 0.2, 0.35), title)
     figure, panels = made.figure, made.axes
     mu = float(np.clip(mu, found.mu[0], found.mu[-1]))
     degrees = math.degrees(gauge.angle)

@@ -21,6 +21,7 @@ def compare_page(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     data = read_json(folder / "compare.json")
+    numbers = data.get("table", ())
     own = data["scene"]["finger"].get("width_mm")
     cases = [c for c in data["cases"] if c["numbers"]]
     headline = [
@@ -42,15 +43,15 @@ def compare_page(folder: str | Path) -> Path:
     ]
     head = ("model", "width (mm)", "edges (mm)", *keys, "seconds", "outcome")
     proof = (
-        "Each case is a separate press. It has numbers only if every step satisfies Eqs. (1)-(4) of Maeno 2004, and "
-        "friction opposes slip, to 1e-8. finger3d press reports the steps of a scene."
+        "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
+        "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
     )
     return write_page(
         folder,
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
-            PageSection("Verdict", list(data["verdict"])),
+            PageSection("Verdict", [*data["verdict"], *([Table(numbers[0], numbers[1:])] if numbers else [])]),
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Every case", [proof, _BARS, Table(head, rows)]),
         ],

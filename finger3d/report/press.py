@@ -22,8 +22,8 @@ _HEADLINE = {
     "normal_force_N": ("normal force", 1.0, "N"),
     "friction_sum_N": ("sum of |friction|", 1.0, "N"),
     "tangential_force_x_N": ("tangential force along x", 1.0, "N"),
-    "contact_half_length_mm": ("contact length at z = 0", 2.0, "mm"),
-    "stick_half_length_mm": ("stick length at z = 0", 2.0, "mm"),
+    "contact_half_length_mm": ("contact, extent along x at z = 0", 2.0, "mm"),
+    "stick_half_length_mm": ("stick, extent along x at z = 0", 2.0, "mm"),
     "contact_area_mm2": ("contact area", 1.0, "mm²"),
     "stick_area_mm2": ("stick area", 1.0, "mm²"),
     "external_work_mJ": ("work done on the finger", 1.0, "mJ"),
@@ -35,7 +35,7 @@ _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
     "contact.png": "Traction on the finger along x, with the friction limit and the stick and slip zones",
     "markers.png": "Displacements of the markers",
-    "force.png": "Forces, and half lengths of contact and stick zone, against depth",
+    "force.png": "Forces, and half the extents of contact and stick zone along x, against depth",
 }
 
 _STEP_COLUMNS = {
@@ -74,6 +74,7 @@ _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number
 class MeshSummary(TypedDict):
     """The ``mesh`` of summary.json."""
 
+    finger: NotRequired[str]
     points: int
     cells: int
     dofs: int
@@ -113,7 +114,7 @@ def press_page(folder: str | Path) -> Path:
     good = [step for step in steps if step.outcome == "converged"]
     source = folder / "steps.npz"
     states = load_states(source) if source.exists() else None
-    last = f" after step {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
+    last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
         *([_proof(steps, states, good)] if steps else []),
@@ -212,12 +213,12 @@ def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[Pre
     parts: list[Part] = [
         "Every contact point is open (gap > 0, no force) or closed (gap = 0, pressure > 0). A closed point sticks (no "
         "slip, |friction| at most mu times pressure) or slips (|friction| = mu times pressure, opposite to the slip): "
-        "Eqs. (1)-(4) of Maeno 2004, and friction opposes slip. All conditions are checked after every step. The "
+        "Eqs. (1)-(4) of Maeno 2004, and friction opposes slip. All conditions are checked after every increment. The "
         "residual is the largest violation, relative to the depth for gaps and slips, and to the largest nodal "
-        f"force for forces. A step has converged only if its residual is at most {TOLERANCE:g}."
+        f"force for forces. An increment has converged only if its residual is at most {TOLERANCE:g}."
     ]
     if worst is not None:
-        parts.append(f"Largest residual of the {len(good)} converged steps: {worst:.1e}.")
+        parts.append(f"Largest residual of the {len(good)} converged increments: {worst:.1e}.")
     if states is not None:
         parts.append(_last_state(states))
     rows = [
@@ -232,7 +233,7 @@ def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[Pre
         )
         for k, step in enumerate(steps, start=1)
     ]
-    head = ("step", "depth (mm)", "residual", f"≤ {TOLERANCE:g}", "iterations", "method", "outcome")
+    head = ("increment", "depth (mm)", "residual", f"≤ {TOLERANCE:g}", "iterations", "method", "outcome")
     return PageSection("Proof of the contact conditions", [*parts, Table(head, rows)])
 
 
@@ -249,7 +250,7 @@ def _last_state(states: States) -> Table:
     if closed.any():
         rows.append(("largest |gap| of a closed point", float(np.abs(gap[closed]).max()), "mm, = 0"))
         rows.append(("smallest pressure on a closed point", float(pressure[closed].min()), "MPa, ≥ 0"))
-    return Table(("in the last step", "", ""), rows)
+    return Table(("in the last increment", "", ""), rows)
 
 
 def _steps(good: Sequence[PressStep]) -> PageSection:
@@ -266,12 +267,13 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     names = [*(f"strain {g}" for g in gauges), *(f"pressure {t} (MPa)" for t in taxels)]
     table = Table([*(_STEP_COLUMNS[k] for k in shown), *names], rows)
     return PageSection(
-        "Every step", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
+        "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
     )
 
 
 def _mesh(mesh: MeshSummary) -> Table:
     rows: list[tuple[str, object]] = [
+        ("finger", mesh.get("finger", "unknown")),
         ("nodes, cells", f"{mesh['points']}, {mesh['cells']}"),
         ("unknowns", str(mesh["dofs"])),
         ("contact points", str(mesh["contact_points"])),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
-from finger3d.plotting.layout import sheet, style
+from finger3d.plotting.layout import finish, sheet
 from finger3d.report.chart import Chart
 from finger3d.report.sweep import sweep_charts
 from finger3d.results.summary import read_json, read_rows
@@ -53,7 +53,7 @@ def draw(path: str | Path, charts: Sequence[Chart]) -> None:
     columns = len({chart.x for chart in charts})
     high = max(1 + math.ceil((len(chart.lines) + bool(chart.more)) / _columns(chart)) for chart in charts)
     below = 0.65 + _LINE_HEIGHT * high * any(chart.legend for chart in charts)
-    made = sheet(len(charts) // columns, columns, (5.6, 3.5 + below), (0.9, 0.15, below, 0.2))
+    made = sheet(len(charts), columns, (5.6, 3.5 + below), (0.9, 0.15, below, 0.2))
     for axes, chart in zip(made.axes, charts, strict=True):
         _panel(axes, chart)
     made.save(path)
@@ -69,16 +69,6 @@ def _panel(axes: Axes, chart: Chart) -> None:
         axes.plot(line.x, line.y, "o-" if chart.joined else "o", ms=4, lw=1.2, label=line.label)
     if chart.more:
         axes.plot([], [], " ", label=f"and {chart.more} more")
-    axes.set_xlabel(chart.x)
-    axes.set_ylabel(chart.y)
-    style(axes)
-    if chart.legend:
-        axes.legend(
-            title=chart.legend,
-            frameon=False,
-            fontsize=9,
-            title_fontsize=9,
-            loc="upper center",
-            bbox_to_anchor=(0.45, -0.13),
-            ncols=_columns(chart),
-        )
+    place = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.13), "ncols": _columns(chart)}
+    legend = {"title": chart.legend, "fontsize": 9, "title_fontsize": 9, **place} if chart.legend else {}
+    finish(axes, chart.x, chart.y, **legend)

@@ -59,7 +59,7 @@ class View3D:
             '<div class="view"><div class="controls">'
             '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
             '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
-            f'<label{hidden}>step <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
+            f'<label{hidden}>increment <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
             f'<label{none}><input id="view-gauges" type="checkbox"{"" if none else " checked"}>gauges</label>'
             f'<label{no_object}><input id="view-object" type="checkbox"{"" if no_object else " checked"}>object</label>'
             '<output id="view-label"></output>'
@@ -69,7 +69,7 @@ class View3D:
             '</div><div class="stage" id="view-stage"></div>'
             "<p>Deformed, to scale. Drag to rotate, scroll or pinch to zoom; hover over the contact surface for values."
             f"{' Gauges are projected onto the front face.' if self.gauge_labels else ''}"
-            "<noscript> The 3D view needs JavaScript; the pictures below show the last step.</noscript></p></div>"
+            "<noscript> The 3D view needs JavaScript; the pictures below show the last increment.</noscript></p></div>"
         )
 
     def script(self) -> str:

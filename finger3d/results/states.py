@@ -261,7 +261,7 @@ def label(step: int, target: Array) -> str:
     depth, x, z, *turns = (float(v) for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
     turned = "".join(f", turned {v:.4g} deg about {axis}" for v, axis in zip(turns, "xyz", strict=True) if v)
-    return f"step {step}: {depth:.4g} mm deep{slid}{turned}"
+    return f"increment {step}: {depth:.4g} mm deep{slid}{turned}"
 
 
 def captions(states: States) -> list[str]:

@@ -20,8 +20,8 @@ class PressStep:
 
     Attributes
     ----------
-    depth_mm : press depth, the way of the object along -y from first touch
-    slide_x_mm, slide_z_mm : way of the object along x and z from where it touched first
+    depth_mm : press depth, the displacement of the object along -y since first touch
+    slide_x_mm, slide_z_mm : displacement of the object along x and z since first touch
     turn_x_deg, turn_y_deg, turn_z_deg : turns of the object from where it touched first
     time_s : time at the end of the increment
     normal_force_N : sum of the contact forces along -y on the finger

@@ -10,40 +10,13 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
-from finger3d.mechanics.model import Domain, MeshOptions
 from finger3d.meshing.given import GivenMesh
-from finger3d.objects import RigidObject
-from finger3d.scene.messages import dotted, shown
+from finger3d.scene.mesh_sizes import smallest_mm
+from finger3d.scene.messages import Place, dotted, shown
 from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
-Box = tuple[float, float, float, float]
-
-SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
-"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
-than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py)."""
-
 _MOST_MARKERS = 20_000
-
-_ACROSS = {"swept": 20.0, "ftetwild": 30.0, "netgen": 30.0}
-"""Number of edges across the overlap of a curved object, which is about 1.4 times as wide as the contact. Penetration
-between points at the edge of contact has, over 38 presses of random solids, a median of 0.8 (edges across)^-1.6 times
-the depth, and is below 1 % of it from 20 edges on, except at sharp tips and at rims of the finger. Unstructured meshes,
-whose edges differ in length, need 1.5 times as many."""
-
-_LEAST_ACROSS = 12.0
-"""The same if the overlap ends at edges of the finger or the object, and contact extends over all of it; also the least
-number of edges in a wavelength."""
-
-_PER_WAVE = 25.0
-"""Edges in a wavelength, whose crests touch over up to some 0.8 of it."""
-
-_MOST_POINTS = 600.0
-"""Contact points of a solid across the overlap from which edges stay at `_LEAST_ACROSS`: a press under a long edge took
-88 s instead of 18 s to lower the penetration from 1.3 to 0.8 % of the depth."""
-
-_FINEST = 0.2
-"""Least edge length over the default: finer is left to those who ask for it."""
 
 
 def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> list[str]:
@@ -106,44 +79,36 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
     lines = []
     height, half_length = design.height_mm, design.half_length_mm
     for i, leg in enumerate(legs):
-        at = ("press", "leg", i) if "leg" in press else ("press",)
+        place = ("press", "leg", i) if "leg" in press else ("press",)
         allowed = f"a number above 0 and below the finger's height of {at_most(height)} mm"
         if i > 0 and _target(leg) == _target(legs[i - 1]) and leg.duration_s is None:
-            lines.append(f"{dotted(at)}: goes nowhere, its target is that of the leg before; take it out")
+            lines.append(f"{dotted(place)}: goes nowhere, its target is that of the leg before; take it out")
         if (leg.depth_mm is None) == (leg.force_N is None):
             both = f"must not stand beside force_N = {shown(leg.force_N)}; give either a depth or a force"
-            what = f"{dotted((*at, 'depth_mm'))}"
+            what = f"{dotted((*place, 'depth_mm'))}"
             lines.append(f"{what} is missing: give it, or force_N" if leg.force_N is None else f"{what}: {both}")
             continue
         if leg.depth_mm is None:
             pass
         elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
-            lines.append(f"{dotted(at)}: moves before first touch; give the first leg a depth_mm above 0")
+            lines.append(f"{dotted(place)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
-            lines.append(f"{dotted((*at, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
+            lines.append(f"{dotted((*place, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
         for key in ("slide_x_mm", "slide_z_mm"):
             far = LONGEST_SLIDE * half_length
             if abs(value := getattr(leg, key)) > far:
                 lines.append(
-                    f"{dotted((*at, key))} = {shown(value)}: must be a number from -{at_most(far)} to {at_most(far)}, "
-                    f"{LONGEST_SLIDE:g} times the finger's half length"
+                    f"{dotted((*place, key))} = {shown(value)}: must be a number from -{at_most(far)} to "
+                    f"{at_most(far)}, {LONGEST_SLIDE:g} times the finger's half length"
                 )
         for key in () if solid else ("slide_z_mm", "turn_x_deg", "turn_y_deg"):
             if (value := getattr(leg, key)) != 0.0:
-                lines.append(f"{dotted((*at, key))} = {shown(value)}: must be 0.0 in a 2D domain")
+                lines.append(f"{dotted((*place, key))} = {shown(value)}: must be 0.0 in a 2D domain")
     return lines
 
 
 def _target(leg: LegTable) -> tuple[float | None, ...]:
     return leg.force_N, leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg
-
-
-def smallest_mm(design: Design, solid: bool) -> float:
-    """Return the smallest extent of the meshed part, mm."""
-    extents = [design.height_mm, 2.0 * design.half_length_mm]
-    if solid:
-        extents.append(design.width_mm)
-    return min(extents)
 
 
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:
@@ -184,62 +149,20 @@ def _beside_a_mesh(mesh: MeshTable, design: GivenMesh) -> str:
             f"mesh.tolerance = {shown(mesh.tolerance)}: the mesh {design.name} is used as it is; take it out, and "
             "lower mesh.size_mm, which halves cells at the contact, until the results agree"
         )
-    for key, own in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
+    for key, edge in (("size_mm", design.size_mm), ("base_size_mm", design.base_size_mm)):
         value = getattr(mesh, key)
-        if value is not None and value > own * (1.0 + 1e-9):
+        if value is not None and value > edge * (1.0 + 1e-9):
             return (
-                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(own)} mm and is not made "
-                f"coarser; must be at most {at_most(own)}, or be taken out"
+                f"mesh.{key} = {shown(value)}: the mesh {design.name} has edges of {shown(edge)} mm and is not made "
+                f"coarser; must be at most {at_most(edge)}, or be taken out"
             )
     return ""
 
 
-def chosen(mesh: MeshTable, design: Design, domain: Domain, obj: RigidObject, box: Box) -> MeshOptions:
-    """Return the mesh options, with sizes chosen where they are absent, from all else and the box of contact."""
-    if isinstance(design, GivenMesh):
-        finest = mesh.size_mm or design.size_mm
-        longest = max(mesh.base_size_mm or design.base_size_mm, finest)
-        return MeshOptions(finest, longest, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
-    solid = domain == "solid"
-    share = design.height_mm * (1.0 if solid else 0.25)
-    size, base = mesh.size_mm, mesh.base_size_mm
-    if size is None:
-        # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
-        coarse = min(share * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
-        size = _rounded(max(min(coarse, _detail(obj, design, box, solid, mesh.mesher)), coarse * _FINEST))
-    if base is None:
-        base = max(_rounded(min(share * BASE_SHARE, smallest_mm(design, solid=False))), size)
-    return MeshOptions(size, base, mesh.mesher, gauge_refinement=mesh.gauge_refinement)
-
-
-def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str) -> float:
-    """Return the edge length, mm, that gives a curved object some elements across its contact or its crest."""
-    if obj.is_flat:
-        return math.inf
-    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[mesher if solid else "swept"]
-    halves = (design.half_length_mm, 0.5 * design.width_mm) if solid else (design.half_length_mm,)
-    wanted, least = [math.inf], [math.inf]
-    for side, low, high, half in zip(sides, box[::2], box[1::2], halves, strict=False):
-        opens_inside = min(-low, high) < half * (1.0 - 1e-9) and not obj.has_edges
-        wanted.append(side / (edges if opens_inside else _LEAST_ACROSS))
-        least.append(side / _LEAST_ACROSS)
-    detail = obj.detail
-    if detail and detail.kind == "wavelength":
-        wanted.append(detail.length_mm / _PER_WAVE)
-        least.append(detail.length_mm / _LEAST_ACROSS)
-    if not solid:
-        return min(wanted)
-    return max(min(wanted), min(min(least), math.sqrt(math.prod(sides) / _MOST_POINTS)))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
-
-
-def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
+def _place(place: Place, it: GaugeTable | MarkerTable, along: Float, angle: float, design: Design) -> list[str]:
     """Check the place of a gauge or marker, and the ends of a gauge: distances `along` from its middle, mm."""
     half_length, height = design.half_length_mm, design.height_mm
-    half_width, what = design.width_mm / 2.0, f"{at[0]} {shown(it.name)}"
+    half_width, what = design.width_mm / 2.0, f"{place[0]} {shown(it.name)}"
     for key, value, low, high in (
         ("x_mm", it.x_mm, -half_length, half_length),
         ("y_mm", it.y_mm, 0.0, height),
@@ -247,7 +170,7 @@ def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angl
     ):
         if not low <= value <= high:
             return [
-                f"{dotted((*at, key))} = {shown(value)}: {what} is outside the finger; "
+                f"{dotted((*place, key))} = {shown(value)}: {what} is outside the finger; "
                 f"must be a number from {at_least(low)} to {at_most(high)}"
             ]
     x, y = it.x_mm + along * math.cos(angle), it.y_mm + along * math.sin(angle)
@@ -258,16 +181,16 @@ def _place(at: tuple[str, int], it: GaugeTable | MarkerTable, along: Float, angl
     here = float(design.top(np.array([it.x_mm]), np.array([it.z_mm]))[0])
     if math.isnan(here):
         return [
-            f"{dotted((*at, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
+            f"{dotted((*place, 'z_mm'))} = {shown(it.z_mm)}: {what} is outside the finger; "
             f"must be nearer to 0 at x_mm = {shown(it.x_mm)}"
         ]
     if isinstance(it, GaugeTable) and it.length_mm and it.y_mm <= here + slack:
         return [
-            f"{dotted((*at, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
+            f"{dotted((*place, 'length_mm'))} = {shown(it.length_mm)}: an end of {what} "
             "leaves the finger; must be shorter, or the gauge moved inward"
         ]
     return [
-        f"{dotted((*at, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
+        f"{dotted((*place, 'y_mm'))} = {shown(it.y_mm)}: {what} is outside the finger; "
         f"must be a number from 0 to {at_most(here)} at x_mm = {shown(it.x_mm)}"
     ]
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from finger3d._types import Tree, TreeView
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
+from finger3d.scene.tables import FileTable, MeshFileTable, TomlTable
 
 if TYPE_CHECKING:
     from finger3d.geometry.imported import Imported
@@ -27,10 +28,15 @@ def is_file(geometry: object) -> bool:
     return isinstance(geometry, str) and geometry.lower().endswith(FINGER_SUFFIXES)
 
 
-def absolute(given: TreeView, scene: Path | None) -> Tree:
+def table_of_file(path: str) -> type[TomlTable]:
+    """Return the table of the keys beside a file."""
+    return MeshFileTable if path.lower().endswith(MESH_SUFFIXES) else FileTable
+
+
+def absolute(document: TreeView, scene: Path | None) -> Tree:
     """Return the tree with absolute paths of its bodies; those in it are relative to the file of the scene."""
     folder = scene.parent if scene else Path()
-    tree = dict(given)
+    tree = dict(document)
     for table, key in (("finger", "geometry"), ("object", "path")):
         old = tree.get(table)
         if isinstance(old, Mapping) and isinstance(value := old.get(key), str) and (key == "path" or is_file(value)):
@@ -38,15 +44,15 @@ def absolute(given: TreeView, scene: Path | None) -> Tree:
     return tree
 
 
-def finger(path: str) -> Imported | GivenMesh:
-    """Return the finger in a file."""
+def finger(path: str, table: TomlTable) -> Imported | GivenMesh:
+    """Return the finger in a file, turned as its table says."""
     if path.lower().endswith(MESH_SUFFIXES):
         from finger3d.meshing.given import given_mesh
 
         return given_mesh(path)
     from finger3d.geometry.imported import imported
 
-    return imported(path)
+    return imported(path, up=cast(FileTable, table).up)
 
 
 def unit_mistake(design: Design, obj: RigidObject) -> str:

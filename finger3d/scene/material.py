@@ -24,14 +24,14 @@ def mistakes(table: ElasticTable, place: Place) -> dict[Place, str]:
     ----------
     place : of the table in the scene
     """
-    given = [key for key in MODULUS_KEYS if getattr(table, key) is not None]
-    if not given:
+    keys = [key for key in MODULUS_KEYS if getattr(table, key) is not None]
+    if not keys:
         missing = (*place, "E_MPa")
         return {missing: f"{dotted(missing)} is missing: a number from 1e-9 to 1e9 is required, or one of {_CHOICE}"}
-    if len(given) > 1:
-        second = (*place, given[1])
-        value = shown(getattr(table, given[1]))
-        return {second: f"{dotted(second)} = {value}: must not stand beside {given[0]}; give one of {_CHOICE}"}
+    if len(keys) > 1:
+        second = (*place, keys[1])
+        value = shown(getattr(table, keys[1]))
+        return {second: f"{dotted(second)} = {value}: must not stand beside {keys[0]}; give one of {_CHOICE}"}
     if table.E_MPa is not None and table.nu is None:
         missing = (*place, "nu")
         return {missing: f"{dotted(missing)} is missing: a number from 0 to 0.5 is required beside E_MPa"}
@@ -61,11 +61,11 @@ def filled_in(table: Elastic) -> Elastic:
 
 def with_modulus(table: ElasticTable) -> Tree:
     """Return the keys of a table; if another key gives Young's modulus, with it, its spread and its origin."""
-    given = {key: value for key, value in table.model_dump().items() if value is not None}
+    values = {key: value for key, value in table.model_dump().items() if value is not None}
     if table.E_MPa is not None or is_rigid(table):
-        return given
+        return values
     constants = table.constants
-    return given | {"E_MPa": constants.E_MPa, "E_spread": constants.spread, "E_origin": constants.origin}
+    return values | {"E_MPa": constants.E_MPa, "E_spread": constants.spread, "E_origin": constants.origin}
 
 
 def replace_modulus(tree: Tree, changed: Iterable[str]) -> None:
@@ -104,7 +104,7 @@ def modulus_of(tree: Mapping[str, object], key: str) -> float | None:
 
 def _table(tree: Mapping[str, object], where: Iterable[str]) -> Any:
     """Return the table at a place, empty if there is none."""
-    found: Any = tree
+    table: Any = tree
     for part in where:
-        found = found.get(part, {}) if isinstance(found, Mapping) else {}
-    return found if isinstance(found, Mapping) else {}
+        table = table.get(part, {}) if isinstance(table, Mapping) else {}
+    return table if isinstance(table, Mapping) else {}

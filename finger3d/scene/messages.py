@@ -52,11 +52,11 @@ def listed(names: Iterable[str], last: str = "or") -> str:
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """Return the known name that `name` was probably meant to be, ignoring case and a missing unit."""
-    known = {n.lower(): n for n in names}
-    bare = {n.removesuffix("_mm").removesuffix("_deg").removesuffix("_mpa"): n for n in known}
-    for pool in (known, bare):
-        if found := difflib.get_close_matches(name.lower(), pool, n=1, cutoff=0.6):
-            return known[found[0]] if pool is known else known[bare[found[0]]]
+    spelling = {n.lower(): n for n in names}
+    bare = {n.removesuffix("_mm").removesuffix("_deg").removesuffix("_mpa"): n for n in spelling}
+    for pool in (spelling, bare):
+        if matches := difflib.get_close_matches(name.lower(), pool, n=1, cutoff=0.6):
+            return spelling[matches[0]] if pool is spelling else spelling[bare[matches[0]]]
     return None
 
 
@@ -90,8 +90,6 @@ def _bounds(metadata: Iterable[object]) -> str:
             high = f"at most {_number(m.le)}"
         elif isinstance(m, at.Interval):
             return _bounds(iter(m))
-        elif isinstance(m, at.MinLen):
-            low = "not empty"
     if low.startswith("from") and high:
         low = low.removesuffix(" up")
         return f" {low} to {high.removeprefix('at most ')}" if high.startswith("at most") else f" {low} and {high}"
@@ -106,7 +104,11 @@ def _text(metadata: Sequence[object]) -> str:
     """Return a description of the texts that a type with bounds on their length allows."""
     lines = "one line of printable text" if any(isinstance(m, at.Predicate) for m in metadata) else "a text"
     longest = next((f", of at most {m.max_length} characters" for m in metadata if isinstance(m, at.MaxLen)), "")
-    return lines + (", not empty" if any(isinstance(m, at.MinLen) for m in metadata) else "") + longest
+    return lines + _filled(metadata) + longest
+
+
+def _filled(metadata: Sequence[object]) -> str:
+    return ", not empty" if any(isinstance(m, at.MinLen) for m in metadata) else ""
 
 
 def described(hint: Any) -> str:
@@ -118,7 +120,7 @@ def described(hint: Any) -> str:
         kind, *metadata = typing.get_args(hint)
         if kind is str:
             return _text(metadata)
-        return described(kind) + _bounds(metadata)
+        return described(kind) + _bounds(metadata) + _filled(metadata)
     if origin is typing.Literal:
         return listed(str(a) for a in typing.get_args(hint))
     if origin in (typing.Union, types.UnionType):
@@ -127,7 +129,7 @@ def described(hint: Any) -> str:
         items = typing.get_args(hint)
         if items[-1] is Ellipsis:
             tables = _is_table(items[0])
-            return "a list of tables under double brackets," if tables else f"a list, each item {described(items[0])}"
+            return "a list of tables under double brackets" if tables else f"a list, each item {described(items[0])}"
         return "[" + ", ".join(described(a) for a in items) + "]"
     if _is_table(hint):
         required = ", ".join(n for n, f in hint.model_fields.items() if f.is_required())

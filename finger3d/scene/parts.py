@@ -35,10 +35,10 @@ def largest_spread(tables: SceneTable) -> float | None:
 
 def moduli(tables: SceneTable) -> dict[str, str]:
     """Return Young's modulus of the finger and of its parts as text with spread and origin, by the name of the part."""
-    found = {"modulus": str(tables.material.constants)}
+    origins = {"modulus": str(tables.material.constants)}
     for label, part in tables.parts.items():
-        found[f"modulus of {label}"] = "rigid" if part.rigid else str(part.constants)
-    return found
+        origins[f"modulus of {label}"] = "rigid" if part.rigid else str(part.constants)
+    return origins
 
 
 def check_parts(tables: SceneTable, design: Design) -> list[str]:
@@ -46,11 +46,11 @@ def check_parts(tables: SceneTable, design: Design) -> list[str]:
     lines = []
     for label, part in tables.parts.items():
         place = ("parts", label)
-        given = {key: value for key, value in part.model_dump(exclude={"rigid"}).items() if value is not None}
+        constants = {key: value for key, value in part.model_dump(exclude={"rigid"}).items() if value is not None}
         if label not in design.part_labels:
             lines.append(unknown(place, {}, design.part_labels, kind=f"part of {design.name}"))
-        elif part.rigid and given:
-            key, value = next(iter(given.items()))
+        elif part.rigid and constants:
+            key, value = next(iter(constants.items()))
             lines.append(f"{dotted((*place, key))} = {shown(value)}: not with rigid = true; take one of the two out")
         elif not part.rigid:
             lines += [f"{line}; or rigid = true" for line in mistakes(part, place).values()]

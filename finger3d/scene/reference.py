@@ -14,6 +14,7 @@ from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     ContactTable,
     DomainTable,
+    FileTable,
     FrictionTable,
     GaugeTable,
     LegTable,
@@ -51,6 +52,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     )
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
+    yield "[finger] with a STEP or STL file", _rows(FileTable)
     yield "[material]", _rows(MaterialTable)
     yield "[parts.LABEL]", _rows(PartTable)
     common = _rows(table_of(RigidObject), RigidObject)
@@ -94,9 +96,9 @@ def _default(field: typing.Any) -> str:
 
 def descriptions(documented: type) -> dict[str, str]:
     """Return the description of each key in the docstrings of a class and its bases."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for base in reversed(documented.__mro__):
         for names, text in _SAID.findall(base.__doc__ or ""):
-            found |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+            texts |= dict.fromkeys(names.split(", "), " ".join(text.split()))
     missing = [f.name for f in dataclasses.fields(documented)] if dataclasses.is_dataclass(documented) else []
-    return dict.fromkeys(missing, "") | found
+    return dict.fromkeys(missing, "") | texts

@@ -24,11 +24,11 @@ from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.legs import legs_of
+from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.parts import parts_of
 from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
-    FileTable,
     LegsTable,
     LegTable,
     PressTable,
@@ -155,12 +155,12 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
     set_keys : keys that came from the command line, for messages; with the option that gave them if not ``--set``
     """
     given = tree.frozen(files.absolute(given, path))
-    found: dict[Place, str] = {}
-    parts = _read(given, found)
+    mistakes: dict[Place, str] = {}
+    parts = _read(given, mistakes)
     if parts is None:
         order = [*given]
-        places = sorted(found, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
-        raise messages.refusal([found[p] for p in places], path, set_keys)
+        places = sorted(mistakes, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
+        raise messages.refusal([mistakes[p] for p in places], path, set_keys)
     if lines := parts.contradictions():
         raise messages.refusal(lines, path, set_keys)
     try:
@@ -207,7 +207,7 @@ class _Parts:
         domain = self.tables.model.domain
         legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
         way = contact_path(self.design, self.object, legs, domain)
-        return checks.chosen(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
+        return mesh_options(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
         """Return the tables with every default."""
@@ -227,17 +227,18 @@ class _Parts:
         )
 
 
-def _read(given: TreeView, found: dict[Place, str]) -> _Parts | None:
-    """Check every table by itself; None if there are mistakes, which are put into `found`."""
-    tables = _checked(SceneTable, given, (), found)
-    found |= material.mistakes(tables.material, ("material",)) if tables else {}
-    geometry, dimensions = _named(given, "finger", "geometry", designs(), found)
-    design = _design(geometry, dimensions, found)
-    shape, placed = _named({**given, "object": _shaped(given.get("object", {}))}, "object", "shape", OBJECTS, found)
-    rigid = _object(shape, placed, found)
-    press = _press(given, found)
-    settings, effects = _effects(given, found)
-    if found or not (tables and dimensions and design and placed and rigid and press):
+def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
+    """Check every table by itself; None if there are mistakes, which are put into `mistakes`."""
+    tables = _checked(SceneTable, document, (), mistakes)
+    mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
+    geometry, dimensions = _named(document, "finger", "geometry", designs(), mistakes)
+    design = _design(geometry, dimensions, mistakes)
+    shaped = {**document, "object": _shaped(document.get("object", {}))}
+    shape, placed = _named(shaped, "object", "shape", OBJECTS, mistakes)
+    rigid = _object(shape, placed, mistakes)
+    press = _press(document, mistakes)
+    settings, effects = _effects(document, mistakes)
+    if mistakes or not (tables and dimensions and design and placed and rigid and press):
         return None
     return _Parts(
         tables=tables,
@@ -254,39 +255,39 @@ def _read(given: TreeView, found: dict[Place, str]) -> _Parts | None:
 
 
 def _checked(
-    table: type[AnyTable], given: TreeView, under: Place, found: dict[Place, str], also: tuple[str, ...] = ()
+    table: type[AnyTable], values: TreeView, under: Place, mistakes: dict[Place, str], also: tuple[str, ...] = ()
 ) -> AnyTable | None:
     try:
-        return table.model_validate(given)
+        return table.model_validate(values)
     except ValidationError as error:
-        found |= messages_from(error, table, given, under, also)
+        mistakes |= messages_from(error, table, values, under, also)
         return None
 
 
-def _built(record: type[Record], settings: TomlTable, place: Place, found: dict[Place, str]) -> Record | None:
+def _built(record: type[Record], settings: TomlTable, place: Place, mistakes: dict[Place, str]) -> Record | None:
     """Build a design or an effect; values that it refuses are collected as mistakes."""
     try:
         return record_of(record, settings)
     except Finger3dError as error:
-        found[place] = f"{dotted(place)}: {error}"
+        mistakes[place] = f"{dotted(place)}: {error}"
         return None
 
 
-def _design(geometry: str, dimensions: TomlTable | None, found: dict[Place, str]) -> Design | None:
+def _design(geometry: str, dimensions: TomlTable | None, mistakes: dict[Place, str]) -> Design | None:
     """Build the finger from a design, or read it from a file."""
     if dimensions is None:
         return None
     if not files.is_file(geometry):
-        design: Design | None = _built(designs()[geometry], dimensions, ("finger",), found)
+        design: Design | None = _built(designs()[geometry], dimensions, ("finger",), mistakes)
         return design
     try:
-        return files.finger(geometry)
+        return files.finger(geometry, dimensions)
     except Finger3dError as error:
-        found["finger", "geometry"] = f"finger.geometry: {error}"
+        mistakes["finger", "geometry"] = f"finger.geometry: {error}"
         return None
 
 
-def _object(shape: str, placed: TomlTable | None, found: dict[Place, str]) -> RigidObject | None:
+def _object(shape: str, placed: TomlTable | None, mistakes: dict[Place, str]) -> RigidObject | None:
     """Build the object; defects of its file are collected as mistakes."""
     if placed is None:
         return None
@@ -294,7 +295,7 @@ def _object(shape: str, placed: TomlTable | None, found: dict[Place, str]) -> Ri
         return record_of(OBJECTS[shape], placed).read()
     except Finger3dError as error:
         hint = "; give its path from the scene's folder" if str(error).endswith("there is no such file") else ""
-        found["object", "path"] = f"object.path: {error}{hint}"
+        mistakes["object", "path"] = f"object.path: {error}{hint}"
         return None
 
 
@@ -306,10 +307,10 @@ def _shaped(table: Any) -> Any:
 
 
 def _named(
-    given: TreeView, name: str, key: str, known: Mapping[str, type], found: dict[Place, str]
+    document: TreeView, name: str, key: str, types: Mapping[str, type], mistakes: dict[Place, str]
 ) -> tuple[str, TomlTable | None]:
     """Check a table whose `key` says which other keys it takes."""
-    given_table = given.get(name)
+    given_table = document.get(name)
     if not isinstance(given_table, Mapping):
         return "", None  # found by the check of the whole file
     if key not in given_table:
@@ -317,64 +318,63 @@ def _named(
         line = (
             unknown((name, misspelt), given_table[misspelt], (key,))
             if misspelt
-            else f"{name}.{key} is missing: must be {listed(known)}"
+            else f"{name}.{key} is missing: must be {listed(types)}"
         )
-        found[name, misspelt or key] = line
+        mistakes[name, misspelt or key] = line
         return "", None
-    value = given_table[key]
+    value, rest = given_table[key], {k: v for k, v in given_table.items() if k != key}
     if isinstance(value, str) and not one_line(value):
-        found[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
+        mistakes[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
         return "", None
     if name == "finger" and files.is_file(value):
         if not Path(value).exists():
             # Reported alone: the other keys may be those of the design that the file replaces.
-            found[name, key] = (
+            mistakes[name, key] = (
                 f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
-                f"{listed(known)}"
+                f"{listed(types)}"
             )
             return "", None
-        rest, mistakes = {k: v for k, v in given_table.items() if k != key}, dict[Place, str]()
-        table = _checked(FileTable, rest, (name,), mistakes, also=(key,))
-        found |= {p: t.replace("no such key", "no such key beside a file, take it out") for p, t in mistakes.items()}
+        extra: dict[Place, str] = {}
+        table = _checked(files.table_of_file(value), rest, (name,), extra, also=(key,))
+        mistakes |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in extra.items()}
         return value, table
     if name == "finger" and isinstance(value, str) and "." in value:
-        found[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
+        mistakes[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
     elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
-        found[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
-    elif not isinstance(value, str) or value not in known:
-        found[name, key] = choose((name, key), value, list(known))
+        mistakes[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
+    elif not isinstance(value, str) or value not in types:
+        mistakes[name, key] = choose((name, key), value, list(types))
     else:
-        rest = {k: v for k, v in given_table.items() if k != key}
-        return value, _checked(table_of(known[value]), rest, (name,), found, also=(key,))
+        return value, _checked(table_of(types[value]), rest, (name,), mistakes, also=(key,))
     return "", None
 
 
-def _press(given: TreeView, found: dict[Place, str]) -> PressTable | LegsTable | None:
-    press = given.get("press")
+def _press(document: TreeView, mistakes: dict[Place, str]) -> PressTable | LegsTable | None:
+    press = document.get("press")
     if not isinstance(press, Mapping):
         return None  # found by the check of the whole file
     if "leg" not in press:
-        return _checked(PressTable, press, ("press",), found, also=("leg",))
+        return _checked(PressTable, press, ("press",), mistakes, also=("leg",))
     if both := [k for k in press if k in LegTable.model_fields]:
-        found["press", both[0]] = (
+        mistakes["press", both[0]] = (
             f"press.{both[0]} = {shown(press[both[0]])}: must not stand beside [[press.leg]]; "
             "give either one press or its legs"
         )
         return None
-    return _checked(LegsTable, press, ("press",), found)
+    return _checked(LegsTable, press, ("press",), mistakes)
 
 
-def _effects(given: TreeView, found: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree]:
+def _effects(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree]:
     """Check the effects that are present, the only ones that are imported; return their tables and their settings."""
     tables: dict[str, TomlTable] = {}
     effects: Tree = {}
-    present = given.get("effects")
+    present = document.get("effects")
     for name, settings in present.items() if isinstance(present, Mapping) else ():
         place = ("effects", name)
         if name not in effect_names():
-            found[place] = unknown(place, settings, effect_names(), kind="effect")
+            mistakes[place] = unknown(place, settings, effect_names(), kind="effect")
         elif not isinstance(settings, Mapping):
-            found[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
-        elif table := _checked(table_of(effect_type(name)), settings, place, found):
-            tables[name], effects[name] = table, _built(effect_type(name), table, place, found)
+            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
+        elif table := _checked(table_of(effect_type(name)), settings, place, mistakes):
+            tables[name], effects[name] = table, _built(effect_type(name), table, place, mistakes)
     return tables, effects

@@ -6,18 +6,28 @@ keys, such as a depth below the finger's height, are checked when the scene is l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from finger3d._types import Tree
+from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import MODULUS_KEYS
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
-from finger3d.scene.files import FINGER_SUFFIXES
 from finger3d.scene.reference import descriptions
 from finger3d.scene.registry import effect_names, effect_type
-from finger3d.scene.tables import LegsTable, LegTable, PressTable, SceneTable, TomlTable, table_of
+from finger3d.scene.tables import (
+    FileTable,
+    LegsTable,
+    LegTable,
+    MeshFileTable,
+    PressTable,
+    SceneTable,
+    TomlTable,
+    table_of,
+)
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -33,7 +43,7 @@ def schema() -> Tree:
     """
     root = _of(SceneTable)
     keys = root["properties"]
-    keys["finger"] = _one_of("what is pressed", [*map(_design, designs().items()), _file()])
+    keys["finger"] = _one_of("what is pressed", [*map(_design, designs().items()), *_files()])
     shapes = [_named("shape", name, table_of(record), record) for name, record in OBJECTS.items()]
     plane = next(shape for shape in shapes if shape["properties"]["shape"]["const"] == "plane")
     plane["required"].remove("shape")  # [object] without a shape is a plane
@@ -58,23 +68,22 @@ def _design(item: tuple[str, type]) -> Tree:
 
 def _named(key: str, name: str, table: type[TomlTable], documented: type) -> Tree:
     """Return the schema of a table whose `key` must be `name`."""
-    found = _of(table, documented)
-    found["title"] = name
-    found["properties"] = {key: {"const": name}} | found["properties"]
-    found["required"] = [key, *found["required"]]
-    return found
+    table_schema = _of(table, documented)
+    table_schema["title"] = name
+    table_schema["properties"] = {key: {"const": name}} | table_schema["properties"]
+    table_schema["required"] = [key, *table_schema["required"]]
+    return table_schema
 
 
-def _file() -> Tree:
-    suffixes = "|".join(suffix.removeprefix(".") for suffix in FINGER_SUFFIXES)
-    path = {"type": "string", "pattern": rf"\.({_any_case(suffixes)})$", "description": "path from the scene's folder"}
-    return {
-        "title": "file",
-        "type": "object",
-        "additionalProperties": False,
-        "properties": {"geometry": path},
-        "required": ["geometry"],
-    }
+def _files() -> list[Tree]:
+    kinds = (("STEP or STL file", SUFFIXES, FileTable), ("mesh file", MESH_SUFFIXES, MeshFileTable))
+    return [_file(title, suffixes, _of(table)) for title, suffixes, table in kinds]
+
+
+def _file(title: str, suffixes: Sequence[str], table: Tree) -> Tree:
+    names = _any_case("|".join(suffix.removeprefix(".") for suffix in suffixes))
+    path = {"type": "string", "pattern": rf"\.({names})$", "description": "path from the scene's folder"}
+    return table | {"title": title, "properties": {"geometry": path} | table["properties"], "required": ["geometry"]}
 
 
 def _any_case(text: str) -> str:
@@ -91,10 +100,10 @@ def _press() -> Tree:
 
 
 def _legs() -> Tree:
-    found = _of(LegsTable)
+    table_schema = _of(LegsTable)
     leg = _of(LegTable) | _depth_or_force()
-    found["properties"]["leg"] |= {"items": leg, "description": "targets, each reached from the one before"}
-    return found | {"title": "legs"}
+    table_schema["properties"]["leg"] |= {"items": leg, "description": "targets, each reached from the one before"}
+    return table_schema | {"title": "legs"}
 
 
 def _depth_or_force() -> Tree:
@@ -107,41 +116,41 @@ def _documented(record: type) -> Tree:
 
 def _of(table: type[TomlTable], documented: type | None = None) -> Tree:
     """Return the schema of a table, with the descriptions of its keys, in its own tables too."""
-    found = table.model_json_schema()
-    nested = found.pop("$defs", {})
-    _describe(found, documented or table)
+    table_schema = table.model_json_schema()
+    nested = table_schema.pop("$defs", {})
+    _describe(table_schema, documented or table)
     for name, one in nested.items():
         _describe(one, getattr(tables, name))
-    result: Tree = _tidy(found, nested)
+    result: Tree = _tidy(table_schema, nested)
     return {"properties": {}, "required": []} | result
 
 
-def _describe(found: Tree, documented: type) -> None:
+def _describe(table_schema: Tree, documented: type) -> None:
     """Put the descriptions of a docstring beside the keys of a schema."""
-    found.pop("description", None)  # the docstring of the table
+    table_schema.pop("description", None)  # the docstring of the table
     said = descriptions(documented)
-    for key, value in found["properties"].items():
+    for key, value in table_schema["properties"].items():
         if text := said.get(key) or said.get(key.removesuffix("_deg")):
             value["description"] = text
 
 
-def _tidy(node: Any, found: Tree) -> Any:
+def _tidy(node: Any, definitions: Tree) -> Any:
     """Inline references, and drop null, which TOML has not, titles, and defaults of whole tables."""
     if isinstance(node, list):
-        return [_tidy(item, found) for item in node]
+        return [_tidy(item, definitions) for item in node]
     if not isinstance(node, Mapping):
         return node
     if "$ref" in node:
-        inlined = found[node["$ref"].rpartition("/")[2]]
-        return _tidy({**inlined, **{k: v for k, v in node.items() if k != "$ref"}}, found)
+        inlined = definitions[node["$ref"].rpartition("/")[2]]
+        return _tidy({**inlined, **{k: v for k, v in node.items() if k != "$ref"}}, definitions)
     out = {}
     for key, value in node.items():
         if key in ("properties", "$defs"):
-            out[key] = {name: _tidy(item, found) for name, item in value.items()}
+            out[key] = {name: _tidy(item, definitions) for name, item in value.items()}
         elif key == "title" or (key == "default" and (value is None or isinstance(value, list | dict))):
             continue
         else:
-            out[key] = _tidy(value, found)
+            out[key] = _tidy(value, definitions)
     return _without_null(out)
 
 

@@ -53,15 +53,15 @@ def tables_of(source: Source, overrides: Sequence[str] = ()) -> tuple[TreeView, 
         If the file cannot be read, a key cannot be set, or the argument is no scene.
     """
     if isinstance(source, Scene):
-        given, path = source.given, source.path
+        document, path = source.given, source.path
     elif isinstance(source, Mapping):
-        given, path = tree.frozen(source), None
+        document, path = tree.frozen(source), None
     elif isinstance(source, str | Path):
         path = Path(source)
-        given = tree.read(path)
+        document = tree.read(path)
     else:
         raise Finger3dError(
             f"a {type(source).__name__} is no scene: give the path of a scene file, a dict with its tables, or what "
             "finger3d.load returns (a Model is solved by build and march of finger3d.mechanics)"
         )
-    return tree.override(given, overrides), path
+    return tree.override(document, overrides), path

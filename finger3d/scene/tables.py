@@ -160,7 +160,7 @@ class DomainTable(TomlTable):
 
 
 class MeshTable(TomlTable):
-    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.checks`).
+    """[mesh]: absent sizes are chosen from the finger (see `finger3d.scene.mesh_sizes`).
 
     Attributes
     ----------
@@ -283,7 +283,18 @@ class SceneTable(TomlTable):
 
 
 class FileTable(TomlTable):
-    """[finger] with a file as its geometry: all dimensions are the file's."""
+    """[finger] with a STEP or STL file as its geometry: all dimensions are the file's.
+
+    Attributes
+    ----------
+    up : the axis of the file that points from the base to the contact face; a body with z up is turned about x
+    """
+
+    up: Literal["y", "z"] = "y"
+
+
+class MeshFileTable(TomlTable):
+    """[finger] with a mesh of tetrahedra as its geometry."""
 
 
 @functools.cache

@@ -95,10 +95,10 @@ def value_at(tree: TreeView, key: str) -> object:
 def parsed(text: str) -> Any:
     """Return the TOML value of a text, or the text itself if it is no TOML."""
     try:
-        found = tomllib.loads(f"value = {text}")
+        tables = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
-    return found["value"] if found.keys() == {"value"} else text
+    return tables["value"] if tables.keys() == {"value"} else text
 
 
 def _set(node: Any, parts: list[str], value: Any, key: str) -> None:

@@ -114,14 +114,14 @@ class Calibration(SensorModel):
     def _ranges(self, judged: Sequence[Estimate]) -> tuple[tuple[float, float], ...]:
         good = np.array([False, *(one.status == "ok" for one in judged), False]).astype(int)
         ends = np.flatnonzero(np.diff(good)).reshape(-1, 2)
-        found = [(float(self.judged_mu[a]), float(self.judged_mu[b - 1])) for a, b in ends if b - a > 1]
-        return tuple(sorted(found, key=lambda pair: pair[0] - pair[1]))
+        ranges = [(float(self.judged_mu[a]), float(self.judged_mu[b - 1])) for a, b in ends if b - a > 1]
+        return tuple(sorted(ranges, key=lambda pair: pair[0] - pair[1]))
 
     @property
     def best(self) -> int | None:
         """Number, among the calibrated mu, of the one that is known best; None if none is determined."""
-        known = [i for i, one in enumerate(self.judged_at_mu) if one.is_determined]
-        return min(known, key=lambda i: self.judged_at_mu[i].std, default=None)
+        determined = [i for i, one in enumerate(self.judged_at_mu) if one.is_determined]
+        return min(determined, key=lambda i: self.judged_at_mu[i].std, default=None)
 
     def verdict(self) -> str:
         """Return in one sentence where the readings determine mu."""
@@ -132,11 +132,11 @@ class Calibration(SensorModel):
         if self.best is None:
             return text
         mu = self.mu[self.best]
-        share = {name: float(values[0]) for name, values in self.reductions([mu]).items()}
-        cause = max(share, key=lambda name: share[name])
+        reductions = {name: float(values[0]) for name, values in self.reductions([mu]).items()}
+        cause = max(reductions, key=lambda name: reductions[name])
         return (
             f"{text}; to +- {self.judged_at_mu[self.best].std:.2g} at best (mu = {mu:.2g}; without the uncertainty of "
-            f"{cause} the variance would be {100.0 * share[cause]:.0f} % smaller)"
+            f"{cause} the variance would be {100.0 * reductions[cause]:.0f} % smaller)"
         )
 
 
@@ -166,7 +166,7 @@ def summary(calibration: Calibration) -> list[tuple[str, str]]:
         rows += [(f"  {name} alone", c.of([name]).judged_at_mu[i].verdict) for name in c.names]
     shares = sorted(c.reductions([mu]).items(), key=lambda item: -float(item[1][0]))
     rows.append(("variance of mu", "would fall there by so much if one of these were known exactly"))
-    rows += [(f"  {name}", f"{100.0 * float(share[0]):.1f} %") for name, share in shares]
+    rows += [(f"  {name}", f"{100.0 * float(part[0]):.1f} %") for name, part in shares]
     if c.failed:
         rows.append(("failed", ", ".join(f"mu = {at:.4g}" for at, _ in c.failed)))
     return rows

@@ -120,23 +120,18 @@ class ReadingCurve:
             return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
 
     @cached_property
-    def interpolation_error(self) -> float:
-        """Error of the interpolation, rms over mu: see :meth:`curve_error`."""
-        return float(np.sqrt(np.mean(self._missed[1:-1] ** 2)))
-
-    @cached_property
     def _missed(self) -> Float:
         """Error (n,) of the interpolation near every mu."""
-        found = np.zeros(len(self.mu))
+        errors = np.zeros(len(self.mu))
         every = np.arange(len(self.mu))
         for first in (1, 2):
             out = every[first:-1:2]
             kept = np.setdiff1d(every, out)
             left = self.reading[out] - MonotoneCubic.of(self.mu[kept], self.reading[kept])(self.mu[out])
-            found[out] = np.abs(left) / _SHARPER
-        found[[0, -1]] = found[[1, -2]]
+            errors[out] = np.abs(left) / _SHARPER
+        errors[[0, -1]] = errors[[1, -2]]
         # a kink between two of the points is seen from either of them, or from the next
-        return np.asarray(np.max([found, np.append(found[1:], 0.0), np.append(0.0, found[:-1])], axis=0))
+        return np.asarray(np.max([errors, np.append(errors[1:], 0.0), np.append(0.0, errors[:-1])], axis=0))
 
     def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
         """Return the error (m,) of the curve at mu (m,).
@@ -144,24 +139,23 @@ class ReadingCurve:
         For the fit it is the rms residual; for the interpolation a quarter of the change at points that are left out,
         every second one.
         """
-        at = np.asarray(mu, dtype=float)
-        return np.full(at.shape, self.fit.rms) if shape == "fit" else np.interp(at, self.mu, self._missed)
+        mus = np.asarray(mu, dtype=float)
+        return np.full(mus.shape, self.fit.rms) if shape == "fit" else np.interp(mus, self.mu, self._missed)
 
     @cached_property
     def grid(self) -> Float:
         """Mu (m,) on which the likelihood is evaluated: the calibrated ones and 31 between any two."""
-        share = np.arange(_CUTS) / _CUTS
-        inner = self.mu[:-1, None] + np.diff(self.mu)[:, None] * share
+        fractions = np.arange(_CUTS) / _CUTS
+        inner = self.mu[:-1, None] + np.diff(self.mu)[:, None] * fractions
         return np.append(inner.ravel(), self.mu[-1])
 
     def tolerance_sd(self, mu: ArrayLike) -> Float:
         """Return the error (k, m) of the reading due to every tolerance at mu (m,)."""
-        at = np.atleast_1d(np.asarray(mu, dtype=float))
-        rows = [np.interp(at, self.mu, t.spread) for t in self.tolerances]
-        return np.array(rows).reshape(len(rows), len(at))
+        mus = np.atleast_1d(np.asarray(mu, dtype=float))
+        rows = [np.interp(mus, self.mu, t.spread) for t in self.tolerances]
+        return np.array(rows).reshape(len(rows), len(mus))
 
-    def reading_sd(self, mu: ArrayLike, std: ArrayLike | None = None, shape: Shape = "interpolation") -> Float:
-        """Return the standard deviation of a reading: noise (or `std`), error of the curve, and tolerances."""
-        noise = np.asarray(self.noise if std is None else std, dtype=float)
-        squares = noise**2 + self.curve_error(mu, shape) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
+    def reading_sd(self, mu: ArrayLike) -> Float:
+        """Return the standard deviation of a reading: noise, error of the interpolation, and tolerances."""
+        squares = self.noise**2 + self.curve_error(mu) ** 2 + np.sum(self.tolerance_sd(mu) ** 2, axis=0)
         return np.asarray(np.sqrt(squares))

@@ -52,12 +52,12 @@ def estimate(
     rows = [_row(name, named[name], -LARGEST_STRAIN) for name in names]
     stds = [_row(f"std of {name}", values, 0.0) for name, values in zip(names, _stds(chosen, std), strict=True)]
     count = len(rows[0])
-    for name, row, own in zip(names, rows, stds, strict=True):
+    for name, row, std_row in zip(names, rows, stds, strict=True):
         if len(row) != count:
             raise Finger3dError(f"{name}: {len(row)} readings, but {count} of {names[0]}; a set has one of each")
-        if len(own) not in (1, count):
-            raise Finger3dError(f"std of {name}: {len(own)} for {count} readings; give one for all, or each")
-    noise = np.stack([np.broadcast_to(own, count) for own in stds], axis=-1)
+        if len(std_row) not in (1, count):
+            raise Finger3dError(f"std of {name}: {len(std_row)} for {count} readings; give one for all, or each")
+    noise = np.stack([np.broadcast_to(std_row, count) for std_row in stds], axis=-1)
     return chosen.estimates(np.stack(rows, axis=-1), noise, tolerances, curve)
 
 

@@ -41,8 +41,8 @@ def prior(shared: int, mu_sd: float) -> Float:
 
 def mu_sd(fisher: Float) -> Float:
     """Return the standard deviation (...) of mu from Fisher matrices (..., 1 + q, 1 + q)."""
-    own, mixed, others = fisher[..., 0, 0], fisher[..., 1:, 0], fisher[..., 1:, 1:]
+    information, mixed, others = fisher[..., 0, 0], fisher[..., 1:, 0], fisher[..., 1:, 1:]
     if not mixed.shape[-1]:
-        return np.asarray(1.0 / np.sqrt(own))
-    left = own - np.einsum("...i,...i->...", mixed, np.linalg.solve(others, mixed[..., None])[..., 0])
+        return np.asarray(1.0 / np.sqrt(information))
+    left = information - np.einsum("...i,...i->...", mixed, np.linalg.solve(others, mixed[..., None])[..., 0])
     return np.asarray(1.0 / np.sqrt(left))

@@ -125,7 +125,7 @@ class Estimator:
     Attributes
     ----------
     limit : standard deviation of mu beyond which an estimate is called coarse
-    at : (m, k) readings
+    readings : (m, k) readings
     precision : (m, k, k) inverse covariance
     log_determinant : (m,) of the covariance
     """
@@ -133,7 +133,7 @@ class Estimator:
     model: SensorModel
     limit: float
     noise: Float
-    at: Float
+    readings: Float
     precision: Float
     log_determinant: Float
 
@@ -155,58 +155,60 @@ class Estimator:
 
     def estimate(self, reading: Float) -> Estimate:
         """Return the estimate from readings (k,)."""
-        found = self._likelihood(reading)
-        chi_square = float(found.chi_square.min())
+        likelihood = self._likelihood(reading)
+        chi_square = float(likelihood.chi_square.min())
         freedom = max(1, len(reading) - 1)
         p_value = chi_square_tail(chi_square, freedom)
-        intervals = found.credible_set()
-        status = self._status(found, p_value, len(intervals))
+        intervals = likelihood.credible_set()
+        status = self._status(likelihood, p_value, len(intervals))
         c = self.model
-        below, above = found.reaches_ends(c.mu)
-        known = status in ("ok", "coarse")
+        below, above = likelihood.reaches_ends(c.mu)
+        determined = status in ("ok", "coarse")
         none = status in ("outside", "contradiction")
         return Estimate(
             readings=dict(zip(c.names, map(float, reading), strict=True)),
             stds=dict(zip(c.names, map(float, self.noise), strict=True)),
-            mu=found.mean if known else math.nan,
-            std=found.std if known else math.nan,
+            mu=likelihood.mean if determined else math.nan,
+            std=likelihood.std if determined else math.nan,
             low=math.nan if none else 0.0 if below else intervals[0][0],
             high=math.nan if none else math.inf if above else intervals[-1][1],
             intervals=() if none else intervals,
             status=status,
             chi_square=chi_square,
             p_value=p_value,
-            verdict=self._verdict(status, found, intervals, reading, p_value),
+            verdict=self._verdict(status, likelihood, intervals, reading, p_value),
         )
 
     def _likelihood(self, reading: Float) -> _Likelihood:
         """Return the likelihood on the grid, or on a finer one around a peak that the grid does not resolve."""
         mu = self.model.grid
         for _ in range(_ZOOMS):
-            found = self._on(mu, reading)
-            good = np.flatnonzero(found.density >= _NEGLIGIBLE)
+            likelihood = self._on(mu, reading)
+            good = np.flatnonzero(likelihood.density >= _NEGLIGIBLE)
             if len(good) >= _ENOUGH:
                 break
             mu = np.linspace(mu[max(good[0] - 1, 0)], mu[min(good[-1] + 1, len(mu) - 1)], _NODES)
-        return found
+        return likelihood
 
     def _on(self, mu: Float, reading: Float) -> _Likelihood:
         """Return the likelihood at mu (m,); between points of the grid, readings and precision are interpolated."""
         grid = self.model.grid
         if mu is grid:
-            return _Likelihood.of(mu, reading - self.at, self.precision, self.log_determinant)
+            return _Likelihood.of(mu, reading - self.readings, self.precision, self.log_determinant)
         cell = np.clip(np.searchsorted(grid, mu, side="right") - 1, 0, len(grid) - 2)
-        share = ((mu - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
-        residual = reading - self.at[cell] * (1.0 - share) - self.at[cell + 1] * share
-        precision = self.precision[cell] * (1.0 - share[:, :, None]) + self.precision[cell + 1] * share[:, :, None]
+        fraction = ((mu - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
+        residual = reading - self.readings[cell] * (1.0 - fraction) - self.readings[cell + 1] * fraction
+        precision = (
+            self.precision[cell] * (1.0 - fraction[:, :, None]) + self.precision[cell + 1] * fraction[:, :, None]
+        )
         return _Likelihood.of(mu, residual, precision, np.interp(mu, grid, self.log_determinant))
 
-    def _status(self, found: _Likelihood, p_value: float, intervals: int) -> Status:
+    def _status(self, likelihood: _Likelihood, p_value: float, intervals: int) -> Status:
         mu = self.model.mu
         if p_value < LEAST_P:
-            nearest = found.mu[np.argmin(found.chi_square)]
+            nearest = likelihood.mu[np.argmin(likelihood.chi_square)]
             return "outside" if nearest in (mu[0], mu[-1]) or len(self.noise) == 1 else "contradiction"
-        below, above = found.reaches_ends(mu)
+        below, above = likelihood.reaches_ends(mu)
         if intervals > 1:
             return "ambiguous"
         if below and above:
@@ -215,12 +217,12 @@ class Estimator:
             return "above"
         if below:
             return "below"
-        return "coarse" if found.std > self.limit else "ok"
+        return "coarse" if likelihood.std > self.limit else "ok"
 
     def _verdict(
         self,
         status: Status,
-        found: _Likelihood,
+        likelihood: _Likelihood,
         intervals: tuple[tuple[float, float], ...],
         reading: Float,
         p_value: float,
@@ -229,46 +231,47 @@ class Estimator:
         first, last, low, high = mu[0], mu[-1], intervals[0][0], intervals[-1][1]
         these = "this reading" if len(reading) == 1 else "these readings"
         if status == "contradiction":
-            return self._contradiction(found, reading, p_value)
+            return self._contradiction(likelihood, reading, p_value)
         if status == "outside":
             or_else = "" if len(reading) == 1 else ", or they contradict each other"
-            nearest = int(np.argmin(found.chi_square))
+            nearest = int(np.argmin(likelihood.chi_square))
             return (
                 f"out of range: no mu from {first:g} to {last:g} has {these}{or_else}; the nearest, mu = "
-                f"{found.mu[nearest]:.3g}, is {math.sqrt(found.chi_square[nearest]):.2g} standard deviations away "
-                f"(p = {p_value:.1g})"
+                f"{likelihood.mu[nearest]:.3g}, is {math.sqrt(likelihood.chi_square[nearest]):.2g} standard deviations "
+                f"away (p = {p_value:.1g})"
             )
         if status == "ambiguous":
             return f"ambiguous: {ranges_text(intervals)} hold {100.0 * CREDIBLE:.0f} % of the likelihood"
         if status == "blind":
-            share = {name: float(values[0]) for name, values in self.model.reductions([found.mean]).items()}
-            largest = max(share, key=lambda name: share[name])
+            reductions = {name: float(values[0]) for name, values in self.model.reductions([likelihood.mean]).items()}
+            largest = max(reductions, key=lambda name: reductions[name])
             return (
                 f"out of range: every mu from {first:g} to {last:g} is plausible"
-                + f"; {100.0 * share[largest]:.0f} % of the variance is from {largest}" * (share[largest] > 0.0)
+                + f"; {100.0 * reductions[largest]:.0f} % of the variance is from {largest}"
+                * (reductions[largest] > 0.0)
             )
         if status == "above":
             return f"out of range: mu > {low:.3g}, and the calibration ends at {last:g}"
         if status == "below":
             return f"out of range: mu < {high:.3g}, and the calibration begins at {first:g}"
-        text = f"mu = {found.mean:.3g} +- {found.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
+        text = f"mu = {likelihood.mean:.3g} +- {likelihood.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
         return text if status == "ok" else f"{text}: coarser than the limit of {self.limit:g}"
 
-    def _contradiction(self, found: _Likelihood, reading: Float, p_value: float) -> str:
+    def _contradiction(self, likelihood: _Likelihood, reading: Float, p_value: float) -> str:
         """Return the verdict that readings contradict each other, and without which one the others agree."""
         c, text = self.model, ""
         for i, name in enumerate(c.names if len(c.names) > 2 else ()):
             others = [j for j in range(len(reading)) if j != i]
             # the inverse of a block of the covariance, by the Schur complement of the precision
             row = self.precision[:, others, i]
-            precision = self.precision[np.ix_(range(len(self.at)), others, others)] - (
+            precision = self.precision[np.ix_(range(len(self.readings)), others, others)] - (
                 row[:, :, None] * row[:, None, :] / self.precision[:, i, i, None, None]
             )
             part = Estimator(
                 c.of([c.names[j] for j in others]),
                 self.limit,
                 self.noise[others],
-                self.at[:, others],
+                self.readings[:, others],
                 precision,
                 -np.linalg.slogdet(precision).logabsdet,
             )
@@ -276,8 +279,8 @@ class Estimator:
             if chi_square_tail(left, len(others) - 1) >= LEAST_P:
                 text += f"; without {name}: {part.estimate(reading[others]).verdict}"
         return (
-            f"these readings contradict each other: chi-square {found.chi_square.min():.3g} with {len(reading) - 1} "
-            f"degree{'s' if len(reading) > 2 else ''} of freedom (p = {p_value:.1g}){text}"
+            f"these readings contradict each other: chi-square {likelihood.chi_square.min():.3g} with "
+            f"{len(reading) - 1} degree{'s' if len(reading) > 2 else ''} of freedom (p = {p_value:.1g}){text}"
         )
 
 

@@ -90,25 +90,25 @@ class SensorModel:
         without : name of a tolerance that is known exactly, or ``"noise"``
         shape : the curve whose error counts
         """
-        at = np.atleast_1d(np.asarray(mu, dtype=float))
+        mus = np.atleast_1d(np.asarray(mu, dtype=float))
         scale = self.noise
-        own = np.array([c.curve_error(at, shape) ** 2 for c in self.readings]).T
+        independent = np.array([c.curve_error(mus, shape) ** 2 for c in self.readings]).T
         if without != "noise":
-            own = own + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
-        shared = [np.zeros((len(at), len(self.readings))) for _ in SHARED]
+            independent = independent + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
+        shared = [np.zeros((len(mus), len(self.readings))) for _ in SHARED]
         for i, c in enumerate(self.readings):
             for t in (t for t in c.tolerances if t.name != without):
-                square = np.interp(at, c.mu, t.spread) ** 2
+                square = np.interp(mus, c.mu, t.spread) ** 2
                 if t.name in SHARED:
-                    effect = t.sd * np.interp(at, c.mu, t.slope)
+                    effect = t.sd * np.interp(mus, c.mu, t.slope)
                     shared[SHARED.index(t.name)][:, i] = effect
                     square = np.maximum(square - effect**2, 0.0)
-                own[:, i] += square
-        found = np.zeros((len(at), len(scale), len(scale)))
-        found[:, np.arange(len(scale)), np.arange(len(scale))] = np.maximum(own, (_LEAST_NOISE * scale) ** 2)
+                independent[:, i] += square
+        total = np.zeros((len(mus), len(scale), len(scale)))
+        total[:, np.arange(len(scale)), np.arange(len(scale))] = np.maximum(independent, (_LEAST_NOISE * scale) ** 2)
         for effect in shared:
-            found += effect[:, :, None] * effect[:, None, :]
-        return found
+            total += effect[:, :, None] * effect[:, None, :]
+        return total
 
     def mu_sd(self, mu: ArrayLike, without: str = "") -> Float:
         """Return the standard deviation (m,) of mu of a linear model, ``1 / sqrt(s^T C^-1 s)`` with the slopes s.

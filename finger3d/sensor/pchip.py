@@ -45,12 +45,12 @@ class MonotoneCubic:
         slope[-1] = _end_slope(step[-1], step[-2], secant[-1], secant[-2])
         return cls(x, y, slope)
 
-    def __call__(self, at: ArrayLike, derivative: int = 0) -> Float:
+    def __call__(self, x: ArrayLike, derivative: int = 0) -> Float:
         """Return values, or first derivatives, at places within the range; beyond it the end cubics continue."""
-        at = np.asarray(at, dtype=float)
-        k = np.clip(np.searchsorted(self.x, at, side="right") - 1, 0, len(self.x) - 2)
+        x = np.asarray(x, dtype=float)
+        k = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(self.x) - 2)
         step, rise = self.x[k + 1] - self.x[k], self.y[k + 1] - self.y[k]
-        t, a, b = at - self.x[k], self.slope[k], self.slope[k + 1]
+        t, a, b = x - self.x[k], self.slope[k], self.slope[k + 1]
         second = (3.0 * rise / step - 2.0 * a - b) / step
         third = (a + b - 2.0 * rise / step) / step**2
         if derivative:

@@ -18,7 +18,6 @@ OBJECT = "NOBJECT"
 """Name of the object's node set; its total force, which ccx prints, is the contact force on the meshed part."""
 
 _FACES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))}  # S1, S2, ... of CPE6, C3D10
-_PER_LINE = 15  # numbers of an element or a set on a line, at most 16
 
 
 @dataclass(frozen=True)

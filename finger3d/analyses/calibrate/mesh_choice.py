@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from finger3d._cost import CALIBRATION_S
 from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.calibrate.curve_points import CurvePoints
@@ -18,9 +19,6 @@ from finger3d.sensor.calibration import Calibration
 
 SHARE = 0.1
 """Largest share of the mesh in the variance of mu."""
-
-LONGEST_S = 60.0
-"""Estimated time of a calibration, s, beyond which a finer mesh is recommended but not used."""
 
 _FINER, _FINEST, _COARSEST = 0.9, 0.3, 0.8
 """Edge length of the next mesh relative to that from the order of convergence, and bounds relative to the last mesh."""
@@ -45,7 +43,7 @@ def choose_mesh(
     automatic: bool,
     calibrated: Callable[[Model], tuple[CurvePoints, Calibration]],
     report: Progress,
-    longest_s: float = LONGEST_S,
+    longest_s: float = CALIBRATION_S,
 ) -> CalibratedMesh:
     """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.
 

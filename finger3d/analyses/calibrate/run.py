@@ -149,10 +149,9 @@ def calibrated(
     noises: Mapping[Kind, float] = NOISES,
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
-    report: Progress | None = None,
 ) -> tuple[Calibration, CurvePoints]:
     """Return the calibration of readings of a model made in Python, and its presses; write nothing."""
-    report = report or Progress()
+    report = Progress()
     readings = found_readings(model, [names] if isinstance(names, str) else names, noises)
     settings = CalibrationSettings(readings, tuple(mus), limit, with_defaults(tolerances))
     curve = _press_all(model, settings, report)

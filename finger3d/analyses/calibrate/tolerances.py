@@ -41,7 +41,7 @@ _LEAST_POINTS = {2: 150, 3: 500}
 """Least number of contact points, by dimension, for which differences on the coarser mesh are accurate enough: within a
 fifth of the largest."""
 
-_GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
 Effect: TypeAlias = tuple[float, Float]
 """Step of a quantity in its unit, and the changes (k, m) of readings at several mu that it causes."""
@@ -87,7 +87,7 @@ class DisplacedGauge:
 def displaced_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
     """Return the gauge displaced by plus and minus each tolerance of its place, as far as it stays in the body."""
     found = []
-    for name in (n for n in _GAUGE_PLACES if n in tolerances):
+    for name in (n for n in GAUGE_PLACES if n in tolerances):
         for sign in (1.0, -1.0):
             step = sign * tolerances[name]
             displaced = replace(_displaced(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
@@ -137,7 +137,7 @@ def evaluate_tolerances(
     mu = base.mu[base.sample]
     own = np.array([base.readings[name][base.sample] for name in names])
     body = ReferenceBody(problem, names, mu, own, base.pressed)
-    others = set(tolerances) - {*_GAUGE_PLACES, "increments"}
+    others = set(tolerances) - {*GAUGE_PLACES, "increments"}
     if others and increments.comparison_legs != problem.model.legs:
         legs = increments.comparison_legs
         body = ReferenceBody.of(under(problem, legs=legs), names, mu)
@@ -154,7 +154,7 @@ def evaluate_tolerances(
             effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
         elif name == "increments":
             effects = [(sd, sd * _increment_errors(problem, names, own, increments, mu))]
-        elif name in _GAUGE_PLACES and not problem.model.inclusions:
+        elif name in GAUGE_PLACES and not problem.model.inclusions:
             known = base.mu
             effects = _effects_of_displaced_gauges(problem.model, readings, name, sd, base)
         else:
@@ -170,10 +170,10 @@ def _tolerances(
         found = [(step, _interpolated(mu, known, change[i])) for step, change in effects]
         own = [(step, change) for step, change in found if np.isfinite(change).all()]
         if own:
-            yield reading.name, _tolerance(name, sd, own)
+            yield reading.name, tolerance_of(name, sd, own)
 
 
-def _tolerance(name: str, sd: float, effects: list[Effect]) -> Tolerance:
+def tolerance_of(name: str, sd: float, effects: list[Effect]) -> Tolerance:
     """Return a tolerance from its effects, each scaled to one standard deviation."""
     scaled = np.array([change * sd / step for step, change in effects])
     (a, change_a), (b, change_b) = [*effects, (0.0, np.zeros(scaled.shape[1]))][:2]
@@ -302,7 +302,7 @@ _VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], flo
     "E_percent": _vary_modulus,
     "nu": _vary_poisson,
     "tilt_deg": _vary_tilt,
-    **{name: partial(_vary_stiff_gauge, name) for name in _GAUGE_PLACES},
+    **{name: partial(_vary_stiff_gauge, name) for name in GAUGE_PLACES},
 }
 """By tolerance, the function that yields its effects on a reference body for one standard deviation."""
 

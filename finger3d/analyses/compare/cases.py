@@ -23,8 +23,6 @@ from finger3d.results.comparison import Case
 _POINTS = 600
 """Largest number of contact points of the meshed part of a solid of another width; a press then takes a few seconds."""
 
-LINES = ("z = 0", "end")
-
 
 def resized(model: Model, size_mm: float) -> Model:
     """Return the model with all edge lengths scaled alike."""
@@ -63,11 +61,6 @@ def press_with_errors(name: str, model: Model) -> Case:
             case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
         )
     return replace(case, seconds=time.perf_counter() - start)
-
-
-def press_without_errors(name: str, model: Model) -> Case:
-    """Press the model without estimating its errors."""
-    return _pressed(name, model)[-1]
 
 
 def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], tuple[Run, ...], Case]:

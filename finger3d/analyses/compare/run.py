@@ -13,7 +13,7 @@ from finger3d._machine import versions
 from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Tree
 from finger3d.analyses.compare.cases import press_with_errors, section_of, widened
-from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, verdict
+from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, numbers_table, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.geometry.design import lacks_section
 from finger3d.io import atomic, claimed, write_csv, write_json
@@ -34,10 +34,19 @@ _INCOMPLETE = "incomplete: the comparison is running or was interrupted; the cas
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """Result of `compare`: the cases, the verdict on them in sentences, and the folder of the files."""
+    """Result of `compare`.
+
+    Attributes
+    ----------
+    cases : the models that were solved
+    verdict : on them, in sentences
+    table : text of the numbers at the scene's width: the head, then a row for each quantity
+    out : folder of the files
+    """
 
     cases: tuple[Case, ...]
     verdict: tuple[str, ...]
+    table: tuple[Sequence[str], ...]
     out: Path
 
     def __repr__(self) -> str:
@@ -115,7 +124,7 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
         cases.append(_press(name, variant, model))
         report.step(done, len(variants), _remark(cases[-1]))
-        comparison = Comparison(tuple(cases), tuple(_verdict(model, cases)), folder)
+        comparison = _compared(model, cases, folder)
         _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
     from finger3d.plotting.comparison import draw
     from finger3d.report.compare import compare_page
@@ -198,6 +207,11 @@ def _remark(case: Case) -> str:
     return f"{case.model}, {case.width_mm:g} mm wide, edges of {case.size_mm:.3g} mm: {force:.4g} N per mm"
 
 
+def _compared(model: Model, cases: Sequence[Case], folder: Path) -> Comparison:
+    table = numbers_table(cases, model.design.width_mm)
+    return Comparison(tuple(cases), tuple(_verdict(model, cases)), tuple(table), folder)
+
+
 def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:
     turns = any(leg.turn_x or leg.turn_y for leg in model.legs)
     lines = verdict(cases, model.design.width_mm, model.design.height_mm, turns)
@@ -228,6 +242,7 @@ def _write(comparison: Comparison, scene: Scene, height_mm: float, complete: boo
             "scene": scene.as_dict(),
             "outcome": str(comparison.outcome) if complete else _INCOMPLETE,
             "verdict": comparison.verdict,
+            "table": comparison.table,
             "within": WITHIN,
             "width_within": {name: _width_within(found, name == "plane stress") for name, found in by_width.items()},
             "deviation_of_force": {name: [asdict(d) for d in found] for name, found in by_width.items()},

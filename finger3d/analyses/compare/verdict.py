@@ -71,10 +71,8 @@ def force_deviation(plane: Case, solid: Case) -> Deviation:
     return Deviation(found.width_mm, found.value, min(found.error, max(error, _COMMON * found.error)))
 
 
-def crossing_width(
-    found: Sequence[Deviation], narrow: bool, limit: float = WITHIN
-) -> tuple[float, float, float] | None:
-    """Return the width at which the deviation reaches a limit, and the ends of its error bar, mm; None if it does not.
+def crossing_width(found: Sequence[Deviation], narrow: bool) -> tuple[float, float, float] | None:
+    """Return the width at which the deviation reaches `WITHIN`, and the ends of its error bar, mm; None if it does not.
 
     Parameters
     ----------
@@ -86,7 +84,7 @@ def crossing_width(
     value, error = np.array([abs(d.value) for d in ordered]), np.array([d.error for d in ordered])
     # The deviation from plane strain falls as 1/width; that from plane stress grows in proportion to the width.
     scale = width if narrow else 1.0 / width
-    at = [_crossing(scale, v, limit) for v in (value, np.maximum(value - error, 0.0), value + error)]
+    at = [_crossing(scale, v, WITHIN) for v in (value, np.maximum(value - error, 0.0), value + error)]
     if at[0] is None:
         return None
     sizes = [float("nan") if a is None else (a if narrow else 1.0 / a) for a in at]
@@ -120,7 +118,7 @@ def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float, turns:
     out.append(_force(planes, solid, height_mm))
     out += _ends(own)
     out += [_width_within(name, cases) for name in ("plane strain", "plane stress")]
-    out += _others(planes, solid)
+    out += _across(solid)
     out += _torsion(solid) if turns else []
     out.append(_sufficient(planes, solid))
     return out
@@ -132,12 +130,8 @@ def _force(planes: Sequence[Case], solid: Case, height: float) -> str:
         d = deviation(plane, solid)
         verb = "overstates" if d.value > 0.0 else "understates"
         parts.append(f"{plane.model} {verb} {'it' if parts else 'the force'} by {d.text()}")
-    numbers = ", ".join(f"{c.model} {_with_error(c, FORCE)}" for c in (solid, *planes))
     text = " and ".join(parts)
-    return (
-        f"At width/height {solid.width_mm / height:.2g} ({solid.width_mm:g} mm wide, {height:.4g} mm high) {text}: "
-        f"{numbers} N per mm of width."
-    )
+    return f"At width/height {solid.width_mm / height:.2g} ({solid.width_mm:g} mm wide, {height:.4g} mm high) {text}."
 
 
 def _with_error(case: Case, key: str, unit: str = "") -> str:
@@ -197,24 +191,40 @@ def _width_within(name: str, cases: Sequence[Case]) -> str:
     return f"{name.capitalize()} is {goal} {side} a width of {at:.3g} mm{between}."
 
 
-def _others(planes: Sequence[Case], solid: Case) -> list[str]:
-    out = []
-    for key, what in (("contact_length_mm", "Contact length at z = 0"), ("stick_length_mm", "Stick length at z = 0")):
-        values = ", ".join(f"{c.model} {_with_error(c, key, ' mm')}" for c in (solid, *planes))
-        out.append(f"{what}: {values}.")
+def _across(solid: Case) -> list[str]:
+    """Return the share of the friction along the width, which no section has."""
     total, across = (solid.numbers[k] for k in ("friction_sum_N_per_mm", "friction_along_z_N_per_mm"))
-    if total > 0.0:
-        along = ", ".join(f"{c.model} {_with_error(c, 'friction_along_x_N_per_mm')}" for c in (solid, *planes))
-        out.append(f"Sum of |friction along x|: {along} N per mm.")
-        out.append(
-            f"Sum of |friction along z|, which is zero in a section: solid {across:.3g} N per mm, "
-            f"{100 * across / total:.0f} % of the sum of |friction|."
-        )
-    for key in solid.numbers:
-        if key.startswith("gauge_"):
-            values = ", ".join(f"{c.model} {_with_error(c, key)}" for c in (solid, *planes))
-            out.append(f"Gauge {key.removeprefix('gauge_')}: {values}.")
-    return out
+    if total <= 0.0:
+        return []
+    return [f"{100 * across / total:.0f} % of the solid's sum of |friction| act along z, where a section has none."]
+
+
+_QUANTITIES = {
+    FORCE: "force (N per mm of width)",
+    "contact_length_mm": "extent of contact at z = 0 (mm)",
+    "stick_length_mm": "extent of the stick zone at z = 0 (mm)",
+    "friction_sum_N_per_mm": "sum of |friction| (N/mm)",
+    "friction_along_x_N_per_mm": "sum of |friction along x| (N/mm)",
+    "friction_along_z_N_per_mm": "sum of |friction along z| (N/mm)",
+    "peak_pressure_MPa": "peak pressure (MPa)",
+}
+
+
+def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]:
+    """Return the numbers of the models at the scene's width with their errors: the head, then a row for each."""
+    order = ("solid", "plane strain", "plane stress")
+    own = sorted(
+        (c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order),
+        key=lambda c: order.index(c.model),
+    )
+    names = list(dict.fromkeys(key for case in own for key in case.numbers))
+    shown = _QUANTITIES | {k: f"strain of gauge {k.removeprefix('gauge_')}" for k in names if k.startswith("gauge_")}
+    rows = [
+        [text, *(_with_error(case, key) if key in case.numbers else "" for case in own)]
+        for key, text in shown.items()
+        if any(case.numbers.get(key) for case in own)
+    ]
+    return [["", *(case.model for case in own)], *rows] if rows else []
 
 
 def _torsion(solid: Case) -> list[str]:
@@ -229,8 +239,8 @@ def _sufficient(planes: Sequence[Case], solid: Case) -> str:
     """Name the quantities of each plane model that deviate by more and by less than the limit."""
     names = {
         FORCE: "force",
-        "contact_length_mm": "contact length",
-        "stick_length_mm": "stick length",
+        "contact_length_mm": "extent of contact",
+        "stick_length_mm": "extent of the stick zone",
         "friction_sum_N_per_mm": "friction sum",
         "peak_pressure_MPa": "peak pressure",
     }

@@ -159,8 +159,6 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error):
         raise Finger3dError(f"{path}: not a CSV file; it must have a line of names, then a line for each row") from None
-    if len(names) == 1 and ";" in names[0]:
-        raise Finger3dError(f"{path}: semicolons separate the columns; write commas, and decimal points in numbers")
     twice = next((n for i, n in enumerate(names) if n in names[:i]), None)
     if twice is not None:
         raise Finger3dError(f'{path}: two columns are called "{twice}"')

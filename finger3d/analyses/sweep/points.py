@@ -160,11 +160,7 @@ class Sweep:
         }
 
 
-def combinations(
-    source: Source,
-    overrides: Sequence[str],
-    texts: Sequence[str],
-) -> Sweep:
+def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str]) -> Sweep:
     """Read a scene and check every combination of some values.
 
     Parameters
@@ -184,12 +180,7 @@ def combinations(
     return _checked(source, overrides, vary, "--vary")
 
 
-def listed_points(
-    source: Source,
-    overrides: Sequence[str],
-    columns: tuple[Vary, ...],
-    option: str,
-) -> Sweep:
+def listed_points(source: Source, overrides: Sequence[str], columns: tuple[Vary, ...], option: str) -> Sweep:
     """Read a scene and check every point of a list.
 
     Parameters

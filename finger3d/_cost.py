@@ -1,0 +1,157 @@
+"""Cost model: seconds on two cores and memory, from the size of the meshed part.
+
+Calibrated on the Fig. 9 finger by the runs of validation/cost_of_accuracy.py and scaling.py, up to 386 000 unknowns in
+2D and 1 010 000 in 3D.  Solids among them took 0.53 to 1.09 times the forecast time and 1.01 to 1.27 times the memory;
+other presses 0.63 to 2.5 times the time, and solids meshed by fTetWild 0.79 to 1.19 times the memory.  The processor
+time that large deformation took on one core was 0.69 to 1.48 times the forecast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MAX_TETS = 1_000_000
+"""Largest number of tets for pytetwild, which takes minutes below and hours above."""
+
+MEMORY_SHARE = 0.8
+"""Largest share of the machine's memory that a solution may need."""
+
+START_S, FIGURES_S = 0.4, {2: 1.0, 3: 4.5}
+"""Seconds to import the package, and to draw the figures by dimension."""
+
+BASE_MB, CAD_MB = 170.0, 400.0
+"""Memory of the package, and of CAD besides, with which unstructured meshes are made."""
+
+GAUGE_S, GAUGE_CELL_S = 3e-3, 7e-7
+"""Seconds for each gauge, and for each cell searched for it."""
+
+AUTOMATIC_S = 4.0
+"""Seconds that automatic increments may take in addition to those of the condensation."""
+
+LARGE_DEFORMATION_S = 10.0
+"""Largest cost of a coarse press at large deformation; 30 % of a press of a million unknowns would hold 4 GB."""
+
+CALIBRATION_S = 60.0
+"""Estimated time of a calibration beyond which a finer mesh is recommended but not used."""
+
+GROWTH = {2: 1.2, 3: 1.6}
+"""Power of the unknowns with which the seconds of a press grow, by dimension; from 161 000 to 523 000 of a solid."""
+
+PRESS_TO_ROUND = 1.3
+"""Time of a press over that of its last round of refinement: contact is solved again, and drawn."""
+
+_NODES_PER_TET, _VERTICES_PER_TET = 1.55, 0.24
+_DOFS_PER_TRIANGLE = 4.1
+"""Sizes of quadratic meshes."""
+
+_ITERATIONS_AN_INCREMENT = 9
+"""Iterations of an increment at finite strain, which has about one factorisation of the tangent."""
+
+_NUMERIC_FACTORISATION = 0.85
+"""Time of a factorisation whose ordering is known, with the assembly of its tangent, over that of a condensation."""
+
+_ITERATION_S = 2.8e-6
+"""Seconds of an iteration for each unknown: a residual, and a forward and a backward substitution."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Largest cost of an estimate, relative to that of the press and in seconds; the larger limit applies."""
+
+    share: float
+    least_s: float
+
+    def seconds(self, press_s: float) -> float:
+        """Return the seconds that the estimate may take beside a press of `press_s`."""
+        return max(self.share * press_s, self.least_s)
+
+
+INCREMENT_ERRORS, CHANGES = Budget(0.15, 0.2), Budget(0.3, 1.0)
+"""Of the errors due to the increments, and of the changes by a better model or by more increments."""
+
+
+@dataclass(frozen=True)
+class PressSize:
+    """Size of a meshed part: dimension, unknowns and contact points."""
+
+    dim: int
+    dofs: float
+    contact_points: float
+
+    @property
+    def assembly_s(self) -> float:
+        """Seconds of the assembly."""
+        return 8e-6 * self.dofs if self.dim == 3 else 0.005 + 3e-6 * self.dofs
+
+    @property
+    def condensation_s(self) -> float:
+        """Seconds of the condensation."""
+        return float(6.0 * (self.dofs / 85_000.0) ** 1.75 if self.dim == 3 else 0.004 + 8e-6 * self.dofs)
+
+    @property
+    def contact_s(self) -> float:
+        """Seconds of contact in an increment."""
+        points = self.contact_points
+        return float(0.0025 + (0.065 * (points / 680.0) ** 2.4 if self.dim == 3 else 0.038 * (points / 700.0) ** 2.75))
+
+    @property
+    def finite_strain_s(self) -> float:
+        """Seconds that finite strain adds to an increment."""
+        return _NUMERIC_FACTORISATION * self.condensation_s + _ITERATIONS_AN_INCREMENT * _ITERATION_S * self.dofs
+
+    @property
+    def factor_mb(self) -> float:
+        """Memory of the factorised stiffness."""
+        return factor_mb(self.dofs, self.dim)
+
+    def press_s(self, increments: int) -> float:
+        """Return the seconds of a press in small strain, without meshing and output."""
+        return self.condensation_s + increments * self.contact_s
+
+
+def meshing_s(cells: float) -> float:
+    """Return the seconds in which fTetWild meshes a body, and CAD prepares it."""
+    return 3.0 + 3.5e-4 * cells
+
+
+def meshing_limit_s(cells: float, triangles: int) -> float:
+    """Return five times the seconds that fTetWild took on a loaded machine.
+
+    With a coarse surface: 6 s for 4 700 tets, 149 s for 219 000.  With few tets: 27 s for 5 500 triangles, 197 s for
+    34 000.
+    """
+    return 5.0 * (10.0 + 8e-4 * cells + 5e-3 * triangles)
+
+
+def netgen_limit_s(cells: float) -> float:
+    """Return ten times the seconds that netgen took on a loaded machine, and a minute."""
+    return 60.0 + 4e-3 * cells
+
+
+def tets_made(ratio: float) -> float:
+    """Return the number of tets that fTetWild makes over the number that the field of edge lengths asks for.
+
+    Cells grow faster than the field where its largest length is `ratio` times the smallest: 0.57 of them
+    were made at 15 and 20, 0.7 to 0.8 at 10, 0.9 at 5, and 1.03 to 1.07 at 2 to 4.
+    """
+    return float(min(5.0 / ratio, 1.0) ** 0.4)
+
+
+def tet_mesh(cells: float, mixed: bool) -> tuple[float, float]:
+    """Return the nodes and the unknowns of a mesh of quadratic tets; a mixed one has pressures at its vertices."""
+    return _NODES_PER_TET * cells, (3.0 * _NODES_PER_TET + _VERTICES_PER_TET * mixed) * cells
+
+
+def factor_mb(dofs: float, dim: int) -> float:
+    """Return the memory of a factorised stiffness; a million unknowns of a solid took 19.8 GB."""
+    return float(1.19e-3 * dofs**1.2 if dim == 3 else 2.5e-3 * dofs)
+
+
+def mesh_gb(cells: float, dim: int) -> float:
+    """Return the memory of the factorised stiffness of a mesh, GB."""
+    return 1e-3 * factor_mb(tet_mesh(cells, False)[1] if dim == 3 else _DOFS_PER_TRIANGLE * cells, dim)
+
+
+def rows_gb(rows: float) -> float:
+    """Return the memory of the dense compliance of condensed rows and its copies, GB."""
+    return 40e-9 * rows**2

@@ -1,0 +1,172 @@
+"""Deformed fingers drawn to scale: contact pressure on the left, stick and slip on the right.
+
+Solids are rendered by PyVista in a child process, because VTK aborts the process if no OpenGL driver works. In that
+case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from finger3d._types import Float, Int
+from finger3d.contact.friction import OPEN
+from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.plotting.camera import WINDOW, flat
+from finger3d.plotting.gauges import Mark, draw_marks
+from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
+from finger3d.plotting.panels import Marks, highest_of, keys, palette, pressure_colours, sliced, two_panels
+from finger3d.plotting.solid import BODY, FEATURE, LINE, OBJECT, OBJECT_TINT, REST, draw_solid, render_solids, skin_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeformedFinger:
+    """A finger at one step of a press.
+
+    Attributes
+    ----------
+    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
+    displacement : (n, d) mm
+    pressure, shear : (c,) and (c, 3) MPa, at the contact points; the shear is the friction on the finger
+    status : (c,) status of these points
+    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.simplex.FREE_FACES` of their faces
+    thing : (t, 3, 3) corners of the object's triangles, mm; None without it
+    title : of the picture
+    marks : gauges, from `finger3d.plotting.gauges.marks_of`
+    """
+
+    mesh: Mesh
+    displacement: Float
+    pressure: Float
+    shear: Float
+    status: Int
+    nodes: Int
+    faces: Int
+    thing: Float | None
+    title: str = ""
+    marks: Sequence[Mark] = ()
+
+    @property
+    def moved(self) -> Float:
+        """Positions (n, d) of the nodes, mm."""
+        return self.mesh.points + self.displacement
+
+    @property
+    def lines(self) -> Marks:
+        """Labels of the gauges and their lines (3, d), mm."""
+        return [(mark.label, mark.of(self.moved)) for mark in self.marks]
+
+
+def draw_fingers(
+    fingers: Sequence[DeformedFinger], window: tuple[int, int] = WINDOW, arrows: bool = True
+) -> tuple[list[Figure], str]:
+    """Return figures of one finger at several steps, with one camera and one scale of pressure, and their renderer.
+
+    Parameters
+    ----------
+    fingers : the steps
+    window : width and height of rendered solids, in pixels
+    arrows : whether friction on solids is drawn
+
+    Returns
+    -------
+    figures : one for each step
+    renderer : ``pyvista`` or ``matplotlib``
+    """
+    highest = highest_of(np.concatenate([finger.pressure for finger in fingers]))
+    if fingers[0].mesh.dim == 2:
+        return _sections(fingers, highest), "matplotlib"
+    return _solids(fingers, highest, window, arrows)
+
+
+def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]:
+    """Draw a 2D model, with the pressure and the status along the faces that may touch."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+
+    mesh = fingers[0].mesh
+    everywhere = np.concatenate([mesh.points, *(finger.moved for finger in fingers)])
+    low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
+    rest, figures = outline_of(mesh, mesh.points), []
+    for finger in fingers:
+        halves, pressure, status = _coloured_halves(finger)
+        figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
+        paths = [draw(mesh, finger.moved) for draw in (outline_of, edges_of, interfaces_of)]
+        lines = [(paths[0], BODY, LINE, 0.5), (paths[1], "none", LINE, 0.25), (paths[2], "none", FEATURE, 0.9)]
+        for axes, colours in zip(panels, (pressure_colours(pressure, highest, status), palette()[status]), strict=True):
+            for path, face, edge, width in lines:
+                axes.add_artist(PathPatch(path, facecolor=face, edgecolor=edge, lw=width))
+            axes.add_artist(PathPatch(rest, facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
+            if finger.thing is not None:
+                axes.add_collection(LineCollection(list(sliced(finger.thing)), colors=OBJECT, lw=1.2, zorder=2))
+            axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+            axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
+            axes.set_xlabel("x (mm)", labelpad=1)
+            axes.spines[["top", "right"]].set_visible(False)
+        panels[0].set_ylabel("y (mm)")
+        draw_marks(panels[0], finger.lines)
+        keys(figure, highest, {"finger at rest": REST} | ({} if finger.thing is None else {"object": OBJECT}))
+        figures.append(figure)
+    return figures
+
+
+def _coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
+    """Return both halves (h, 2, 2) of every facet that may touch, the mean pressure (h,) and the status (h,) of each.
+
+    The status is that of the half's end.
+    """
+    mesh, moved = finger.mesh, finger.moved
+    halves, pressure, status = [], [], []
+    for k in np.union1d(finger.faces, CONTACT):
+        arc, own = mesh.facets.get(FREE_FACES[k], mesh.facets["contact"][:0]), finger.faces == k
+        value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
+        value[finger.nodes[own]], state[finger.nodes[own]] = finger.pressure[own], finger.status[own]
+        middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
+        pairs = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2)
+        halves.append(pairs.reshape(-1, 2, 2))
+        pressure.append((0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel())
+        status.append(state[arc[:, :2]].ravel())
+    return np.concatenate(halves), np.concatenate(pressure), np.concatenate(status)
+
+
+def _solids(
+    fingers: Sequence[DeformedFinger], highest: float, window: tuple[int, int], arrows: bool
+) -> tuple[list[Figure], str]:
+    """Draw a solid; without a renderer by matplotlib."""
+    skins = [skin_of(f.mesh, f.displacement, f.pressure, f.shear, f.status, f.nodes, f.faces, f.thing) for f in fingers]
+    pictures = []
+    for skin in skins:
+        by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
+        pictures += [
+            (skin, pressure_colours(skin.pressure, highest, skin.status[:, None]), False),
+            (skin, by_status, arrows),
+        ]
+    images, extent = render_solids(pictures, window) or (None, None)
+    seen = np.concatenate([flat(skin.points) for skin in skins])
+    low, span = seen.min(axis=0), np.ptp(seen, axis=0)
+    aspect = float(span[1] / span[0]) if images is None else images[0].shape[0] / images[0].shape[1]
+    figures = []
+    for k, (finger, skin) in enumerate(zip(fingers, skins, strict=True)):
+        figure, panels = two_panels(aspect, finger.title)
+        for number, axes in enumerate(panels, start=2 * k):
+            if images is not None:
+                axes.imshow(images[number], interpolation="antialiased", extent=extent)
+            else:
+                draw_solid(axes, *pictures[number])
+                axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
+            axes.set_axis_off()
+        draw_marks(panels[0], [(label, flat(line)) for label, line in finger.lines])
+        if finger.marks:
+            panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
+        if arrows and skin.largest_shear > 0.0:
+            text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
+            panels[1].set_title(text, fontsize=11)
+        keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
+        figures.append(figure)
+    return figures, "matplotlib" if images is None else "pyvista"

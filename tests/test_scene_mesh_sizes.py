@@ -1,0 +1,54 @@
+"""Edge lengths that a scene leaves open: chosen from the finger's height and the overlap of a curved object."""
+
+from __future__ import annotations
+
+import pytest
+
+from finger3d.scene import parse
+from tests.scene_tables import FINGER, HEIGHT, SMALL
+
+
+@pytest.mark.parametrize(("domain", "share"), [("solid", 1.0), ("plane-strain", 0.25), ("plane-stress", 0.25)])
+def test_absent_mesh_sizes_are_chosen_from_the_height(domain, share) -> None:
+    mesh = parse({**SMALL, "model": {"domain": domain}}).model().mesh
+    assert mesh.size_mm == pytest.approx(share * HEIGHT / 25, rel=1e-3)
+    assert mesh.base_size_mm == pytest.approx(share * HEIGHT / 6.25, rel=1e-3)
+
+
+@pytest.mark.parametrize("given_size", [{"size_mm": 10.0}, {"base_size_mm": 1.0}])
+def test_a_chosen_size_never_contradicts_a_given_one(given_size) -> None:
+    mesh = parse({**SMALL, "mesh": given_size}).model().mesh
+    assert mesh.size_mm <= mesh.base_size_mm
+    assert {k: getattr(mesh, k) for k in given_size} == given_size
+
+
+def test_a_thin_finger_gets_two_elements_across() -> None:
+    thin = parse({**SMALL, "finger": {**FINGER, "width_mm": 1.0}})
+    assert thin.model().mesh.size_mm == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("thing", "size"),
+    [
+        ({"shape": "plane", "tilt_deg": 0.0}, 0.4),
+        ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 600**0.5),  # sqrt(d (2 R - d)) each way, 600 points
+        ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, 2 * 2.78388 / 30),
+        ({"shape": "cylinder", "radius_mm": 100.0, "axis": "x"}, 4.0 / 12.0),  # as wide as the finger, no end inside
+        (
+            {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
+            4.0 / 12.0,
+        ),  # finer would be more than 600 points
+        ({"shape": "sphere", "radius_mm": 0.4}, 0.2 * 0.4),  # the finest
+    ],
+)
+def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> None:
+    tables = {
+        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 4.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3},
+        "press": {"depth_mm": 0.5},
+        "object": thing,
+    }
+    wide = thing["shape"] in ("sphere", "plane")
+    tables["finger"]["width_mm"] = 20.0 if wide else 4.0
+    # the overlap is found on a grid of a hundredth of the finger
+    assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)
