@@ -22,22 +22,6 @@ from numpy.typing import ArrayLike
 from finger3d._types import Array
 from finger3d.errors import Finger3dError, MissingError
 
-MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
-"""The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
-
-AREAS = ("contact_area_mm2", "stick_area_mm2")
-"""Those that get an error bar besides."""
-
-RESULTANTS = {
-    2: ("force_x_N", "force_y_N", "moment_z_Nmm", "tangential_force_x_N", "outward_friction_x_N"),
-    3: (
-        *(f"force_{axis}_N" for axis in "xyz"),
-        *(f"moment_{axis}_Nmm" for axis in "xyz"),
-        *(f"{name}_{axis}_N" for axis in "xz" for name in ("tangential_force", "outward_friction")),
-    ),
-}
-"""Components of force, moment and friction by dimension; they get an error bar, too."""
-
 
 def cannot_write(path: Path, error: OSError) -> Finger3dError:
     """Return the error of a file that cannot be written: a full disk is nobody's mistake in the input."""

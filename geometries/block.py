@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from finger3d._ranges import Dimension, Zero
-from finger3d.geometry.design import ExtrudedDesign
-from finger3d.geometry.rules import check_layer
+from finger3d.geometry.design import ExtrudedDesign, check_layer
 from finger3d.geometry.section import Section, block_section, with_layer
 
 

@@ -13,7 +13,7 @@ from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Outcome
-from finger3d.io import RESULTANTS
+from finger3d.mechanics.columns import RESULTANTS
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem

@@ -12,6 +12,7 @@ import pytest
 
 from finger3d.accuracy.cost import AddedCost, forecast
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -20,7 +21,6 @@ from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import Plane, Sphere
 from finger3d.scene import load
-from finger3d.scene.registry import effect_names, effect_type
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "elastic_object": {"E_MPa": 2.0, "nu": 0.4},

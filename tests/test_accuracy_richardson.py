@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
+from finger3d.mechanics.columns import strain_columns
 
 
 def test_the_order_is_that_of_the_corners_of_the_base() -> None:
@@ -23,7 +24,9 @@ def test_an_error_of_the_assumed_order_is_found_exactly() -> None:
     exact, scale = 7.0, 0.3
     fine, coarse = ({"normal_force_N": exact + scale * h**ORDER, "gauge_g": 0.0} for h in (1.0, 2.0))
     # the grain is so fine that its floor, 0.1 * share^2 of the force, lies far below
-    found = mesh_error(fine, coarse, 2.0, (PointResolution(1e-3, 1e-3), PointResolution(2e-3, 2e-3)))
+    found = mesh_error(
+        fine, coarse, 2.0, (PointResolution(1e-3, 1e-3), PointResolution(2e-3, 2e-3)), strain_columns("g")
+    )
     assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
 
 

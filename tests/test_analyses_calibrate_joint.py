@@ -66,7 +66,7 @@ def test_a_tilt_is_that_of_tilted_presses(joint: Calibration) -> None:
     for sign in (1.0, -1.0):
         tilted = replace(model, object=replace(model.object, tilt=sign * np.radians(0.5)), symmetry=())
         *_, last = march(build(replace(tilted, friction=tilted.friction.with_mu(0.6))))
-        change[sign] = last.readings
+        change[sign] = last.named_readings
     for one in joint.readings:
         expected = 0.5 * (change[1.0][one.name] - change[-1.0][one.name])
         found = 0.5 * tolerance(one, "tilt_deg").slope[list(FEW).index(0.6)]

@@ -14,7 +14,7 @@ from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import Candidates, Region, objectives, search
 from finger3d.errors import Finger3dError
 from finger3d.progress import QUIET
-from finger3d.sensor.information import ReadingEffects, prior
+from finger3d.sensor.likelihood import ReadingEffects, prior
 from tests.sensor_cases import scene
 
 MUS = (0.1, 0.25, 0.4, 0.55, 0.7)

@@ -21,7 +21,7 @@ EXAMPLES = (
     "finger3d.analyses.result",
     "finger3d.mechanics.step_halving",
     "finger3d.mold.export",
-    "finger3d.results.format",
+    "finger3d.accuracy.error_bars",
     "finger3d.results.states",
 )
 COMMANDS = ("press", "compare", "calibrate", "estimate", "identify", "sweep", "optimise", "export", "plan")

@@ -44,7 +44,7 @@ def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, c
     fake_press.end = Outcome.NO_CONVERGENCE
     assert run("press", scene, "--out", tmp_path / "out") == 3
     out, err = capsys.readouterr()
-    assert "5 mm, step 1 " in out  # the numbers of the step that converged
+    assert "5 mm, increment 1 " in out  # the numbers of the one that converged
     assert len(err.splitlines()) == 1
     assert str(Outcome.NO_CONVERGENCE) in err
     assert "1 of 2 increments" in err

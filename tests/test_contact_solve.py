@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
-from finger3d.contact.maeno import maeno_active_set
 from finger3d.contact.newton import uniqueness
+from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome

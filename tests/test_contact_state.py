@@ -9,7 +9,7 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.state import ContactState, next_state, pressure
-from finger3d.fem.directions import bases_of
+from finger3d.fem.tensors import bases_of
 
 
 def test_slip_adds_up_while_a_point_touches_and_displacement_always() -> None:

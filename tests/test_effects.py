@@ -5,13 +5,16 @@ from __future__ import annotations
 import itertools
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import finger3d.effects
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import effect_names, effect_type, fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -19,7 +22,9 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
-from finger3d.scene.registry import effect_names, effect_type
+from finger3d.scene import parse
+from tests.models import block
+from tests.scene_tables import SMALL
 
 TYPICAL: dict[str, dict[str, Any]] = {
     "elastic_object": {"E_MPa": 2.0, "nu": 0.4},
@@ -103,7 +108,7 @@ def test_an_absent_effect_is_not_imported() -> None:
     code = (
         "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); import finger3d.mechanics.build; "
         "import finger3d.mechanics.solve; mine = 'viscoelastic', 'elastic_object', 'foils', 'finite_strain'; "
-        "print([m for m in sys.modules if m.startswith('finger3d.effects.') and m != 'finger3d.effects.base' "
+        "print([m for m in sys.modules if m.startswith('finger3d.effects.') "
         "or m.startswith('finger3d.mechanics.') and m.endswith(mine)])"
     )
     done = subprocess.run(
@@ -123,7 +128,7 @@ def test_only_the_effects_a_scene_names_are_imported(name: str, tmp_path: Any) -
     )
     scene, table = "geometries/fig9.toml", "{" + settings + "}"
     done = subprocess.run([sys.executable, "-c", code, scene, name, table], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == f"['finger3d.effects.base', 'finger3d.effects.{name}']"
+    assert done.stdout.strip() == f"['finger3d.effects.{name}']"
 
 
 def test_an_absent_effect_adds_no_factorisation() -> None:
@@ -134,3 +139,78 @@ def test_an_absent_effect_adds_no_factorisation() -> None:
         workspace = formulation_of(problem.model).workspace()
         list(march(problem, workspace=workspace))
         assert problem.factorizations + workspace.factorizations == count, name
+
+
+def test_a_slot_is_filled_once_and_both_effects_are_named_otherwise() -> None:
+    model = fill(block(), "friction", Coulomb(0.7), "wet")
+    assert model.friction == Coulomb(0.7)
+    assert dict(model.filled) == {"friction": "wet"}
+    with pytest.raises(Finger3dError, match="wet and dry "):
+        fill(model, "friction", Coulomb(0.1), "dry")
+    assert fill(model, "held_ends", True, "dry").filled == (("friction", "wet"), ("held_ends", "dry"))
+
+
+def test_a_warning_is_kept_once() -> None:
+    assert warn(warn(warn(block(), "b"), "a"), "b").warnings == ("a", "b")
+
+
+STIFFER = """
+from dataclasses import dataclass, replace
+from typing import Annotated
+from annotated_types import Gt
+from finger3d.errors import Finger3dError
+
+@dataclass(frozen=True)
+class Effect:
+    factor: Annotated[float, Gt(0)]
+    prony: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self):
+        if self.factor > 100:
+            raise Finger3dError(f"factor = {self.factor:g} is too large; allowed: at most 100")
+
+    def apply(self, model):
+        return replace(model, material=replace(model.material, E_MPa=model.material.E_MPa * self.factor))
+"""
+
+
+@pytest.fixture
+def stiffer(tmp_path, monkeypatch):
+    """An effect that only this test knows, as a file beside the real ones."""
+    (tmp_path / "stiffer.py").write_text(STIFFER, encoding="utf-8")
+    monkeypatch.setattr(finger3d.effects, "__path__", [*finger3d.effects.__path__, str(tmp_path)])
+    yield "finger3d.effects.stiffer"
+    sys.modules.pop("finger3d.effects.stiffer", None)
+
+
+def test_a_present_effect_fills_its_slot_and_an_absent_one_is_not_imported(stiffer) -> None:
+    assert parse(SMALL).model().material.E_MPa == 1.0
+    assert stiffer not in sys.modules
+    scene = parse({**SMALL, "effects": {"stiffer": {"factor": 3.0, "prony": [[0.3, 0.5]]}}})
+    assert scene.model().material.E_MPa == 3.0
+    assert scene.as_dict()["effects"] == {"stiffer": {"factor": 3.0, "prony": [[0.3, 0.5]]}}
+    assert parse(tomllib.loads(scene.to_toml())) == scene
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ({"stifer": {}}, r'effects\.stifer: .*"stiffer"'),
+        ({"stiffer": {}}, r"effects\.stiffer\.factor .* 0 .* 1e12"),
+        ({"stiffer": {"factor": -1.0}}, r"effects\.stiffer\.factor = -1\.0: .* 0"),
+        (
+            {"stiffer": {"factor": 1.0, "facter": 1}},
+            r'effects\.stiffer\.facter = 1: .*"factor"',
+        ),
+        (
+            {"stiffer": {"factor": 1.0, "prony": [[0.3]]}},
+            r"prony = \[\[0\.3\]\]: ",
+        ),
+        ({"stiffer": {"factor": 101.0}}, r"effects\.stiffer: factor = 101 "),
+        ({"stiffer": True}, r"effects\.stiffer = true: .*\[effects\.stiffer\]"),
+        ({"base": {}}, r"effects\.base: "),
+    ],
+)
+def test_mistakes_in_an_effect(stiffer, effects, message) -> None:
+    with pytest.raises(Finger3dError, match=message):
+        parse({**SMALL, "effects": effects})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finger3d.contact.state import ContactState
-from finger3d.fem.directions import bases_of, rotated_delassus
+from finger3d.fem.tensors import bases_of, rotated_delassus
 from finger3d.mechanics.build import build
 from finger3d.mechanics.linear_contact import LinearBody, carried_by_object, transported
 from finger3d.mechanics.model import MeshOptions

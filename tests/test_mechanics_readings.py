@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -20,8 +19,9 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.material import Isotropic
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import displacement_row
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, flat_readings, measure
+from finger3d.mechanics.history import StepResult, measure, table_row
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.readings import Marker, MeshedBody, Taxel
@@ -151,10 +151,9 @@ class Elongation:
     name: str
     low: Marker
     high: Marker
-    kind: ClassVar[str] = "elongation"
 
-    def columns(self, dim: int) -> tuple[str, ...]:
-        return (self.name,)
+    def columns(self, dim: int) -> tuple[Column, ...]:
+        return (Column(self.name, "elongation"),)
 
     def mirrored(self, name: str) -> tuple[Elongation, tuple[float, ...]]:
         return replace(self, name=name, low=self.low.mirrored("")[0], high=self.high.mirrored("")[0]), (1.0,)
@@ -176,12 +175,13 @@ def test_a_reading_of_another_kind_needs_a_class_and_nothing_else(effect: object
     problem, frames = run(effect.apply(model) if effect else model)
     low, high = (np.array(frames[-1].markers[m.name]) + m.place for m in ends)
     along = high[1] - low[1] if not isinstance(effect, LargeDeformation) else np.linalg.norm(high - low)
-    assert frames[-1].other_readings["wire"] == pytest.approx(along - 1.2, rel=1e-9)
+    read = frames[-1].readings[Column("wire", "elongation")]
+    assert read == pytest.approx(along - 1.2, rel=1e-9)
     entry = measure(problem.points, frames[-1])
-    assert entry["other_readings"] == frames[-1].other_readings
-    assert flat_readings(entry)["reading_wire"] == frames[-1].readings["wire"]
+    assert entry["other_readings"] == {"wire": read}
+    assert table_row(problem.points, frames[-1])["reading_wire"] == read
     (step,) = steps_of({"steps": [entry]})
-    assert step.other_readings == {"wire": frames[-1].readings["wire"]}
+    assert step.other_readings == {"wire": read}
     if effect is None:
         bar = adjoint_bars(problem, frames).bars["reading_wire"]
-        assert 0.0 < bar < abs(frames[-1].other_readings["wire"])
+        assert 0.0 < bar < abs(read)

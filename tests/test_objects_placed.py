@@ -11,7 +11,9 @@ from scipy.spatial import KDTree
 
 from finger3d.objects import (
     Cylinder,
+    DistanceTracker,
     MeshObject,
+    Move,
     ObjectPose,
     PlacedObject,
     Plane,
@@ -116,3 +118,18 @@ def test_mirrors_of_an_object_in_its_pose() -> None:
     assert mirrors(Sphere(radius_mm=5.0, turn_x=0.3, turn_y=1.0)) == ("x", "z")
     assert mirrors(Wave(2.5, wavelength_mm=5.0, amplitude_mm=0.3)) == ("x", "z")  # half a wavelength
     assert mirrors(Wedge(angle=0.4, turn_z=0.1)) == ("z",)
+
+
+@pytest.mark.parametrize("within", [0.05, np.inf])
+def test_tracked_distances_are_exact_where_they_are_small(within: float) -> None:
+    obj = MeshObject(surface=ball(2.0))
+    tracker, at = DistanceTracker(), random_points(200) - [0.0, 1.0, 0.0]
+    last = ObjectPose(0.8, 0.5, 0.2, turn_y=0.3)
+    for share in np.linspace(0.0, 1.0, 12):
+        placed = PlacedObject.of(obj, 0.0, Move(ObjectPose(0.0), last).at(float(share)))
+        value, gradient = tracker.distance(placed, at, within)
+        exact, normal = placed.distance(at)
+        near = exact < within
+        assert value[near] == pytest.approx(exact[near], abs=1e-12)
+        assert gradient[near] == pytest.approx(normal[near], abs=1e-12)
+        assert (value[~near] > min(within, exact[~near].min(initial=np.inf)) - 1e-12).all()

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import spsolve
 from finger3d._types import Float
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import effect_type
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.material import RIGID_RATIO, Isotropic
@@ -22,7 +23,6 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Taxel
-from finger3d.scene.registry import effect_type
 from tests.meshes import edge_load, full, grid
 from tests.models import last, marched
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Outcome
+from finger3d.mechanics.columns import strain_columns
 from finger3d.mechanics.model import Gauge
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison
@@ -52,7 +53,16 @@ def comparison(path: Path) -> None:
     x = np.linspace(-20.0, 20.0, 9)
     line = {"x_mm": x, "pressure_MPa": 0.1 - 2e-4 * x**2, "shear_x_MPa": 1e-4 * x}
     cases = [
-        Case(model, 20.0, 2.0, "swept", Outcome.CONVERGED, dict.fromkeys(names, 30.0), lines={"z = 0": line})
+        Case(
+            model,
+            20.0,
+            2.0,
+            "swept",
+            Outcome.CONVERGED,
+            dict.fromkeys(names, 30.0),
+            lines={"z = 0": line},
+            strains=[strain_columns(name)[0] for name in ("g36", "g40")],
+        )  # fmt: skip
         for model in ("plane strain", "plane stress", "solid")
     ]
     draw_comparison(path, cases, 20.0, "Fig. 9 finger, 20 mm wide")
@@ -75,7 +85,7 @@ def sweep(path: Path) -> None:
          "normal_force_N": str(1000.0 * a * b * c), "gauge_g36": str(1000.0 * a * b * c - 9e3)}
         for a, b, c in product([0.06, 0.25, 1.0], [0.3, 0.45, 0.49], [5.0, 10.0, 15.0])
     ]  # fmt: skip
-    draw_sweep(path, sweep_charts(rows, keys))
+    draw_sweep(path, sweep_charts(rows, keys, strain_columns("g36")[:1]))
 
 
 def search(path: Path) -> None:

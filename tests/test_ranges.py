@@ -12,13 +12,13 @@ import pytest
 
 from finger3d._ranges import Modulus, at_least, at_most
 from finger3d.cli import main
+from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
 from finger3d.objects import OBJECTS
 from finger3d.scene import parse
-from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     FrictionTable,
     GaugeTable,

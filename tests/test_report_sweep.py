@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from finger3d.mechanics.columns import strain_columns
 from finger3d.report.chart import Line
 from finger3d.report.sweep import sweep_charts
 
@@ -34,9 +35,10 @@ def test_a_key_of_texts_names_lines_and_is_no_axis() -> None:
 
 
 def test_of_many_keys_gauges_and_settings_the_first_are_drawn_and_the_rest_is_counted() -> None:
-    gauges = {f"gauge_g{i}": "0.01" for i in range(5)}
+    strains = [strain_columns(f"g{i}")[0] for i in range(5)]
+    gauges = {column.key: "0.01" for column in strains}
     rows = [row(str(0.1 * i), str(j), "1.0", a=str(i), b=str(j), **gauges) for i in range(2) for j in range(12)]
-    charts = sweep_charts(rows, ["friction.mu", "press.depth_mm", "a", "b"])
+    charts = sweep_charts(rows, ["friction.mu", "press.depth_mm", "a", "b"], strains)
     assert [chart.x for chart in charts] == ["friction.mu", "press.depth_mm", "a"] * 3
     assert {chart.y for chart in charts} == {"normal force (N)", "strain, g0", "strain, g1"}
     assert [(len(chart.lines), chart.more) for chart in charts] == [(8, 24 - 8)] * 9

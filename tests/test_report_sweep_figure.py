@@ -17,7 +17,7 @@ ROWS = (
 
 
 def folder_with(path: Path, rows: str, keys: list[str]) -> Path:
-    (path / "sweep.json").write_text(json.dumps({"vary": {key: [] for key in keys}}), encoding="utf-8")
+    (path / "sweep.json").write_text(json.dumps({"scene": {}, "vary": {key: [] for key in keys}}), encoding="utf-8")
     (path / "results.csv").write_text(rows, encoding="utf-8")
     return path
 

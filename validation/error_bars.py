@@ -26,8 +26,8 @@ import numpy as np
 
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.contact.friction import Coulomb
-from finger3d.io import AREAS, MAIN
 from finger3d.mechanics.build import build
+from finger3d.mechanics.columns import AREAS, MAIN
 from finger3d.mechanics.coverage import check_surface
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model

@@ -18,7 +18,7 @@ from scipy import sparse
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
 from finger3d.contact.law import ContactLaw
-from finger3d.contact.maeno import maeno_active_set
+from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness

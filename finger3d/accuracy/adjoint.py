@@ -31,7 +31,8 @@ from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
-from finger3d.fem.directions import rotated_delassus
+from finger3d.fem.tensors import rotated_delassus
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.linear_contact import transported
@@ -51,12 +52,15 @@ class Goal:
         Derivative by the displacements of the contact points at the end of each increment, per mm.
     row : int or None
         Number of the reading row that gives the number itself, for a reading.
+    column : Column or None
+        Column of the reading.
     """
 
     name: str
     by_force: Float
     by_displacement: Float
     row: int | None = None
+    column: Column | None = None
 
 
 @dataclass(frozen=True)
@@ -175,8 +179,8 @@ def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
     ]
     rows = problem.system.reading_rows
     return found + [
-        Goal(name=name, by_force=_at_end(zero, row), by_displacement=zero, row=k)
-        for k, (name, row) in enumerate(zip(_reading_columns(problem), rows, strict=True))
+        Goal(name=column.key, by_force=_at_end(zero, row), by_displacement=zero, row=k, column=column)
+        for k, (column, row) in enumerate(zip(problem.model.columns, rows, strict=True))
     ]
 
 
@@ -215,22 +219,6 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
             found[f"moment_{'xyz'[k]}_Nmm"] = lever @ vertical_frame(d).T
     moves = np.isin(np.arange(c * d), problem.system.active_dofs).reshape(c, d)  # none across a plane of symmetry
     return {name: np.where(moves, gradient, 0.0) for name, gradient in found.items()}
-
-
-def _reading_columns(problem: Problem) -> list[str]:
-    """Return the names of readings as in `finger3d.mechanics.history.flat_readings`, in the order of their rows."""
-    columns = []
-    for reading in problem.model.readings:
-        for column in reading.columns(problem.dim):
-            axis = column.rpartition(".")[2]
-            columns.append(
-                {
-                    "gauge": f"gauge_{reading.name}",
-                    "marker": f"marker_{reading.name}_{axis}_mm",
-                    "taxel": f"taxel_{reading.name}_MPa",
-                }.get(reading.kind, f"reading_{column}")
-            )
-    return columns
 
 
 def _states(problem: Problem, steps: Sequence[StepResult]) -> list[ContactState]:

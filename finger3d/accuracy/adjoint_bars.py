@@ -20,12 +20,12 @@ import numpy as np
 
 from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, Quantity, largest_readings
+from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, kinds_of, largest_readings
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
-from finger3d.io import RESULTANTS
-from finger3d.mechanics.history import StepResult, flat_readings, measure
+from finger3d.mechanics.columns import RESULTANTS, by_key, pressure_column
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
@@ -86,6 +86,7 @@ class AdjointBars:
     parts : of forces, energies and readings, the errors that the body's mesh and the contact discretisation cause
     body : signed errors that the mesh of the body causes, and the shares of its cells
     coarse : the press with every second multiplier
+    kinds : of the numbers
     contact_half_length_mm : of the last increment
     """
 
@@ -93,17 +94,16 @@ class AdjointBars:
     parts: Mapping[str, tuple[float, float]]
     body: BodyErrors
     coarse: Problem
+    kinds: Mapping[str, Kind]
     contact_half_length_mm: float
 
-    @staticmethod
-    def body_share(name: str, dim: int) -> float:
+    def body_share(self, name: str, dim: int) -> float:
         """Return the error of the body's mesh over its estimate, without the cells around a gauge."""
-        return _SHARES[Quantity.of(name).kind].body[dim - 2]
+        return _SHARES[self.kinds[name]].body[dim - 2]
 
-    @staticmethod
-    def contact_order(name: str) -> int:
+    def contact_order(self, name: str) -> int:
         """Return the order in the edge length at the contact of the contact discretisation's error of a number."""
-        return _SHARES[Quantity.of(name).kind].power
+        return _SHARES[self.kinds[name]].power
 
 
 class NoAdjointBarsError(Finger3dError):
@@ -156,10 +156,11 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
             for name, value in _numbers(press, end).items():
                 changes[name].append(abs(value - numbers[name]))
     resolution = PointResolution.of(problem, steps[-1])
-    scales = largest_readings(numbers)
+    kinds = kinds_of(few[-1].readings)
+    scales = largest_readings(numbers, kinds)
     parts = {}
     for name, value in numbers.items():
-        kind = Quantity.of(name).kind
+        kind = kinds[name]
         shares = _SHARES[kind]
         # contact does not end within the width, so that the normal force does not depend on the spacing along z
         spacing = resolution.along if kind in (Kind.NORMAL_FORCE, Kind.WORK) else resolution.share
@@ -177,7 +178,7 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
     unresolved = UNRESOLVED_DISSIPATION * resolution.share * abs(numbers["external_work_mJ"])
     bars["dissipation_mJ"] = math.hypot(bars["dissipation_mJ"], unresolved)
     reach = measure(problem.points, steps[-1])["contact_half_length_mm"]
-    return AdjointBars(bars | resolution.zone_bars, parts, body, presses[0], float(reach))
+    return AdjointBars(bars | resolution.zone_bars, parts, body, presses[0], kinds, float(reach))
 
 
 def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
@@ -187,8 +188,8 @@ def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
         return []
     corners = mesh.points[mesh.facets["base"][:, :3]]
     edge = float(np.median(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)))
-    taxels = problem.model.taxels
-    return [(f"taxel_{t.name}_MPa", _BASE_SHARE * edge / min(t.length_mm, t.width_mm or t.length_mm)) for t in taxels]
+    sides = {t.name: min(t.length_mm, t.width_mm or t.length_mm) for t in problem.model.taxels}
+    return [(pressure_column(name).key, _BASE_SHARE * edge / side) for name, side in sides.items()]
 
 
 def short_press(problem: Problem, runs: Sequence[Run] = ()) -> tuple[Problem, Sequence[StepResult]]:
@@ -215,7 +216,5 @@ def _with_few_increments(
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     """Return forces, energies and readings by name."""
     numbers = measure(problem.points, step)
-    readings = flat_readings(numbers)
-    across = {f"marker_{name}_z_mm" for name in step.markers} if problem.dim == 2 else set()  # zero, without an error
     main = ("normal_force_N", "friction_sum_N", *RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ")
-    return {name: float(numbers[name]) for name in main} | {k: v for k, v in readings.items() if k not in across}
+    return {name: float(numbers[name]) for name in main} | by_key(step.readings)

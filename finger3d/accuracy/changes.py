@@ -13,9 +13,13 @@ import numpy as np
 from finger3d._types import Tree
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.columns import by_key, of_kind
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
+
+FORCES = ("normal_force_N", "friction_sum_N")
+"""Forces whose changes are estimated, beside the strains of all gauges."""
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
@@ -108,8 +112,14 @@ def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     Areas of contact and stick are not among them: the distance of the points hides their changes.
     """
     measured = measure(problem.points, step)
-    forces = {name: float(measured[name]) for name in ("normal_force_N", "friction_sum_N")}
-    return forces | {f"gauge_{name}": float(strain) for name, strain in measured["gauges"].items()}
+    strains = {column: step.readings[column] for column in of_kind(step.readings, "gauge")}
+    return {name: float(measured[name]) for name in FORCES} | by_key(strains)
+
+
+def scales(values: Mapping[str, float]) -> dict[str, float]:
+    """Return what a change of each number is relative to: a force to itself, a strain to the largest of all gauges."""
+    largest = max((abs(x) for name, x in values.items() if name not in FORCES), default=0.0)
+    return {name: abs(x) if name in FORCES else largest for name, x in values.items()}
 
 
 def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, Change]:
@@ -120,13 +130,11 @@ def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Ma
     values : numbers of the press by name, as `changing_numbers` returns them
     changes, errors : estimated change of each, and half-width of its interval
     """
-    strains = max((abs(x) for name, x in values.items() if name.startswith("gauge_")), default=0.0)
-    out = {}
+    out, scale = {}, scales(values)
     for name, value in values.items():
         change, error = changes[name], errors[name]
         if all(map(math.isfinite, (value, change, error))):
-            scale = strains if name.startswith("gauge_") else abs(value)
-            significant = error <= _SURE * abs(change) and abs(change) >= _LEAST_CHANGE * scale > 0.0
+            significant = error <= _SURE * abs(change) and abs(change) >= _LEAST_CHANGE * scale[name] > 0.0
             out[name] = Change(value, change, error, significant)
     return out
 

@@ -21,8 +21,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import axis_numbers
+from finger3d.fem.tensors import bases_of
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.contact_geometry import ContactGeometry
 from finger3d.mechanics.history import StepResult

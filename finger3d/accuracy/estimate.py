@@ -26,8 +26,8 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
-from finger3d.io import AREAS, MAIN, RESULTANTS
-from finger3d.mechanics.history import StepResult, flat_readings, measure
+from finger3d.mechanics.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import (
@@ -71,53 +71,53 @@ class ErrorEstimate(ErrorBars):
         return super().as_dict() | ({"signed": dict(self.body.signed)} if self.body else {})
 
 
-def main_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
+def main_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     """Return forces, lengths and areas of contact and stick, and readings, by name."""
-    numbers = measure(problem.points, frame)
-    across = {f"marker_{name}_z_mm" for name in frame.markers} if problem.dim == 2 else set()  # zero, without an error
-    readings = {name: value for name, value in flat_readings(numbers).items() if name not in across}
-    return {name: numbers[name] for name in (*MAIN, *AREAS)} | readings
+    numbers = measure(problem.points, step)
+    return {name: numbers[name] for name in (*MAIN, *AREAS)} | by_key(step.readings)
 
 
-def press_numbers(problem: Problem, frame: StepResult) -> dict[str, float]:
+def press_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     """Return the numbers of a press that have an error bar: the main numbers, resultants and both energies.
 
     Under a prescribed force the depth is one of them.
     """
-    measured = measure(problem.points, frame)
+    measured = measure(problem.points, step)
     others = (*RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ", "contact_half_length_end_mm")
-    numbers = main_numbers(problem, frame) | {name: float(measured[name]) for name in others if name in measured}
-    return {"depth_mm": frame.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
+    numbers = main_numbers(problem, step) | {name: float(measured[name]) for name in others if name in measured}
+    return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
 def compared(
-    problem: Problem, frame: StepResult, beside: Problem, last: StepResult, numbers: Measure = main_numbers
+    problem: Problem, step: StepResult, beside: Problem, last: StepResult, numbers: Measure = main_numbers
 ) -> dict[str, float]:
     """Return the discretisation error by name, from an increment of a problem and one of its companion."""
-    resolutions = PointResolution.of(problem, frame), PointResolution.of(beside, last)
-    return mesh_error(numbers(problem, frame), numbers(beside, last), edge_ratio(problem, beside), resolutions)
+    resolutions = PointResolution.of(problem, step), PointResolution.of(beside, last)
+    ratio, columns = edge_ratio(problem, beside), in_space(step.readings)
+    return mesh_error(numbers(problem, step), numbers(beside, last), ratio, resolutions, columns)
 
 
 def reading_error(
-    problem: Problem, frame: StepResult, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge"
+    problem: Problem, step: StepResult, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge"
 ) -> Float:
     """Return the discretisation error (m,) of a reading at several coefficients of friction.
 
     Parameters
     ----------
-    frame : last increment at any of the coefficients, for the resolution of the contact points
+    step : last increment at any of the coefficients, for the resolution of the contact points
     fine, coarse : (m,) readings of the problem and of its companion
     kind : of the reading: gauge, marker or taxel
     """
-    names = [f"{kind}_{k}" for k in range(len(fine))]
-    numbers, other = (dict(zip(names, map(float, reading), strict=True)) for reading in (fine, coarse))
-    found = mesh_error(numbers, other, edge_ratio(problem, beside), (PointResolution.of(problem, frame),) * 2)
-    return np.array([found.get(name, math.nan) for name in names])
+    columns = [Column(str(k), kind) for k in range(len(fine))]
+    numbers, other = (by_key(dict(zip(columns, map(float, reading), strict=True))) for reading in (fine, coarse))
+    resolutions = (PointResolution.of(problem, step),) * 2
+    found = mesh_error(numbers, other, edge_ratio(problem, beside), resolutions, columns)
+    return np.array([found.get(column.key, math.nan) for column in columns])
 
 
 def estimate(
     problem: Problem,
-    frames: Sequence[StepResult],
+    steps: Sequence[StepResult],
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
@@ -126,9 +126,9 @@ def estimate(
 
     Parameters
     ----------
-    problem, frames : the press as it was solved, all increments converged
+    problem, steps : the press as it was solved, all increments converged
     report : receives the messages
-    numbers : the numbers of an increment by name, names as in `finger3d.accuracy.richardson.Quantity.of`
+    numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
     runs : runs that chose automatic increments
 
     Returns
@@ -137,32 +137,33 @@ def estimate(
         If the part of the mesh or that of the increments fails, the other stays as it is, and `method` has the reason.
     """
     start = time.perf_counter()
-    if not frames or not frames[-1].outcome.ok:
+    if not steps or not steps[-1].outcome.ok:
         return ErrorEstimate(method="no estimate: the last step did not converge")
     automatic = len(runs) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
     used = runs if automatic else ()
     # from here on, automatic increments are numbers
-    own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(frames))))
+    own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
     beside, where = None, ""
     try:
-        found, beside, where = discretisation(own, frames, report, numbers, used)
+        found, beside, where = discretisation(own, steps, report, numbers, used)
     except _FAILURES as error:
         found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
     try:
-        steps, by = _of_increments(own, frames, beside, where, numbers, used)
+        increment_errors, by = _of_increments(own, steps, beside, where, numbers, used)
     except _FAILURES as error:
-        steps, by = {}, f"no estimate: {_reason(error)}"
+        increment_errors, by = {}, f"no estimate: {_reason(error)}"
     if own.model.ends_at_force:  # the normal force is given
         given = ("normal_force_N", "force_y_N")
         mesh = {name: error for name, error in found.discretisation.items() if name not in given}
         found = replace(found, discretisation=mesh)
-        steps = {name: error for name, error in steps.items() if name not in given}
-    return replace(found, steps=steps, method=f"{found.method}; steps: {by}", seconds=time.perf_counter() - start)
+        increment_errors = {name: error for name, error in increment_errors.items() if name not in given}
+    method, seconds = f"{found.method}; steps: {by}", time.perf_counter() - start
+    return replace(found, steps=increment_errors, method=method, seconds=seconds)
 
 
 def _of_increments(
     own: Problem,
-    frames: Sequence[StepResult],
+    steps: Sequence[StepResult],
     beside: Problem | None,
     where: str,
     numbers: Measure,
@@ -188,7 +189,7 @@ def _of_increments(
         if judged is None:
             continue
         try:
-            last = frames[-1] if on_own_mesh else last_step(judged)
+            last = steps[-1] if on_own_mesh else last_step(judged)
             errors = step_error(judged, numbers(judged, last), numbers, way)
         except _FAILURES as error:
             failure = failure or error
@@ -204,7 +205,7 @@ def _reason(error: Exception) -> str:
 
 def discretisation(
     own: Problem,
-    frames: Sequence[StepResult],
+    steps: Sequence[StepResult],
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
@@ -217,9 +218,9 @@ def discretisation(
     beside : a press that costs less than this one
     where : what that press differs in, in words
     """
-    bars = _own_bars(own, frames, runs) if numbers in (main_numbers, press_numbers) else None
+    bars = _own_bars(own, steps, runs) if numbers in (main_numbers, press_numbers) else None
     if bars is not None:
-        named = {name: bars.bars[name] for name in numbers(own, frames[-1])}
+        named = {name: bars.bars[name] for name in numbers(own, steps[-1])}
         method = "mesh: dual-weighted residuals, and every second multiplier"
         return (
             ErrorEstimate(discretisation=named, method=method, body=bars.body),
@@ -231,7 +232,7 @@ def discretisation(
     ratio = edge_ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"
     found = ErrorEstimate(
-        discretisation=compared(own, frames[-1], beside, last, numbers),
+        discretisation=compared(own, steps[-1], beside, last, numbers),
         method=_on_mesh(beside, kind),
         companion_numbers=numbers(beside, last),
         ratio=ratio,
@@ -239,10 +240,10 @@ def discretisation(
     return found, beside, f"on the {kind} mesh"
 
 
-def _own_bars(own: Problem, frames: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
+def _own_bars(own: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
     """Return the error bars from the condensed body itself; None where a companion mesh is needed."""
     try:
-        return adjoint_bars(own, frames, runs) if applies(own.model) else None
+        return adjoint_bars(own, steps, runs) if applies(own.model) else None
     except NoAdjointBarsError:
         return None
 

@@ -94,7 +94,9 @@ def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -
     shortest = min(1.0, contact, nearby) * options.size_mm / options.gauge_refinement
     largest = max(_LARGEST_REFINEMENT, options.gauge_refinement)
     graded = _options(problem, bars, grading, min(1.0, largest * shortest / options.size_mm))
-    names = options.refined_gauges if options.gauge_refinement > 1.0 else (goal.removeprefix("gauge_"),)
+    names = options.refined_gauges
+    if options.gauge_refinement == 1.0:
+        names = tuple(column.sensor for column in problem.model.columns if column.key == goal)
     return replace(graded, gauge_refinement=max(1.0, graded.size_mm / shortest), refined_gauges=names)
 
 

@@ -23,7 +23,7 @@ from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
 from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
 from finger3d.accuracy.cost import forecast
-from finger3d.effects.base import fill
+from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model

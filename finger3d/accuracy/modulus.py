@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from finger3d.mechanics.columns import QUANTITIES
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -50,7 +51,8 @@ def modulus_errors(
     model = problem.model
     if not spread or not steps or not model.stresses_scale_with_modulus:
         return {}
-    told = {name: x for name, x in numbers(problem, steps[-1]).items() if not name.startswith("reading_")}
+    others = {column.key for column in steps[-1].readings if column.kind not in QUANTITIES}
+    told = {name: x for name, x in numbers(problem, steps[-1]).items() if name not in others}
     if model.forces_scale_with_modulus:
         return {name: spread * abs(x) for name, x in told.items() if name.endswith(_STRESS_UNITS)}
     if not _is_press_to_force(model):

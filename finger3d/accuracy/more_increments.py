@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from finger3d._cost import CHANGES
-from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged, scales
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
@@ -37,11 +37,7 @@ def may_matter(numbers: Mapping[str, float], errors: Mapping[str, float]) -> boo
     numbers : numbers of a press by name, as `changing_numbers` returns them
     errors : error bars of the increments by name
     """
-    strains = max((abs(x) for name, x in numbers.items() if name.startswith("gauge_")), default=0.0)
-    return any(
-        errors.get(name, 0.0) > TOLERANCE * (strains if name.startswith("gauge_") else abs(x))
-        for name, x in numbers.items()
-    )
+    return any(errors.get(name, 0.0) > TOLERANCE * scale for name, scale in scales(numbers).items())
 
 
 @attempted

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK
-from finger3d.io import AREAS, MAIN
+from finger3d.mechanics.columns import AREAS, MAIN
 from finger3d.mechanics.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.zones import ERROR_AT_ENDS
@@ -53,33 +53,31 @@ class PointResolution:
         return {name: self.least[name] for name in names if name in self.least and not name.endswith("_N")}
 
     @classmethod
-    def of(cls, problem: Problem, frame: StepResult) -> PointResolution:
+    def of(cls, problem: Problem, step: StepResult) -> PointResolution:
         """Return the resolution of an increment; medians over the points in contact."""
-        points, reach = problem.points, measure(problem.points, frame)["contact_half_length_mm"]
+        points, reach = problem.points, measure(problem.points, step)["contact_half_length_mm"]
         has_friction = problem.model.friction.largest > 0.0
         half_width = points.half_width_mm
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
-            step = float(np.sqrt(np.median(points.area)))
-            along_z = _edge_length(points, frame.state.status != OPEN)
-            least = least_bars(points, frame, along_z)
-            share = _share(step, reach, step, half_width)
-            return cls(step, share, has_friction and reach <= step, least, _along(step, reach))
+            spacing = float(np.sqrt(np.median(points.area)))
+            along_z = _edge_length(points, step.state.status != OPEN)
+            least = least_bars(points, step, along_z)
+            share = _share(spacing, reach, spacing, half_width)
+            return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
         at = np.round(points.points, 9)
         line = np.unique(at[at[:, 2] == 0.0, 0])
-        near = line[np.abs(line - frame.lowest[0]) <= 1.2 * reach]
-        steps = np.diff(near if len(near) > 1 else line)
-        step = float(np.median(steps)) if len(steps) else problem.model.mesh.size_mm
+        near = line[np.abs(line - step.lowest[0]) <= 1.2 * reach]
+        spacings = np.diff(near if len(near) > 1 else line)
+        spacing = float(np.median(spacings)) if len(spacings) else problem.model.mesh.size_mm
         rows = np.diff(np.unique(at[:, 2]))
         along_z = float(np.median(rows)) if len(rows) else 0.0
-        share = _share(step, reach, along_z, half_width)
-        least = least_bars(points, frame, along_z)
+        share = _share(spacing, reach, along_z, half_width)
+        least = least_bars(points, step, along_z)
         if points.dim == 2:
-            friction = float(
-                np.linalg.norm(points.with_basis_of(frame.state).friction(frame.state.force), axis=1).sum()
-            )
+            friction = float(np.linalg.norm(points.with_basis_of(step.state).friction(step.state.force), axis=1).sum())
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
             least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
-        return cls(step, share, has_friction and reach <= step, least, _along(step, reach))
+        return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
 
 
 def _along(along: float, reach: float) -> float:
@@ -98,7 +96,7 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
     return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
 
 
-def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> dict[str, float]:
+def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by a share of the area of the points along the border of its zone, the mean of those on either
@@ -110,12 +108,12 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     ----------
     along_z_mm : spacing of the points along z
     """
-    touching = frame.state.status != OPEN
+    touching = step.state.status != OPEN
     line, nearest = points.middle_line()
-    reach = measure(points, frame)["contact_half_length_mm"]
+    reach = measure(points, step)["contact_half_length_mm"]
     one = float(np.median(points.area[touching])) if touching.any() else 0.0
     found: dict[str, float] = {}
-    for name, zone in (("contact", touching), ("stick", frame.state.status == STICK)):
+    for name, zone in (("contact", touching), ("stick", step.state.status == STICK)):
         border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
         found[f"{name}_area_mm2"] = _AREA_SHARE * max(0.5 * sum(border), one)
         found[f"{name}_half_length_mm"] = _half_length_bar(points, name, zone, (line, nearest), reach)
@@ -127,7 +125,7 @@ def least_bars(points: ContactPoints, frame: StepResult, along_z_mm: float) -> d
     found["contact_length_end_mm"] = 2.0 * found.get("contact_half_length_end_mm", found["contact_half_length_mm"])
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
-        friction = float(np.abs(points.with_basis_of(frame.state).friction(frame.state.force)[:, 2]).sum())
+        friction = float(np.abs(points.with_basis_of(step.state).friction(step.state.force)[:, 2]).sum())
         force = _ALONG_Z * (along_z_mm / extent) ** 2 * friction if extent > 0.0 else 0.0
         width = 2.0 * points.half_width_mm
         found["friction_sum_N"] = force
@@ -160,8 +158,8 @@ def _to_next_points(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
     For an empty zone it is the median distance of the points, which may hide a zone between them.
     """
     if not on.any():
-        steps = np.diff(np.unique(line))
-        return float(np.median(steps)) if len(steps) else 0.0
+        spacings = np.diff(np.unique(line))
+        return float(np.median(spacings)) if len(spacings) else 0.0
     left, right = line[on].min(), line[on].max()
     below, above = line[line < left], line[line > right]
     before = float(left - below.max()) if below.size else 0.0

@@ -20,7 +20,7 @@ from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, app
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, graded_sizes
-from finger3d.accuracy.richardson import ORDER, ORDERS, Quantity, largest_readings
+from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
@@ -198,13 +198,13 @@ def refine_mesh(
     return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
 
-def relative_error(numbers: Mapping[str, float], name: str, error: float) -> float:
+def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
     """Return the relative error; of a length relative to that of contact, of a reading to the largest of its kind."""
-    kind = Quantity.of(name).kind
+    kind = kinds[name]
     if kind.is_length:
         scale = numbers["contact_half_length_mm"]
     else:
-        scale = largest_readings(numbers).get(kind, abs(numbers[name]))
+        scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
     return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
 
 
@@ -220,7 +220,7 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     except NoAdjointBarsError:
         return _run_round(model, tolerance, goal)
     numbers = press_numbers(short, steps[-1])
-    error = relative_error(numbers, goal, bars.bars[goal])
+    error = relative_error(numbers, bars.kinds, goal, bars.bars[goal])
     scale = bars.bars[goal] / error if error > 0.0 else 0.0
     sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if scale > 0.0 else model.mesh
     dofs = int(problem.body.stiffness.upper.shape[0])
@@ -232,14 +232,15 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
     problem = build(model)
-    frame = last_step(problem)
-    numbers = press_numbers(problem, frame)
+    step = last_step(problem)
+    numbers = press_numbers(problem, step)
     other = companion(problem)
     last = last_step(other)
-    error = relative_error(numbers, goal, compared(problem, frame, other, last, press_numbers)[goal])
+    kinds = kinds_of(step.readings)
+    error = relative_error(numbers, kinds, goal, compared(problem, step, other, last, press_numbers)[goal])
     # a finer companion changes both lengths, so that their effects cannot be separated
     coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
-    sizes = _next_sizes(problem, goal, error, tolerance, numbers, coarse)
+    sizes = _next_sizes(problem, (goal, kinds[goal]), error, tolerance, numbers, coarse)
     seconds = time.perf_counter() - start
     dofs = int(problem.body.stiffness.upper.shape[0])
     return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
@@ -252,7 +253,7 @@ def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float
 
 def _next_sizes(
     problem: Problem,
-    number: str,
+    goal: tuple[str, Kind],
     error: float,
     tolerance: float,
     fine: Mapping[str, float],
@@ -262,7 +263,7 @@ def _next_sizes(
     options = problem.model.mesh
     if error <= tolerance:
         return _longer(problem, fine["contact_half_length_mm"])
-    kind = Quantity.of(number).kind
+    number, kind = goal
     is_length = kind.is_length
     shares = (1.0, 0.0) if is_length else _error_shares(problem, number, fine, coarse)
     power = 1.0 if is_length else ORDERS.get(kind, ORDER)

@@ -13,12 +13,11 @@ lies within twice the estimate.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from enum import Enum, auto
 
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.io import RESULTANTS
+from finger3d.mechanics.columns import RESULTANTS, Column
 
 ORDER = 1.2
 """Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
@@ -92,31 +91,22 @@ _READINGS = {
     "gauge": Kind.STRAIN,
     "marker": Kind.DISPLACEMENT,
     "taxel": Kind.BASE_PRESSURE,
-    "reading": Kind.OTHER_READING,
 }
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A number of a press and its kind."""
-
-    name: str
-    kind: Kind
-
-    @classmethod
-    def of(cls, name: str) -> Quantity:
-        """Return the quantity of a name of a press or a comparison; readings begin with their kind and ``_``."""
-        return cls(name, _READINGS.get(name.partition("_")[0]) or _KINDS[name])
+def kinds_of(readings: Iterable[Column]) -> dict[str, Kind]:
+    """Return the kinds of all numbers of a press or a comparison by name, those of readings included."""
+    return _KINDS | {column.key: _READINGS.get(column.kind, Kind.OTHER_READING) for column in readings}
 
 
-def largest(numbers: Mapping[str, float], kind: Kind) -> float:
+def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind) -> float:
     """Return the largest magnitude of all numbers of a kind, 0 without any."""
-    return max((abs(v) for k, v in numbers.items() if Quantity.of(k).kind is kind), default=0.0)
+    return max((abs(v) for k, v in numbers.items() if kinds[k] is kind), default=0.0)
 
 
-def largest_readings(numbers: Mapping[str, float]) -> dict[Kind, float]:
+def largest_readings(numbers: Mapping[str, float], kinds: Mapping[str, Kind]) -> dict[Kind, float]:
     """Return the largest magnitude of every kind of reading, to which errors of readings are relative."""
-    return {kind: largest(numbers, kind) for kind in _READINGS.values()}
+    return {kind: largest(numbers, kinds, kind) for kind in (*_READINGS.values(), Kind.OTHER_READING)}
 
 
 def gain(ratio: float, order: float = ORDER) -> float:
@@ -129,14 +119,16 @@ def mesh_error(
     companion: Mapping[str, float],
     ratio: float,
     resolutions: tuple[PointResolution, PointResolution],
+    readings: Iterable[Column] = (),
 ) -> dict[str, float]:
     """Return the discretisation error by name.
 
     Parameters
     ----------
-    numbers, companion : of the mesh and of its companion, names as in `Quantity.of`
+    numbers, companion : of the mesh and of its companion, by name
     ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
     resolutions : of the contact points of both
+    readings : columns of the readings among the numbers
 
     Returns
     -------
@@ -144,20 +136,21 @@ def mesh_error(
         Errors in the units of the numbers; names without a finite error are left out.
     """
     own, other = resolutions
-    readings, normal_force = largest_readings(numbers), largest(numbers, Kind.NORMAL_FORCE)
+    kinds = kinds_of(readings)
+    scales, normal_force = largest_readings(numbers, kinds), largest(numbers, kinds, Kind.NORMAL_FORCE)
     found = {}
     for name, value in numbers.items():
-        kind, change, bound = Quantity.of(name).kind, abs(value - companion[name]), own.least.get(name, 0.0)
+        kind, change, bound = kinds[name], abs(value - companion[name]), own.least.get(name, 0.0)
         if kind.is_length or kind is Kind.AREA:
             # a difference below the resolution of the companion's points does not count
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
-            scale = readings.get(kind, abs(value))
+            scale = scales.get(kind, abs(value))
             if own.alone and kind is Kind.FRICTION_SUM:
                 scale = max(scale, normal_force)
             power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
             bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:
-            bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, Kind.WORK))
+            bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, kinds, Kind.WORK))
         found[name] = max(change / gain(ratio, ORDERS.get(kind, ORDER)), bound)
     return {name: float(error) for name, error in found.items() if math.isfinite(error)}

@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.accuracy.adjoint import Goal, adjoint_loads, forces_of, press_goals
+from finger3d.accuracy.adjoint import adjoint_loads, forces_of, press_goals
 from finger3d.fem.elements import quadrature
 from finger3d.fem.locate import cells_at
 from finger3d.fem.patch_recovery import PatchRecovery, RecoveredErrors
+from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.readings import Taxel
@@ -83,8 +84,9 @@ def body_errors(problem: Problem, steps: Sequence[StepResult]) -> BodyErrors:
         share = -np.einsum("emq,qm->e", products[:, :, :q], coefficients[:, g])
         if goal.row is not None:
             share -= products[:, :, q + goal.row] @ weights[:, -1]
-        if goal.name.startswith("gauge_"):
-            error, near = _at_gauge(problem, goal, errors, np.append(weights[:, -1], np.zeros(q + _rows(problem))))
+        gauge = next((g for g in problem.model.gauges if goal.column in g.columns(problem.dim)), None)
+        if gauge is not None:
+            error, near = _at_gauge(problem, gauge, errors, np.append(weights[:, -1], np.zeros(q + _rows(problem))))
             local[goal.name], around[goal.name] = error, near
             share[near] = np.sign(share[near]) * error / max(np.count_nonzero(near), 1)
             signed[goal.name] = float(share[~near].sum())
@@ -134,14 +136,13 @@ def _base_displacements(problem: Problem) -> list[tuple[int, Float]]:
     return found
 
 
-def _at_gauge(problem: Problem, goal: Goal, errors: RecoveredErrors, field: Float) -> tuple[float, NDArray[np.bool_]]:
+def _at_gauge(problem: Problem, gauge: Gauge, errors: RecoveredErrors, field: Float) -> tuple[float, NDArray[np.bool_]]:
     """Return the error of the strain at a gauge, and which cells (e,) hold it or touch those that do.
 
     It is the mean over the gauge, or the root mean square in the cells that hold it if that is larger, since the error
     at one place may vanish by chance.
     """
     mesh = problem.mesh
-    gauge = next(g for g in problem.model.gauges if f"gauge_{g.name}" == goal.name)
     start, end = gauge.ends
     inside: list[Int] = []
     means = []

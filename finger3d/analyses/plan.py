@@ -11,7 +11,7 @@ from finger3d.geometry.imported import extent
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.scene import Source, scene_of
-from finger3d.scene.parts import moduli
+from finger3d.scene.derived import moduli
 
 
 @dataclass(frozen=True)

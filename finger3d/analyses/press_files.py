@@ -12,20 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger3d._types import Array, Float, Tree, TreeView
+from finger3d._types import Array, Float, Tree
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.formulations import acting_places
-from finger3d.mechanics.history import (
-    ContactPoints,
-    StepResult,
-    contact_table,
-    flat_readings,
-    measure,
-    without_readings,
-)
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure, table_row
 from finger3d.mechanics.marker_grid import marker_table
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
@@ -114,9 +107,9 @@ class ResultWriter:
         if self._replaces and not record.steps:
             return
         begin = time.perf_counter()
-        steps = self.summary(record, outcome)["steps"]
-        if steps:
-            write_csv(self.folder / "history.csv", history_table(steps))
+        self.summary(record, outcome)
+        if record.steps:
+            write_csv(self.folder / "history.csv", history_table(record.problem.points, record.steps))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
             columns = contact_table(record.problem.points, last.state)
             acting = acting_places(record.problem, last.meshed_state)
@@ -218,10 +211,10 @@ def _markers(record: PressRecord) -> Tree | None:
     return marker_table(record.problem, good, grid.spacing_mm if grid else None)
 
 
-def history_table(steps: Sequence[TreeView]) -> dict[str, ArrayLike]:
-    """Return the columns of history.csv from the entries of `steps` in summary.json."""
-    rows = [without_readings(step) | flat_readings(step) for step in steps]
-    return {name: [row[name] for row in rows] for name in rows[0]}
+def history_table(points: ContactPoints, steps: Sequence[StepResult]) -> dict[str, ArrayLike]:
+    """Return the columns of history.csv; none without steps."""
+    rows = [table_row(points, step) for step in steps]
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str, Array]:

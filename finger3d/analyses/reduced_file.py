@@ -117,7 +117,7 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
     try:
         checked = _Header.model_validate_json(arrays["header"].tobytes())
         model = _model(checked, arrays)
-        _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.reading_names))
+        _check_arrays(arrays, 2 if model.domain != "solid" else 3, len(model.columns))
         problem = assembled(model, arrays, checked.touch_mm, checked.axes)
         return problem, _face("other", arrays, problem.dim), checked.about
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
@@ -213,7 +213,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
             edges=arrays["edges"],
         ),
         delassus=arrays["compliance"].reshape(c, d, c, d),
-        reading_rows=arrays["reading_rows"].reshape(len(model.reading_names), c * d),
+        reading_rows=arrays["reading_rows"].reshape(len(model.columns), c * d),
         active_dofs=np.zeros(0, dtype=np.int64),
         first_contact_mm=touch_mm,
         object_share=arrays.get("object_share"),
@@ -225,7 +225,7 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     without = replace(
         system,
         delassus=arrays["bare_compliance"].reshape(c, d, c, d),
-        reading_rows=arrays["bare_reading_rows"].reshape(len(model.reading_names), c * d),
+        reading_rows=arrays["bare_reading_rows"].reshape(len(model.columns), c * d),
     )
     return replace(problem, without_inclusions=replace(problem, system=without))
 

@@ -119,8 +119,7 @@ class PressResult:
             return rows.astype({name: int if name == "step" else float for name in rows if name != "marker"})
         if table != "history":
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
-        steps = self._numbers["steps"]
-        return pandas.DataFrame(history_table(steps) if steps else {})
+        return pandas.DataFrame(history_table(self.history.points, self.history.steps))
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""
@@ -144,10 +143,10 @@ class PressResult:
         return grid(self.out, step)
 
     def _contact(self) -> Tree:
-        frames = self.history.steps
-        if not frames:
+        steps = self.history.steps
+        if not steps:
             raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")
-        last = next((f for f in reversed(frames) if f.outcome.ok), frames[-1])
+        last = next((f for f in reversed(steps) if f.outcome.ok), steps[-1])
         return contact_table(self.history.points, last.state)
 
     def __repr__(self) -> str:

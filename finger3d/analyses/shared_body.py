@@ -21,11 +21,12 @@ from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.mechanics.columns import Column, in_space, strain_columns
 from finger3d.mechanics.coverage import check_surface
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, flat_readings, measure, without_readings
-from finger3d.mechanics.marker_grid import grid_numbers
+from finger3d.mechanics.history import StepResult, table_row
+from finger3d.mechanics.marker_grid import grid_readings
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.parallel import map_parallel
 from finger3d.mechanics.problem import Problem
@@ -69,15 +70,15 @@ class VariantResult:
     ----------
     outcome : as in summary.json, with the number of the step that failed
     residual : the largest of all steps
-    numbers : quantities of the last step by their names in summary.json, without gauges; empty unless converged
-    gauges : name -> strain; empty unless converged
+    numbers : quantities of the last step by their names in summary.json, without readings; empty unless converged
+    readings : of the last step, those of a grid of markers included; empty unless converged
     seconds : time of this press; 0 if it is that of another variant, with other gauges
     """
 
     outcome: str
     residual: float
     numbers: dict[str, float]
-    gauges: dict[str, float]
+    readings: dict[Column, float]
     seconds: float
 
 
@@ -172,16 +173,19 @@ class SharedBody(PressedBody):
                 self._results[done] = run.result(self._grid_mm)
             result = self._results[press]
             if isinstance(result, VariantResult):
-                gauges = self.strains(variant, result.gauges) if result.gauges else {}
-                result = replace(result, gauges=gauges, seconds=result.seconds if press in unpaid else 0.0)
+                seconds = result.seconds if press in unpaid else 0.0
+                readings = self.readings_of(variant, result.readings) if result.readings else {}
+                result = replace(result, readings=readings, seconds=seconds)
             unpaid.discard(press)
             yield result
 
-    def strains(self, variant: Variant, gauges: dict[str, float]) -> dict[str, float]:
-        """Return the strains of a variant's gauges by name, from those of the gauges of all variants."""
+    def readings_of(self, variant: Variant, readings: dict[Column, float]) -> dict[Column, float]:
+        """Return the readings of a variant from those of all: of the gauges only its own."""
         if self._gauges_are_inclusions:
-            return gauges
-        return {g.name: gauges[self._names[replace(g, name="")]] for g in variant.gauges}
+            return readings
+        names = {g.name: self._names[replace(g, name="")] for g in variant.gauges}
+        strains = {strain_columns(own)[0]: readings[strain_columns(name)[0]] for own, name in names.items()}
+        return strains | {column: value for column, value in readings.items() if column.kind != "gauge"}
 
     def _runs(self, variants: Sequence[Variant], most: int | None) -> Iterator[_Run]:
         """Press each variant; condense the whole contact face once contact goes beyond the candidate points."""
@@ -244,14 +248,14 @@ class _Run:
             if not frame.outcome.ok:
                 at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
                 return VariantResult(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
-        numbers = measure(self.problem.points, self.frames[-1])
-        gauges = numbers.pop("gauges")
-        numbers = without_readings(numbers) | flat_readings(numbers | {"gauges": {}})
+        last = self.frames[-1]
+        numbers = table_row(self.problem.points, replace(last, readings={}))
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
+        readings = in_space(last.readings)
         if grid_mm is not None:
-            numbers |= grid_numbers(self.problem, self.frames[-1], grid_mm)
-        return VariantResult(str(Outcome.CONVERGED), residual, numbers, gauges, self.seconds)
+            readings |= grid_readings(self.problem, last, grid_mm)
+        return VariantResult(str(Outcome.CONVERGED), residual, numbers, readings, self.seconds)
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

@@ -17,19 +17,17 @@ from finger3d._machine import enough_address_space
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,
-    completion,
     estimate,
     export,
     identify,
     info,
-    new,
     optimise,
     plan,
     press,
-    schema,
     show,
     sweep,
     validate,
+    writing,
 )
 from finger3d.cli.common import Interrupted, app, complain
 from finger3d.cli.terminal import legible_width, safe_streams

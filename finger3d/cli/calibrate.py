@@ -55,7 +55,7 @@ def calibrate(
     loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run
     from finger3d.analyses.calibrate.settings import parsed_mus
-    from finger3d.scene.parts import moduli
+    from finger3d.scene.derived import moduli
     from finger3d.sensor.calibration import summary
     from finger3d.sensor.files import as_dict
 

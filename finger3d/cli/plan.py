@@ -39,7 +39,7 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
 
 def effect_rows(scene: Scene) -> list[tuple[str, str]]:
     """Return each known effect and the reason why it is on or off."""
-    from finger3d.scene.registry import effect_names
+    from finger3d.effects import effect_names
 
     def why(name: str) -> str:
         if name not in scene.effects:

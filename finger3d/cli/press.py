@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,7 +44,7 @@ def press(
     begin = time.perf_counter()
     loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
-    from finger3d.scene.parts import moduli
+    from finger3d.scene.derived import moduli
 
     with job(json_, lambda report: _kept(out, report)) as report:
         result = run(loaded, out, report, figures=figures, error=error)
@@ -88,8 +89,8 @@ _NUMBERS = {
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
-    from finger3d.accuracy.error_bars import ErrorBars
-    from finger3d.results.format import with_error
+    from finger3d.accuracy.error_bars import ErrorBars, with_error
+    from finger3d.results.summary import readings_of
 
     bars, estimate = ErrorBars.of_summary(summary), summary.get("error_estimate")
     steps = [step for step in summary["steps"] if step["outcome"] == str(Outcome.CONVERGED)]
@@ -110,17 +111,16 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
         for name, (key, factor, digits, unit) in _NUMBERS.items():
             yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
-        for name, strain in last["gauges"].items():
-            yield f"strain {name}", number(strain, f"gauge_{name}", 5) + of_modulus(f"gauge_{name}", "")
-        for name, moved in last["markers"].items():
-            parts = [number(value, f"marker_{name}_{axis}_mm", 5) for axis, value in zip("xyz", moved, strict=True)]
-            yield f"marker {name}", ", ".join(parts) + " mm"
-            by_modulus = [bars.modulus.get(f"marker_{name}_{axis}_mm", 0.0) for axis in "xyz"]
-            if any(by_modulus):
-                yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + " mm by the modulus"
-        for name, pressure in last["taxels"].items():
-            key = f"taxel_{name}_MPa"
-            yield f"taxel {name}", number(pressure, key, 5) + " MPa" + of_modulus(key, " MPa")
+        readings = readings_of(last["gauges"], last["markers"], last["taxels"])
+        for (kind, sensor), group in groupby(readings, key=lambda c: (c.kind, c.sensor)):
+            columns = list(group)
+            key, unit = columns[0].key, f" {columns[0].unit}".rstrip()
+            text = ", ".join(number(value, c.key, 5) for c in columns if (value := readings[c]) is not None) + unit
+            by_modulus = [bars.modulus.get(c.key, 0.0) for c in columns]
+            name = f"{'strain' if kind == 'gauge' else kind} {sensor}"
+            yield name, text if len(columns) > 1 else text + of_modulus(key, unit)
+            if len(columns) > 1 and any(by_modulus):
+                yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f"{unit} by the modulus"
     if bars.discretisation:
         yield "+-", f"{bars.covered}, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
     if estimate and not (bars.discretisation and bars.steps):

@@ -120,8 +120,9 @@ def _as_dict(store: ResultStore, out: Path) -> dict[str, object]:
 
 def _print_points(store: ResultStore) -> None:
     """Print the varied keys and the main numbers of the first points."""
-    from finger3d.io import MAIN
+    from finger3d.mechanics.columns import MAIN
     from finger3d.report.build import number
+    from finger3d.results.summary import strains_of
 
     def cell(value: object) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)
@@ -129,7 +130,7 @@ def _print_points(store: ResultStore) -> None:
     points = _points(store)
     if not points:
         return
-    gauges = [name for name in points[0] if name.startswith("gauge_")][:_MOST_GAUGES]
+    gauges = [c.key for c in strains_of(store.sweep.given) if c.key in points[0]][:_MOST_GAUGES]
     head = [*(v.key for v in store.sweep.vary), *(name for name in (*MAIN, *gauges, "outcome") if name in points[0])]
     print_columns(head, ([cell(row[name]) for name in head] for row in points[:_MOST_POINTS]))
     if len(points) > _MOST_POINTS:

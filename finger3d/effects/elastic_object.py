@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from finger3d._ranges import Length, Modulus, Poisson
-from finger3d.effects.base import fill, warn
+from finger3d.effects import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import ElasticObject, Model
 

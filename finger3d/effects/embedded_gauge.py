@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from finger3d._ranges import Length, Modulus, at_most
-from finger3d.effects.base import fill
+from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Foils, Model
 

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 from annotated_types import Ge, Le
 
 from finger3d.contact.friction import Branch, TwoCoefficients
-from finger3d.effects.base import fill, warn
+from finger3d.effects import fill, warn
 from finger3d.mechanics.model import Model
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from annotated_types import Ge, Le, MinLen
 
 from finger3d._ranges import Share
-from finger3d.effects.base import fill
+from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.stability import unstable_from

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from annotated_types import MinLen
 
 from finger3d._ranges import Fraction, Seconds
-from finger3d.effects.base import fill, warn
+from finger3d.effects import fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.relaxation import Relaxation

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import axis_numbers
+from finger3d.fem.tensors import bases_of
 from finger3d.fem.traces import BoundarySurface, outward_normals
 
 

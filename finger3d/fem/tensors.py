@@ -1,10 +1,13 @@
-"""Determinants and cofactors of many 3 x 3 tensors, by explicit formulas: LAPACK takes several times as long."""
+"""Many small tensors: determinants and cofactors, bases of normals, and operators turned into them.
+
+Explicit formulas are several times as fast as LAPACK.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 
 
 class InvertedError(ArithmeticError):
@@ -29,3 +32,44 @@ def cofactor(f: Float) -> Float:
             r, s = (j + 1) % 3, (j + 2) % 3
             out[..., i, j] = f[..., p, r] * f[..., q, s] - f[..., p, s] * f[..., q, r]
     return out
+
+
+_ROUND_OFF = 1e-13
+"""Round-off of directions."""
+
+
+def bases_of(normal: Float) -> Float:
+    """Return orthonormal bases (c, d, d) with unit normals (c, d), turned from that of an upright object the short way.
+
+    The normal of an upright object is -y, and its tangents are x and z.
+    """
+    d = normal.shape[1]
+    n = np.zeros((len(normal), 3))
+    n[:, :d] = normal
+    # Rodrigues' formula for the rotation that takes -y to n
+    cosine = -n[:, 1]
+    half = np.maximum(1.0 + cosine, 0.0)
+    opposite = half < 1e-12
+    factor = 1.0 / np.where(opposite, 1.0, half)
+    along = np.stack([1.0 - factor * n[:, 0] ** 2, n[:, 0], -factor * n[:, 0] * n[:, 2]], axis=1)
+    across = np.stack([-factor * n[:, 0] * n[:, 2], n[:, 2], 1.0 - factor * n[:, 2] ** 2], axis=1)
+    along[opposite], across[opposite] = [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]  # about z, which a section has too
+    return np.stack([n, along, across], axis=1)[:, :d, :d]
+
+
+def rotated_delassus(delassus: Float, rotations: Float, points: Int | None = None) -> Float:
+    """Return the Delassus operator (k, d, k, d) of some points along their own directions.
+
+    Parameters
+    ----------
+    delassus : (c, d, c, d) mm/N, in the directions before
+    rotations : (k, d, d) from these directions, point by point
+    points : (k,) numbers of the points; all of them if None
+    """
+    k, d = rotations.shape[:2]
+    if points is not None:
+        delassus = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
+    if np.allclose(rotations, np.eye(d), rtol=0.0, atol=_ROUND_OFF):  # as on a plane
+        return delassus
+    half = (rotations @ delassus.reshape(k, d, k * d)).reshape(k * d, k, d)
+    return np.asarray((half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d))

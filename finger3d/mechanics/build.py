@@ -82,7 +82,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     matrix = stiffness(mesh, elastic, thickness)
     candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)
-    count = len(model.reading_names)
+    count = len(model.columns)
     check_rows(len(active), count)
     bars = _bars(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]

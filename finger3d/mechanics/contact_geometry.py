@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, freeze_arrays
-from finger3d.fem.directions import bases_of
 from finger3d.fem.simplex import CONTACT, axis_numbers
+from finger3d.fem.tensors import bases_of
 from finger3d.fem.traces import BoundarySurface
 from finger3d.objects import vertical_frame
 

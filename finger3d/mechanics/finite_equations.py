@@ -26,10 +26,9 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.condense import condense
-from finger3d.fem.directions import rotated_delassus
 from finger3d.fem.finite_contact import DeformedContact
 from finger3d.fem.recover import displacement
-from finger3d.fem.tensors import InvertedError
+from finger3d.fem.tensors import InvertedError, rotated_delassus
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_state import (
     DeformedBody,

@@ -8,8 +8,8 @@ import numpy as np
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.fem.condense import Condensation
-from finger3d.fem.directions import bases_of
 from finger3d.fem.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.tensors import bases_of
 from finger3d.fem.traces import BoundarySurface
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.formulation import Workspace

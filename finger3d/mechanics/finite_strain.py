@@ -16,6 +16,7 @@ from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.recover import displacement, extrapolated
 from finger3d.fem.tensors import determinant
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.columns import Column, of_kind
 from finger3d.mechanics.finite_body import FiniteBody
 from finger3d.mechanics.finite_increment import FiniteIncrement
 from finger3d.mechanics.finite_state import DeformedBody, FiniteStrainWorkspace, contact_of
@@ -160,14 +161,14 @@ class FiniteStrain:
         """Yield all unknowns (N,) of each state."""
         return (state.body.unknowns for state in states)
 
-    def readings(self, problem: Problem, state: State[DeformedBody]) -> dict[str, float]:
+    def readings(self, problem: Problem, state: State[DeformedBody]) -> dict[Column, float]:
         """Return the readings in the deformed configuration; foils read the strain of their bars."""
         model, body, memory = problem.model, problem.meshed_body, state.body.memory
         u, forces = displacement(problem.mesh, state.body.unknowns), self._nodal_forces(problem, state.body)
         values = {
-            name: float(number)
+            column: float(number)
             for reading in model.readings
-            for name, number in zip(
+            for column, number in zip(
                 reading.columns(problem.dim), reading.at_finite_strain(body, u, forces), strict=True
             )
         }
@@ -175,7 +176,7 @@ class FiniteStrain:
         if bars is not None:
             yielded = memory.elastic[-len(bars.stiffness) :] if memory else bars.yielded(u)
             strains = problem.inclusions.gauge_weights @ bars.strain(u, yielded)
-            values |= {gauge.name: float(strain) for gauge, strain in zip(model.gauges, strains, strict=True)}
+            values |= zip(of_kind(model.columns, "gauge"), map(float, strains), strict=True)
         return values
 
     def _nodal_forces(self, problem: Problem, state: DeformedBody) -> Float:

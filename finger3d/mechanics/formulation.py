@@ -11,6 +11,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.state import B, State
 from finger3d.objects import DistanceTracker, Move, ObjectPose
@@ -88,8 +89,8 @@ class Formulation(Protocol[B, W]):
         """Yield all unknowns (N,) of the meshed part in each of several states, which may cost less than one by one."""
         ...
 
-    def readings(self, problem: Problem, state: State[B]) -> dict[str, float]:
-        """Return every number that is read, by its name in `Model.reading_names`."""
+    def readings(self, problem: Problem, state: State[B]) -> dict[Column, float]:
+        """Return every number that is read, by its column."""
         ...
 
     def loads(self, problem: Problem, state: State[B], pose: ObjectPose) -> Loads:

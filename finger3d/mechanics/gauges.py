@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,6 +12,7 @@ from finger3d._ranges import Turn
 from finger3d._types import Float
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_row, strain_row
+from finger3d.mechanics.columns import Column, strain_columns
 from finger3d.mechanics.readings import MeshedBody, moved_place
 
 
@@ -29,7 +29,6 @@ class Gauge:
     z_mm: float = 0.0
     angle: Turn = 0.0
     length_mm: float = 0.0
-    kind: ClassVar[Literal["gauge"]] = "gauge"
 
     @property
     def is_point(self) -> bool:
@@ -52,9 +51,9 @@ class Gauge:
         half = 0.5 * self.length_mm * self.direction
         return self.middle - half, self.middle + half
 
-    def columns(self, dim: int) -> tuple[str, ...]:
-        """Return the name."""
-        return (self.name,)
+    def columns(self, dim: int) -> tuple[Column, ...]:
+        """Return the column of the strain."""
+        return strain_columns(self.name)[:1]
 
     def mirrored(self, name: str) -> tuple[Gauge, tuple[float, ...]]:
         """Return the gauge at the mirror image about x = 0."""

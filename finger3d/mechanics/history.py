@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._types import Float, Tree, TreeView, freeze_arrays
+from finger3d._types import Float, Tree, freeze_arrays
 from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.simplex import CONTACT, FREE_FACES
+from finger3d.mechanics.columns import QUANTITIES, Column, by_key, in_space, of_kind
 from finger3d.mechanics.state import State
 from finger3d.mechanics.zones import half_extents
 from finger3d.objects import ObjectPose
+
+_READINGS = ("gauges", "markers", "taxels", "other_readings")
+"""Keys of an entry of `steps` in summary.json under which its readings are."""
 
 _ON_LINE = 1e-9
 """Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
@@ -119,8 +123,7 @@ class StepResult:
     `meshed_state` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm,
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface (`finger3d.mechanics.coverage`);
-    `detail` describes a failure. `gauges` are strains, `markers` displacements (d,) in mm, `taxels`
-    pressures in MPa, all by name.
+    `detail` describes a failure.
     """
 
     target: ObjectPose
@@ -128,7 +131,7 @@ class StepResult:
     meshed_state: State[Any]
     lowest: tuple[float, float]
     moment: Float
-    gauges: dict[str, float]
+    readings: dict[Column, float]
     external_work_mJ: float
     dissipation_mJ: float
     outcome: Outcome
@@ -137,19 +140,29 @@ class StepResult:
     method: str
     penetration_mm: float
     detail: str = ""
-    markers: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    taxels: dict[str, float] = field(default_factory=dict)
-    other_readings: dict[str, float] = field(default_factory=dict)
 
     @property
-    def readings(self) -> dict[str, float]:
-        """Every number that is read, by name; ``m1.x`` is the displacement of marker m1 along x."""
-        moved = {
-            f"{name}.{axis}": value
-            for name, displacement in self.markers.items()
-            for axis, value in zip("xyz", displacement, strict=False)
-        }
-        return {**moved, **self.taxels, **self.other_readings, **self.gauges}
+    def named_readings(self) -> dict[str, float]:
+        """Every number that is read, by its name; ``m1.x`` is the displacement of marker m1 along x."""
+        return {column.name: value for column, value in self.readings.items()}
+
+    @property
+    def gauges(self) -> dict[str, float]:
+        """Strain by the name of the gauge."""
+        return {column.sensor: self.readings[column] for column in of_kind(self.readings, "gauge")}
+
+    @property
+    def markers(self) -> dict[str, tuple[float, ...]]:
+        """Displacement (d,), mm, by the name of the marker."""
+        moved: dict[str, tuple[float, ...]] = {}
+        for column in of_kind(self.readings, "marker"):
+            moved[column.sensor] = (*moved.get(column.sensor, ()), self.readings[column])
+        return moved
+
+    @property
+    def taxels(self) -> dict[str, float]:
+        """Pressure, MPa, by the name of the taxel."""
+        return {column.sensor: self.readings[column] for column in of_kind(self.readings, "taxel")}
 
 
 @dataclass(frozen=True, repr=False)
@@ -175,6 +188,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the extents of contact and stick on the line z = 0
     (`finger3d.mechanics.zones`).  The line has the vertices of the surface mesh on it and the intersections of edges
     with it, each with the state of the nearer end of its edge.  Lengths and areas are those of the surface at rest.
+    Readings are sorted by the kind of their sensors, and displacements have three components.
     """
     state, target = step.state, step.target
     points = points.with_basis_of(state)
@@ -206,14 +220,15 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     }
     if points.dim == 3:
         numbers["contact_half_length_end_mm"] = half_extents(*points.end_line(), state, points.area)[0]
+    others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
     return numbers | {
         "largest_penetration_mm": step.penetration_mm,
         "external_work_mJ": step.external_work_mJ,
         "dissipation_mJ": step.dissipation_mJ,
-        "gauges": dict(step.gauges),
+        "gauges": step.gauges,
         "markers": {name: [*moved, *[0.0] * (3 - len(moved))] for name, moved in step.markers.items()},
-        "taxels": dict(step.taxels),
-        **({"other_readings": dict(step.other_readings)} if step.other_readings else {}),
+        "taxels": step.taxels,
+        **({"other_readings": others} if others else {}),
         "iterations": step.iterations,
         "residual": step.residual,
         "method": step.method,
@@ -221,25 +236,10 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     }
 
 
-def flat_readings(entry: TreeView) -> dict[str, float]:
-    """Return the readings of an entry of `steps` by the names of columns.
-
-    These are ``gauge_<name>``, ``marker_<name>_x_mm``, ``_y_mm``, ``_z_mm`` and ``taxel_<name>_MPa``; for readings of
-    other kinds ``reading_<column>``.
-    """
-    moved = {
-        f"marker_{name}_{axis}_mm": value
-        for name, displacement in entry["markers"].items()
-        for axis, value in zip("xyz", displacement, strict=True)
-    }
-    pressures = {f"taxel_{name}_MPa": pressure for name, pressure in entry["taxels"].items()}
-    others = {f"reading_{name}": value for name, value in entry.get("other_readings", {}).items()}
-    return {f"gauge_{name}": strain for name, strain in entry["gauges"].items()} | moved | pressures | others
-
-
-def without_readings(entry: TreeView) -> Tree:
-    """Return an entry of `steps` without its readings."""
-    return {key: value for key, value in entry.items() if key not in ("gauges", "markers", "taxels", "other_readings")}
+def table_row(points: ContactPoints, step: StepResult) -> Tree:
+    """Return the row of history.csv for one increment: its numbers, and its readings by the names of their columns."""
+    numbers = {key: value for key, value in measure(points, step).items() if key not in _READINGS}
+    return numbers | by_key(in_space(step.readings))
 
 
 def contact_table(points: ContactPoints, state: ContactState) -> Tree:

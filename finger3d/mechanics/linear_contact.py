@@ -20,7 +20,7 @@ from finger3d.contact.friction import OPEN
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
-from finger3d.fem.directions import rotated_delassus
+from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.formulation import Workspace, length_scale
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls

@@ -13,6 +13,7 @@ from finger3d._types import Float, Tree
 from finger3d.fem.recover import displacement
 from finger3d.fem.simplex import axis_numbers
 from finger3d.fem.transfer import values_over
+from finger3d.mechanics.columns import Column, displacement_columns
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.problem import Problem
@@ -96,16 +97,13 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
     return columns | {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
 
 
-def grid_numbers(problem: Problem, step: StepResult, spacing_mm: float) -> dict[str, float]:
-    """Return the displacements of the markers of a grid after an increment, named as those of other markers."""
+def grid_readings(problem: Problem, step: StepResult, spacing_mm: float) -> dict[Column, float]:
+    """Return the displacements of the markers of a grid after an increment, as those of other markers."""
     grid = MarkerGrid.of(problem, spacing_mm)
     (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
     moved = _in_space(grid.displacements(displacement(problem.mesh, unknowns)))
-    return {
-        f"marker_grid_{k + 1}_{axis}_mm": float(u)
-        for k, at in enumerate(moved)
-        for axis, u in zip("xyz", at, strict=True)
-    }
+    columns = (column for k in range(len(moved)) for column in displacement_columns(f"grid_{k + 1}"))
+    return dict(zip(columns, map(float, moved.ravel()), strict=True))
 
 
 def _in_space(vectors: Float) -> Float:

@@ -13,6 +13,7 @@ from finger3d.contact.rules import RuleName
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.readings import Marker, Reading, Taxel
 from finger3d.mechanics.relaxation import Relaxation
@@ -194,10 +195,10 @@ class Model:
         return (*self.markers, *self.taxels, *self.other_readings, *self.gauges)
 
     @property
-    def reading_names(self) -> tuple[str, ...]:
-        """Name of every number that is read."""
+    def columns(self) -> tuple[Column, ...]:
+        """Column of every number that is read, in the order of the rows."""
         dim = 3 if self.domain == "solid" else 2
-        return tuple(name for reading in self.readings for name in reading.columns(dim))
+        return tuple(column for reading in self.readings for column in reading.columns(dim))
 
     @property
     def forces_scale_with_modulus(self) -> bool:

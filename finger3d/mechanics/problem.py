@@ -22,6 +22,7 @@ from finger3d.fem.parts import moduli_of
 from finger3d.fem.recover import strain_and_stress
 from finger3d.fem.simplex import FREE_FACES, Mesh
 from finger3d.fem.traces import BoundarySurface, joined, surface
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.contact_geometry import ContactGeometry, contact_geometry, may_touch
 from finger3d.mechanics.history import ContactPoints
 from finger3d.mechanics.model import Model
@@ -229,9 +230,9 @@ class Problem:
         turned = contact_geometry(last.distance, self.surface, axes=self.axes).from_reference
         return uniqueness(np.full(c, self.model.friction.largest), turned @ blocks @ turned.transpose(0, 2, 1))
 
-    def read(self, force: Float) -> dict[str, float]:
-        """Readings by name under contact forces (c, d), through the condensed rows."""
-        return dict(zip(self.model.reading_names, map(float, self.system.reading_rows @ force.ravel()), strict=True))
+    def read(self, force: Float) -> dict[Column, float]:
+        """Readings by column under contact forces (c, d), through the condensed rows."""
+        return dict(zip(self.model.columns, map(float, self.system.reading_rows @ force.ravel()), strict=True))
 
     def strain_and_stress(self, unknowns: Float) -> tuple[Float, Float]:
         """Linear strain and elastic stress (n, 3, 3), MPa, at the nodes of the part, from all unknowns (N,)."""

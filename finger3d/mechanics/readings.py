@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import ClassVar, Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +15,7 @@ from finger3d.fem.assembly import Stiffness, times
 from finger3d.fem.locate import cells_at
 from finger3d.fem.simplex import Mesh, reflect_into_part
 from finger3d.fem.traces import displacement_rows
+from finger3d.mechanics.columns import Column, displacement_columns, pressure_column
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,8 @@ class Reading(Protocol):
         """Name in the output."""
         ...
 
-    @property
-    def kind(self) -> str:
-        """What kind of sensor it is: "gauge", "marker", "taxel", or another word."""
-        ...
-
-    def columns(self, dim: int) -> tuple[str, ...]:
-        """Return the name of each number, in 2 or 3 dimensions."""
+    def columns(self, dim: int) -> tuple[Column, ...]:
+        """Return the column of each number, in 2 or 3 dimensions."""
         ...
 
     def mirrored(self, name: str) -> tuple[Reading, tuple[float, ...]]:
@@ -73,16 +69,15 @@ class Marker:
     x_mm: float
     y_mm: float
     z_mm: float = 0.0
-    kind: ClassVar[Literal["marker"]] = "marker"
 
     @property
     def place(self) -> Float:
         """Place (3,) mm at rest."""
         return np.array([self.x_mm, self.y_mm, self.z_mm])
 
-    def columns(self, dim: int) -> tuple[str, ...]:
-        """Return a name for each component of the displacement, as ``m1.x``."""
-        return tuple(f"{self.name}.{axis}" for axis in "xyz"[:dim])
+    def columns(self, dim: int) -> tuple[Column, ...]:
+        """Return a column for each component of the displacement."""
+        return displacement_columns(self.name, dim)
 
     def mirrored(self, name: str) -> tuple[Marker, tuple[float, ...]]:
         """Return the marker at the mirror image about x = 0; its displacement along x changes its sign."""
@@ -110,11 +105,10 @@ class Taxel:
     z_mm: float
     length_mm: float
     width_mm: float | None = None
-    kind: ClassVar[Literal["taxel"]] = "taxel"
 
-    def columns(self, dim: int) -> tuple[str, ...]:
-        """Return the name."""
-        return (self.name,)
+    def columns(self, dim: int) -> tuple[Column, ...]:
+        """Return the column of the pressure."""
+        return (pressure_column(self.name),)
 
     def mirrored(self, name: str) -> tuple[Taxel, tuple[float, ...]]:
         """Return the taxel at the mirror image about x = 0."""

@@ -273,13 +273,13 @@ def _messages(model: Model, touch_mm: float, landmarks: Float | None, unresolved
     return messages
 
 
-def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -> list[str]:
+def increments_without_contact(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
     """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
     model, face, touch_mm = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
     missed: list[float] = []
-    for frame in frames:
-        end = frame.target
-        if end.depth_mm <= 0.0 or not frame.outcome.ok or (frame.state.status != OPEN).any():
+    for step in steps:
+        end = step.target
+        if end.depth_mm <= 0.0 or not step.outcome.ok or (step.state.status != OPEN).any():
             continue
         slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
         if (rigid_gap(problem.placed(end), problem.surface) < 0.0).any():  # the finger has not followed yet
@@ -289,7 +289,7 @@ def increments_without_contact(problem: Problem, frames: Sequence[StepResult]) -
     if not missed:
         return []
     return [
-        f"{len(missed)} of {len(frames)} increments reach no contact point and have no force, at depths up to "
+        f"{len(missed)} of {len(steps)} increments reach no contact point and have no force, at depths up to "
         f"{max(missed):.3g} mm; lower mesh.size_mm"
     ]
 

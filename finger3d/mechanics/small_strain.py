@@ -11,6 +11,7 @@ from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.columns import Column
 from finger3d.mechanics.contact_geometry import contact_geometry
 from finger3d.mechanics.formulation import Loads, Workspace
 from finger3d.mechanics.linear_contact import LinearBody, solve_increment, solve_linearised
@@ -47,7 +48,7 @@ class SmallStrain:
         """Yield the unknowns from the forces, by one back-substitution for many states."""
         return problem.unknowns_of([problem.upright_force(state.contact) for state in states])
 
-    def readings(self, problem: Problem, state: State[Float]) -> dict[str, float]:
+    def readings(self, problem: Problem, state: State[Float]) -> dict[Column, float]:
         """Return the readings from the forces, by their rows."""
         return problem.read(problem.upright_force(state.contact))
 

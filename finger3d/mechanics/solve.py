@@ -14,6 +14,7 @@ from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
+from finger3d.mechanics.columns import Column, in_order, strain_columns
 from finger3d.mechanics.energy import external_work, frictional_dissipation
 from finger3d.mechanics.force_control import DepthSearch, Trial, deepest, first_trial
 from finger3d.mechanics.formulation import Workspace
@@ -227,18 +228,18 @@ class Press:
     def _normal_force(self, state: State[Any]) -> float:
         return -float(self.problem.world_force(state.contact)[:, 1].sum())
 
-    def _free_strain(self, station: Station) -> dict[str, float]:
-        """Strain of every gauge by name, ``_free`` added, in the body without inclusions; NaN once it has failed."""
+    def _free_strain(self, station: Station) -> dict[Column, float]:
+        """Strain of every gauge in the body without inclusions; NaN once it has failed."""
         press = self._without_inclusions
         if press is None:
             return {}
         step = None if press.has_failed else press.advance(station)
         known = step is not None and not press.has_failed
-        return {f"{g.name}_free": step.gauges[g.name] if step and known else np.nan for g in self.problem.model.gauges}
+        columns = [strain_columns(gauge.name) for gauge in self.problem.model.gauges]
+        return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
-    def _result(self, solution: ContactSolution[State[Any]], free_strain: dict[str, float]) -> StepResult:
-        problem, model, state, pose = self.problem, self.problem.model, self.state, self.pose
-        read = self.formulation.readings(problem, state)
+    def _result(self, solution: ContactSolution[State[Any]], free_strain: dict[Column, float]) -> StepResult:
+        problem, state, pose = self.problem, self.state, self.pose
         moment = self.formulation.loads(problem, state, pose).moment
         return StepResult(
             target=pose,
@@ -246,10 +247,7 @@ class Press:
             meshed_state=state,
             lowest=problem.placed(pose).lowest,
             moment=problem.symmetry.total_moment(moment),
-            gauges={g.name: read[g.name] for g in model.gauges} | free_strain,
-            markers={m.name: tuple(read[name] for name in m.columns(problem.dim)) for m in model.markers},
-            taxels={t.name: read[t.name] for t in model.taxels},
-            other_readings={name: read[name] for r in model.other_readings for name in r.columns(problem.dim)},
+            readings=in_order(self.formulation.readings(problem, state) | free_strain),
             external_work_mJ=self._work,
             dissipation_mJ=self._dissipation,
             outcome=solution.outcome,

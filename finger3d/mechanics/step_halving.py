@@ -21,6 +21,7 @@ from typing import TypeAlias
 from finger3d._cost import AUTOMATIC_S, PressSize
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.columns import by_key, of_kind
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, measure
@@ -241,7 +242,7 @@ def _estimate(problem: Problem, runs: Sequence[Run]) -> StepEstimate:
         {name: increment_error(counts, [run[leg][name] for run in ends], counts[-1]) for name in quantities}
         for leg, quantities in enumerate(finest)
     ]
-    strains = [name for name in finest[0] if name.startswith("gauge_") and not math.isnan(finest[-1][name])]
+    strains = [name for name, value in finest[-1].items() if name not in _FORCES_AND_ENERGIES and not math.isnan(value)]
     floor = FLOOR * max(abs(quantities["external_work_mJ"]) for quantities in finest)
 
     def largest_error(*names: str) -> float:
@@ -268,11 +269,15 @@ def _estimate(problem: Problem, runs: Sequence[Run]) -> StepEstimate:
     )
 
 
+_FORCES_AND_ENERGIES = ("normal_force_N", "friction_sum_N", "dissipation_mJ", "external_work_mJ")
+"""Quantities that determine the number of increments, beside the strains of all gauges."""
+
+
 def _quantities(problem: Problem, result: StepResult) -> dict[str, float]:
     """Quantities by name whose errors determine the number of increments."""
     measured = measure(problem.points, result)
-    names = ("normal_force_N", "friction_sum_N", "dissipation_mJ", "external_work_mJ")
-    return {name: measured[name] for name in names} | {f"gauge_{k}": v for k, v in measured["gauges"].items()}
+    strains = {column: result.readings[column] for column in of_kind(result.readings, "gauge")}
+    return {name: measured[name] for name in _FORCES_AND_ENERGIES} | by_key(strains)
 
 
 COUNT_RATIOS: dict[str, tuple[float, float]] = {"up": (2.0, 4.0), "both": (0.5, 2.0), "down": (0.25, 0.5)}

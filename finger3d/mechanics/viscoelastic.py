@@ -23,6 +23,7 @@ from finger3d.contact.state import ContactSolution
 from finger3d.fem.condense import spring_forces, stiffened
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import BoundarySurface
+from finger3d.mechanics.columns import Column, of_kind
 from finger3d.mechanics.formulation import Loads
 from finger3d.mechanics.linear_contact import LinearBody, solve_increment
 from finger3d.mechanics.problem import Problem, scatter_to_points
@@ -110,15 +111,16 @@ class Viscoelastic:
         """Yield the unknowns of each state from its internal variables."""
         return (self._body(problem).unknowns(state.body.memory.elastic) for state in states)
 
-    def readings(self, problem: Problem, state: State[ViscousBody]) -> dict[str, float]:
+    def readings(self, problem: Problem, state: State[ViscousBody]) -> dict[Column, float]:
         """Return the readings from the internal variables by their rows; pressures are those of the relaxed stress."""
         first, body, memory = len(problem.system.active_dofs), self._body(problem), state.body.memory
         rows = body.read(memory.elastic)[first:]
-        values = dict(zip(problem.model.reading_names, map(float, rows), strict=False))
+        values = dict(zip(problem.model.columns, map(float, rows), strict=False))
         if problem.model.taxels:
             forces = body.nodal_forces(self.relaxation.prony, memory)
             meshed, u = problem.meshed_body, np.zeros((0, problem.dim))
-            values |= {t.name: float(t.at_finite_strain(meshed, u, forces)[0]) for t in problem.model.taxels}
+            pressures = (float(t.at_finite_strain(meshed, u, forces)[0]) for t in problem.model.taxels)
+            values |= zip(of_kind(problem.model.columns, "taxel"), pressures, strict=True)
         return values
 
     def loads(self, problem: Problem, state: State[ViscousBody], pose: ObjectPose) -> Loads:

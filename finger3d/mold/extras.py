@@ -12,8 +12,8 @@ from finger3d.io import atomic
 from finger3d.mold.button import button_for, button_parts, button_scene, button_solid, identify_command
 from finger3d.mold.carrier import LABEL as CARRIER
 from finger3d.mold.carrier import finger_on_carrier, key_solids
-from finger3d.mold.coupon import coupon, coupon_clearances
 from finger3d.mold.parts import Mold
+from finger3d.mold.pegs import coupon, coupon_clearances
 from finger3d.mold.ports import openings
 from finger3d.mold.shell import Shell, shell, write_step
 from finger3d.mold.solids import cylinder

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from finger3d.mold.features import Feature
+from finger3d.mold.hardware import standard_length
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import BAND_DEPTH_MM, MoldOptions
-from finger3d.mold.screws import standard_length
 from finger3d.mold.solids import between, cylinder, hexagon
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.printers import PRINTERS, Printer, PrinterName
-from finger3d.mold.screws import SCREWS, Screw, ScrewName
+from finger3d.mold.hardware import PRINTERS, SCREWS, Printer, PrinterName, Screw, ScrewName
 from finger3d.scene.messages import described
 
 BAND_DEPTH_MM = 1.5

@@ -1,15 +1,21 @@
 """Rigid objects, analytic or triangulated, and their first contact with the finger."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
 from finger3d.objects.held import HeldBody
-from finger3d.objects.placed import PlacedObject
+from finger3d.objects.placed import DistanceTracker, PlacedObject
 from finger3d.objects.pose import Move, ObjectPose
-from finger3d.objects.registry import OBJECTS
 from finger3d.objects.rigid import Axis, RigidObject, vertical_frame
 from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wedge
-from finger3d.objects.tracking import DistanceTracker
-from finger3d.objects.triangulated import MeshObject
+from finger3d.objects.triangulated import MeshObject, ObjectFile
 from finger3d.objects.wave import Wave
+
+OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
+    {"plane": Plane, "cylinder": Cylinder, "sphere": Sphere, "wedge": Wedge, "wave": Wave, "mesh": ObjectFile}
+)
+"""The objects that a scene's ``[object]`` table may name, by shape. A new object is one more entry."""
 
 __all__ = [
     "OBJECTS",

@@ -88,9 +88,7 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
     if solid is None:
         axes.set_axis_off()
         return
-    names = _QUANTITIES | {
-        k: f"gauge\n{k.removeprefix('gauge_')}" for k in list(solid.numbers) if k.startswith("gauge_")
-    }
+    names = _QUANTITIES | {column.key: f"gauge\n{column.sensor}" for column in solid.strains}
     keys = [k for k in names if solid.numbers[k] != 0.0][:_MOST_QUANTITIES]
     shown = [c for c in own if c.model != "solid, ends held"]
     at, step = np.arange(len(keys)), 0.8 / max(len(shown), 1)

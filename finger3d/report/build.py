@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d._machine import versions as installed
+from finger3d.accuracy.error_bars import with_error
 from finger3d.io import atomic
 from finger3d.report.html import asset
-from finger3d.results.format import with_error
 
 if TYPE_CHECKING:
     from finger3d.report.chart import Chart

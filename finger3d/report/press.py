@@ -12,6 +12,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
+from finger3d.mechanics.columns import QUANTITIES
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
@@ -170,15 +171,8 @@ def headline(
         if key.startswith("tangential") and abs(value) <= _ROUND_OFF * max(step.friction_sum_N, 1e-300):
             continue
         rows.append(row(key, name, value, unit, factor))
-    rows += [row(f"gauge_{name}", f"strain of gauge {name}", strain) for name, strain in step.gauges.items()]
-    rows += [
-        row(f"marker_{name}_{axis}_mm", f"displacement of marker {name} along {axis}", value, "mm")
-        for name, moved in step.markers.items()
-        for axis, value in zip("xyz", moved, strict=True)
-        if value
-    ]
-    taxels = step.taxels.items()
-    return rows + [row(f"taxel_{name}_MPa", f"pressure of taxel {name}", pressure, "MPa") for name, pressure in taxels]
+    read = step.readings.items()  # a displacement that is zero by symmetry is left out
+    return rows + [row(c.key, c.title, value, c.unit) for c, value in read if value != 0.0 or c.kind != "marker"]
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
@@ -258,13 +252,9 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     scale = max(abs(step.normal_force_N) for step in good)
     # For instance the tangential force of a symmetric press, and slides of a path without them.
     shown = [k for k in _STEP_COLUMNS if k == "depth_mm" or max(abs(getattr(s, k)) for s in good) > _ROUND_OFF * scale]
-    gauges = list(good[-1].gauges)
-    taxels = list(good[-1].taxels)
-    rows = [
-        [*(getattr(s, k) for k in shown), *(s.gauges.get(g) for g in gauges), *(s.taxels.get(t) for t in taxels)]
-        for s in good
-    ]
-    names = [*(f"strain {g}" for g in gauges), *(f"pressure {t} (MPa)" for t in taxels)]
+    columns = [column for column in good[-1].readings if not column.axis]
+    rows = [[*(getattr(s, k) for k in shown), *(s.readings.get(c) for c in columns)] for s in good]
+    names = [f"{QUANTITIES[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
     table = Table([*(_STEP_COLUMNS[k] for k in shown), *names], rows)
     return PageSection(
         "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True

@@ -6,9 +6,10 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from finger3d.mechanics.columns import Column
 from finger3d.report.build import Code, HeadlineRow, PageSection, Table, write_page
 from finger3d.report.chart import Chart, Line
-from finger3d.results.summary import read_json, read_rows, title_of
+from finger3d.results.summary import read_json, read_rows, strains_of, title_of
 
 _MOST_ROWS = 500  # of the table of points
 _MOST_FAILURES = 10  # listed below the headline
@@ -30,7 +31,8 @@ def sweep_page(folder: str | Path) -> Path:
     failed = [row for row in rows if row["outcome"] != "converged"]
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
     names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
-    names += [name for name in (rows[0] if rows else {}) if name.startswith("gauge_")] + ["outcome"]
+    strains = strains_of(data["scene"])
+    names += [*(column.key for column in strains if rows and column.key in rows[0]), "outcome"]
     headline = [
         HeadlineRow("points", f"{len(rows)} of {data['points']}"),
         HeadlineRow("bodies", str(len(data["bodies"]))),
@@ -50,7 +52,7 @@ def sweep_page(folder: str | Path) -> Path:
             PageSection("Varied", [Table(("key", "values"), varied)]),
             PageSection("Scene", [Code(json.dumps(data["scene"], indent=2), "scene before the variation")]),
         ],
-        charts=sweep_charts(rows, list(data["vary"]), is_list),
+        charts=sweep_charts(rows, list(data["vary"]), strains, is_list),
         command="sweep",
         outcome=f"{len(rows) - len(failed)} of {data['points']} points converged",
         good=len(rows) == data["points"] and not failed,
@@ -66,23 +68,24 @@ def _values(texts: Sequence[str], is_list: bool) -> str:
     return f"{len(set(numbers))} values from {min(numbers):.6g} to {max(numbers):.6g}"
 
 
-def sweep_charts(rows: Sequence[Mapping[str, str]], keys: Sequence[str], is_list: bool = False) -> list[Chart]:
+def sweep_charts(
+    rows: Sequence[Mapping[str, str]], keys: Sequence[str], strains: Sequence[Column] = (), is_list: bool = False
+) -> list[Chart]:
     """Return charts of the normal force and of gauge strains against each varied key with several numeric values.
 
     Parameters
     ----------
     rows : rows of results.csv; points that failed are ignored
     keys : varied keys; a chart against one of them has a line for each combination of the others
+    strains : columns of gauges
     is_list : whether the points are a list: each is then drawn by itself
     """
     good = [{name: _number(text) for name, text in row.items()} for row in rows if row["outcome"] == "converged"]
     values = {key: {row[key] for row in good} for key in keys}
     along = [key for key, of in values.items() if len(of) > 1 and all(isinstance(v, float) for v in of)]
-    gauges = [name for name in (good[0] if good else {}) if name.startswith("gauge_")]
     titles = {"normal_force_N": ("Normal force", "normal force (N)")}
-    for name in gauges[:_MOST_GAUGES]:
-        gauge = name.removeprefix("gauge_")
-        titles[name] = (f"Strain, {gauge}", f"strain, {gauge}")
+    shown_strains = [column for column in strains if good and column.key in good[0]][:_MOST_GAUGES]
+    titles |= {c.key: (f"Strain, {c.sensor}", f"strain, {c.sensor}") for c in shown_strains}
     found = []
     for name, (quantity, title) in titles.items():
         for key in along[:_MOST_KEYS]:

@@ -11,7 +11,7 @@ from finger3d.errors import Finger3dError
 from finger3d.plotting.layout import finish, sheet
 from finger3d.report.chart import Chart
 from finger3d.report.sweep import sweep_charts
-from finger3d.results.summary import read_json, read_rows
+from finger3d.results.summary import read_json, read_rows, strains_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,8 @@ def picture(folder: str | Path, path: str | Path) -> None:
     folder = Path(folder)
     try:
         data = read_json(folder / "sweep.json")
-        charts = sweep_charts(read_rows(folder / "results.csv"), list(data["vary"]), data.get("list", False))
+        rows, strains = read_rows(folder / "results.csv"), strains_of(data["scene"])
+        charts = sweep_charts(rows, list(data["vary"]), strains, data.get("list", False))
     except (KeyError, TypeError, ValueError):  # for instance saved by a spreadsheet
         raise Finger3dError(
             f"{folder}: sweep.json or results.csv is not as a sweep wrote it; remove the folder, and sweep again"

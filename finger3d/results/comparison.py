@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.companions import FACTOR
 from finger3d.errors import Outcome
+from finger3d.mechanics.columns import Column
 
 FORCE = "force_N_per_mm"
 
@@ -21,6 +22,7 @@ class Case:
     model : plane stress, plane strain, solid, or solid with held ends
     size_mm : edge length at the contact
     numbers : quantity -> value, forces per width; see `finger3d.analyses.compare.cases.quantities`
+    strains : columns of the strains among the numbers
     errors : quantity -> error bar of mesh and increments; empty if it was not estimated
     lines : line along x ("z = 0", "end") -> columns x_mm, pressure_MPa, shear_x_MPa, shear_z_MPa, status
     outcome : `numbers` is empty unless it is CONVERGED
@@ -41,6 +43,7 @@ class Case:
     companion: Mapping[str, float] = field(default_factory=dict)
     ratio: float = FACTOR
     method: str = ""
+    strains: Sequence[Column] = ()
 
     @property
     def ok(self) -> bool:

@@ -118,28 +118,28 @@ def chosen(count: int, most: int = MOST) -> list[int]:
 
 
 def states_of(
-    problem: Problem, frames: Sequence[StepResult], mesh: Mesh, parent: Array, sign: Array, last: Array
+    problem: Problem, steps: Sequence[StepResult], mesh: Mesh, parent: Array, sign: Array, last: Array
 ) -> States:
     """Recover chosen increments.
 
     Parameters
     ----------
-    frames : those that converged, in turn
+    steps : those that converged, in turn
     mesh, parent, sign : the whole finger, and where each node comes from (`finger3d.fem.simplex.unfold`)
     last : (n, d) mm, displacement of the whole finger at the end, which is known already
     """
     from finger3d.fem.recover import displacement
 
-    kept = chosen(len(frames))
+    kept = chosen(len(steps))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)
-    parts = [frames[number].meshed_state for number in kept[:-1]]
+    parts = [steps[number].meshed_state for number in kept[:-1]]
     for k, unknowns in enumerate(formulation_of(problem.model).unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
-    tables = [contact_table(problem.points, frames[i].state) for i in kept]
+    tables = [contact_table(problem.points, steps[i].state) for i in kept]
     facets = {label: f for label, f in mesh.facets.items() if len(f)}
     faces = {label: FREE_FACES.index(label) if label in FREE_FACES else -1 for label in facets}
-    at = [frames[i].target for i in kept]
+    at = [steps[i].target for i in kept]
     placed = [problem.placed(target) for target in at]
     thing = object_drawing(problem, placed)
 
@@ -162,7 +162,7 @@ def states_of(
         shear_y=columns("shear_y_MPa"),
         shear_z=columns("shear_z_MPa"),
         gap=columns("gap_mm"),
-        status=np.array([frames[i].state.status for i in kept], dtype=np.int8),
+        status=np.array([steps[i].state.status for i in kept], dtype=np.int8),
         object_points=thing.points.astype(np.float32),
         object_faces=thing.faces.astype(np.int32),
         object_rotation=np.array([p.turned for p in placed]),

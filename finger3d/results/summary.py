@@ -10,6 +10,7 @@ from pathlib import Path
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.columns import Column, displacement_columns, pressure_column, strain_columns
 from finger3d.mechanics.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
 
@@ -82,6 +83,24 @@ class PressStep:
     taxels: Mapping[str, float] = field(default_factory=dict)
     other_readings: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def readings(self) -> dict[Column, float | None]:
+        """Readings of gauges, markers and taxels by column."""
+        return readings_of(self.gauges, self.markers, self.taxels)
+
+
+def readings_of(
+    gauges: Mapping[str, float | None], markers: Mapping[str, Sequence[float]], taxels: Mapping[str, float]
+) -> dict[Column, float | None]:
+    """Return readings by column from those of an entry of ``steps``, which are sorted by the kind of their sensors."""
+    strains = {strain_columns(name)[0]: strain for name, strain in gauges.items()}
+    displacements = {
+        column: component
+        for name, displacement in markers.items()
+        for column, component in zip(displacement_columns(name), displacement, strict=True)
+    }
+    return {**strains, **displacements, **{pressure_column(name): pressure for name, pressure in taxels.items()}}
+
 
 def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
     """Return the steps of a summary.
@@ -145,3 +164,9 @@ def gauges_of(scene: TreeView) -> list[Gauge]:
         If they are not as a press writes them.
     """
     return [record_of(Gauge, GaugeTable.model_validate(gauge)) for gauge in scene.get("gauge") or ()]
+
+
+def strains_of(scene: TreeView) -> list[Column]:
+    """Return the columns of the strains of a scene's gauges, then those of the strains without foils."""
+    columns = [strain_columns(gauge["name"]) for gauge in scene.get("gauge") or ()]
+    return [own for own, _ in columns] + [free for _, free in columns]

@@ -10,10 +10,11 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
+from finger3d.mechanics.columns import displacement_columns, pressure_column, strain_columns
 from finger3d.meshing.given import GivenMesh
+from finger3d.scene.derived import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import Place, dotted, shown
-from finger3d.scene.parts import check_parts
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 _MOST_MARKERS = 20_000
@@ -55,8 +56,8 @@ def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[s
         return [f"mesh.goal = {shown(goal)}: only with mesh.tolerance, for which the mesh is refined"]
     first = "normal_force_N" if legs[-1].force_N is None else "depth_mm"  # under a force the depth is unknown
     names = [first, "friction_sum_N", "external_work_mJ", "dissipation_mJ"]
-    names += [f"gauge_{g.name}" for g in tables.gauge] + [f"taxel_{t.name}_MPa" for t in tables.taxel]
-    names += [f"marker_{m.name}_{axis}_mm" for m in tables.marker for axis in ("xyz" if solid else "xy")]
+    names += [strain_columns(g.name)[0].key for g in tables.gauge] + [pressure_column(t.name).key for t in tables.taxel]
+    names += [c.key for m in tables.marker for c in displacement_columns(m.name, 3 if solid else 2)]
     if goal in names:
         return []
     return [f"mesh.goal = {shown(goal)}: no number of this press; must be one of {', '.join(names)}"]
@@ -67,7 +68,7 @@ def _names(tables: SceneTable) -> list[str]:
     kinds = [("gauge", g.name) for g in tables.gauge] + [("taxel", t.name) for t in tables.taxel]
     kinds += [("marker", m.name) for m in tables.marker]
     count = Counter(name for _, name in kinds)
-    count.update(f"{m.name}.{axis}" for m in tables.marker for axis in "xyz")
+    count.update(column.name for m in tables.marker for column in displacement_columns(m.name))
     twice = {name: kind for kind, name in kinds if count[name] > 1}
     return [
         f"{kind}.name = {shown(name)}: used more than once; every gauge, marker and taxel needs its own name"

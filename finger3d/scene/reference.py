@@ -7,10 +7,10 @@ import re
 import typing
 from collections.abc import Iterator
 
+from finger3d.effects import effect_names, effect_type
 from finger3d.geometry.registry import designs
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene.messages import described, listed, shown
-from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     ContactTable,
     DomainTable,

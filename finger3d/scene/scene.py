@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from finger3d._ranges import PathName, one_line, printable
 from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.fem.material import Isotropic
 from finger3d.geometry.design import Design
@@ -23,11 +24,9 @@ from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_pa
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
-from finger3d.scene.legs import legs_of
+from finger3d.scene.derived import legs_of, parts_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
-from finger3d.scene.parts import parts_of
-from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     LegsTable,
     LegTable,

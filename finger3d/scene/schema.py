@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from finger3d._types import Tree
+from finger3d.effects import effect_names, effect_type
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import MODULUS_KEYS
@@ -17,7 +18,6 @@ from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
 from finger3d.scene.reference import descriptions
-from finger3d.scene.registry import effect_names, effect_type
 from finger3d.scene.tables import (
     FileTable,
     LegsTable,

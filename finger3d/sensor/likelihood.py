@@ -8,6 +8,11 @@ has several peaks, that set is several intervals, all of which are reported.
 The smallest ``d^T C^-1 d`` of several readings of one press follows a chi-square distribution with one degree of
 freedom less than there are readings; that of a single reading is at most as large as with one degree of freedom.
 Readings with a p-value below 0.001 are out of range, or contradict each other.
+
+The Fisher information of readings that nobody has taken yet marginalises the tolerances.  The unknowns are mu and the
+tolerances that all readings share, each in units of its standard deviation.  A reading with slope s against mu, effects
+f of the shared tolerances, and variance d of its own adds ``v v^T / d`` with v = (s, f) to the Fisher matrix.  The
+information about mu alone is the Schur complement of the other unknowns.
 """
 
 from __future__ import annotations
@@ -309,3 +314,37 @@ def chi_square_tail(value: float, freedom: int) -> float:
         total += term
         term *= half / (i + 0.5)
     return math.erfc(math.sqrt(half)) + math.exp(-half) * total
+
+
+@dataclass(frozen=True)
+class ReadingEffects:
+    """Effects of mu and tolerances on candidates for a reading (c), at several mu (m).
+
+    Attributes
+    ----------
+    effects : (c, m, 1 + q) slope against mu, and change for one standard deviation of each shared tolerance
+    variance : (c, m) of the noise and of what every reading has of its own
+    """
+
+    effects: Float
+    variance: Float
+
+    @property
+    def fisher(self) -> Float:
+        """Fisher matrices (c, m, 1 + q, 1 + q) of the candidates."""
+        v = self.effects
+        return np.asarray(v[..., :, None] * v[..., None, :] / self.variance[..., None, None])
+
+
+def prior(shared: int, mu_sd: float) -> Float:
+    """Return the Fisher matrix (1 + q, 1 + q) without readings; `mu_sd` is what is known of mu beforehand."""
+    return np.diag([mu_sd**-2, *np.ones(shared)])
+
+
+def mu_sd(fisher: Float) -> Float:
+    """Return the standard deviation (...) of mu from Fisher matrices (..., 1 + q, 1 + q)."""
+    information, mixed, others = fisher[..., 0, 0], fisher[..., 1:, 0], fisher[..., 1:, 1:]
+    if not mixed.shape[-1]:
+        return np.asarray(1.0 / np.sqrt(information))
+    left = information - np.einsum("...i,...i->...", mixed, np.linalg.solve(others, mixed[..., None])[..., 0])
+    return np.asarray(1.0 / np.sqrt(left))

@@ -111,9 +111,9 @@ class StrainMap:
 
     @classmethod
     def of(
-        cls, problem: Problem, frames: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
+        cls, problem: Problem, steps: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
     ) -> StrainMap:
-        """Recover the field of every frame with the factor at hand, and read it at every square of the plane z_mm."""
+        """Recover the field of every step with the factor at hand, and read it at every square of the plane z_mm."""
         check(problem.model)
         design = problem.model.design
         half, top = design.half_length_mm, design.height_mm
@@ -123,9 +123,9 @@ class StrainMap:
         grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         points = np.insert(grid, 2, z_mm, axis=1)[:, : problem.dim]
         reader = Reader.at(problem.mesh, points, problem.axes)
-        mus = np.array(sorted(frames))
+        mus = np.array(sorted(steps))
         fields = []
-        for unknowns in formulation_of(problem.model).unknowns(problem, [frames[float(mu)].meshed_state for mu in mus]):
+        for unknowns in formulation_of(problem.model).unknowns(problem, [steps[float(mu)].meshed_state for mu in mus]):
             fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
         return cls(mus, x, y, z_mm, np.array(fields))
 

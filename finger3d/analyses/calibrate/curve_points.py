@@ -55,4 +55,4 @@ class CurvePoints:
 
     def reading(self, name: str) -> Float:
         """Return a reading (n,) in the presses that converged."""
-        return np.array([frame.readings[name] for frame in self.frames.values()])
+        return np.array([frame.named_readings[name] for frame in self.frames.values()])

@@ -37,7 +37,7 @@ def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings
     mus = [p.mu for p in curve.presses]
     columns: Tree = {"mu": mus}
     for name in settings.names:
-        columns[name] = [frames[mu].readings[name] if mu in frames else math.nan for mu in mus]
+        columns[name] = [frames[mu].named_readings[name] if mu in frames else math.nan for mu in mus]
     write_csv(folder / "calibration.csv", columns | {"outcome": [failed.get(mu, "converged") for mu in mus]})
 
 
@@ -46,7 +46,7 @@ def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -
     if not model.is_linear_elastic:
         report.say("no reduced.npz: the compliance of the body changes during the press")
         return
-    rows = problem.system.reading_rows[: len(model.reading_names)]
+    rows = problem.system.reading_rows[: len(model.columns)]
     own = replace(
         problem,
         model=replace(problem.model, gauges=model.gauges),

@@ -70,7 +70,7 @@ def reading_only(model: Model, names: Sequence[str]) -> Model:
     return replace(
         model,
         gauges=model.gauges if model.inclusions else tuple(g for g in model.gauges if g.name in wanted),
-        markers=tuple(m for m in model.markers if wanted & {*m.columns(dim)}),
+        markers=tuple(m for m in model.markers if wanted & {column.name for column in m.columns(dim)}),
         taxels=tuple(t for t in model.taxels if t.name in wanted),
     )
 
@@ -81,5 +81,5 @@ def read(problem: Problem, names: Sequence[str], mu: Float, initial: PressesByMu
 
 
 def _readings(frames: Sequence[StepResult], names: Sequence[str]) -> Float:
-    every = [frame.readings if frame.outcome.ok else {} for frame in frames]
+    every = [frame.named_readings if frame.outcome.ok else {} for frame in frames]
     return np.array([[one.get(name, math.nan) for one in every] for name in names])

@@ -88,7 +88,7 @@ def calibrate(
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
     from finger3d.scene import scene_of
-    from finger3d.scene.parts import largest_spread
+    from finger3d.scene.derived import largest_spread
 
     report = report or Progress()
     scene = scene_of(scene, overrides)
@@ -230,7 +230,7 @@ def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Prog
         frames = list(curve.frames.values())
         base = ReferenceReadings(
             mu=mu,
-            readings={name: curve.reading(name) for name in frames[0].readings},
+            readings={name: curve.reading(name) for name in frames[0].named_readings},
             sample=_sample(curve.problem, len(mu)),
             frame=frames[-1],
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},

@@ -11,9 +11,8 @@ import numpy as np
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings import Marker, Taxel
+from finger3d.mechanics.readings import Reading
 from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, Kind
 
 _LARGEST_MU = 1e6
@@ -89,8 +88,8 @@ class CalibrationSettings:
 def found_readings(model: Model, names: Sequence[str], noises: Mapping[Kind, float]) -> tuple[CalibratedReading, ...]:
     """Return the readings of these names; an unknown name is refused with the nearest one."""
     dim = 3 if model.domain == "solid" else 2
-    calibrated: tuple[Marker | Taxel | Gauge, ...] = (*model.markers, *model.taxels, *model.gauges)
-    known: dict[str, Kind] = {name: reading.kind for reading in calibrated for name in reading.columns(dim)}
+    kinds: dict[Kind, tuple[Reading, ...]] = {"marker": model.markers, "taxel": model.taxels, "gauge": model.gauges}
+    known = {c.name: kind for kind, readings in kinds.items() for reading in readings for c in reading.columns(dim)}
     if not names:
         raise Finger3dError("--gauge: no name is given")
     if not known:

@@ -279,7 +279,8 @@ def _mirrored(model: Model, names: Sequence[str]) -> tuple[dict[str, tuple[Any, 
         images = [sensor.mirrored(f"{sensor.name} mirrored") for sensor in own]
         sensors[kind] = (*own, *(image for image, _ in images))
         for sensor, (image, signs) in zip(own, images, strict=True):
-            image_of |= zip(sensor.columns(dim), zip(image.columns(dim), signs, strict=False), strict=True)
+            columns = zip(sensor.columns(dim), image.columns(dim), signs, strict=False)
+            image_of |= {column.name: (reflected.name, sign) for column, reflected, sign in columns}
     return sensors, tuple(image_of[n][0] for n in names), np.array([image_of[n][1] for n in names])
 
 

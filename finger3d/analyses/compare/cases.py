@@ -13,7 +13,8 @@ from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
 from finger3d.fem.simplex import CONTACT
 from finger3d.mechanics.build import build
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, flat_readings, measure
+from finger3d.mechanics.columns import by_key, in_space, of_kind
+from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import Run, march_automatic
@@ -54,9 +55,9 @@ def widened(model: Model, width_mm: float) -> Model:
 def press_with_errors(name: str, model: Model) -> Case:
     """Press the model and estimate its errors; see `finger3d.accuracy.estimate.estimate`."""
     start = time.perf_counter()
-    problem, frames, runs, case = _pressed(name, model)
+    problem, steps, runs, case = _pressed(name, model)
     if case.ok:
-        found = estimate(problem, frames, numbers=lambda p, f: quantities(p.points, f), runs=runs)
+        found = estimate(problem, steps, numbers=lambda p, f: quantities(p.points, f), runs=runs)
         case = replace(
             case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
         )
@@ -67,21 +68,22 @@ def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], 
     start = time.perf_counter()
     # The whole contact face is a candidate, because the extent of contact differs from model to model.
     problem = build(model, margin=math.inf)
-    frames, increments = march_automatic(problem)
+    steps, increments = march_automatic(problem)
     runs = increments.runs if increments else ()
-    frame = frames[-1]
+    step = steps[-1]
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
-    case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, frame.outcome)
-    if frame.outcome.ok:
-        case = replace(case, numbers=quantities(problem.points, frame), lines=lines_along_x(problem.points, frame))
-    return problem, frames, runs, replace(case, seconds=time.perf_counter() - start)
+    case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, step.outcome)
+    if step.outcome.ok:
+        numbers, lines = quantities(problem.points, step), lines_along_x(problem.points, step)
+        case = replace(case, numbers=numbers, lines=lines, strains=of_kind(step.readings, "gauge"))
+    return problem, steps, runs, replace(case, seconds=time.perf_counter() - start)
 
 
-def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
+def quantities(points: ContactPoints, step: StepResult) -> dict[str, float]:
     """Return the quantities of a step that sections and solids have in common: N per mm of width, mm, MPa, strains."""
-    numbers = measure(points, frame)
+    numbers = measure(points, step)
     width = 2.0 * points.half_width_mm
-    friction = np.abs(points.friction(frame.state.force)).sum(axis=0)
+    friction = np.abs(points.friction(step.state.force)).sum(axis=0)
     out = {
         "force_N_per_mm": numbers["normal_force_N"] / width,
         "friction_sum_N_per_mm": numbers["friction_sum_N"] / width,
@@ -95,14 +97,14 @@ def quantities(points: ContactPoints, frame: StepResult) -> dict[str, float]:
         out["contact_length_end_mm"] = 2.0 * numbers["contact_half_length_end_mm"]
     if points.dim == 3:
         out["moment_y_Nmm_per_mm"] = numbers["moment_y_Nmm"] / width
-    middle = lines_along_x(points, frame)["z = 0"]
+    middle = lines_along_x(points, step)["z = 0"]
     out["peak_pressure_MPa"] = float(np.max(middle["pressure_MPa"], initial=0.0))
-    return out | flat_readings(numbers)
+    return out | by_key(in_space(step.readings))
 
 
-def lines_along_x(points: ContactPoints, frame: StepResult) -> dict[str, Tree]:
+def lines_along_x(points: ContactPoints, step: StepResult) -> dict[str, Tree]:
     """Return tractions along x at z = 0, or near it on an unstructured mesh, and at the end of a solid."""
-    table = contact_table(points, frame.state)
+    table = contact_table(points, step.state)
     z = table["z_mm"]
     exact = 1e-6 * points.half_width_mm
     top = points.face == CONTACT

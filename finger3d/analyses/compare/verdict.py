@@ -10,9 +10,9 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.accuracy.companions import FACTOR
+from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
 from finger3d.results.comparison import FORCE, Case
-from finger3d.results.format import with_error
 
 WITHIN = 0.05
 """Relative deviation from the solid below which a plane model is called sufficient."""
@@ -217,8 +217,7 @@ def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]
         (c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order),
         key=lambda c: order.index(c.model),
     )
-    names = list(dict.fromkeys(key for case in own for key in case.numbers))
-    shown = _QUANTITIES | {k: f"strain of gauge {k.removeprefix('gauge_')}" for k in names if k.startswith("gauge_")}
+    shown = _QUANTITIES | {column.key: column.title for case in own for column in case.strains}
     rows = [
         [text, *(_with_error(case, key) if key in case.numbers else "" for case in own)]
         for key, text in shown.items()
@@ -244,7 +243,7 @@ def _sufficient(planes: Sequence[Case], solid: Case) -> str:
         "friction_sum_N_per_mm": "friction sum",
         "peak_pressure_MPa": "peak pressure",
     }
-    names |= {k: f"gauge {k.removeprefix('gauge_')}" for k in solid.numbers if k.startswith("gauge_")}
+    names |= {column.key: f"gauge {column.sensor}" for column in solid.strains}
     parts = []
     for plane in planes:
         sides: dict[str, list[str]] = {"more than": [], "less than": [], "not significantly more or less than": []}

@@ -19,7 +19,8 @@ from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
-from finger3d.mechanics.history import flat_readings, measure, without_readings
+from finger3d.mechanics.columns import by_key, in_order, in_space
+from finger3d.mechanics.history import table_row
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.results.journal import Journal
@@ -54,12 +55,7 @@ Curve = Mapping[str, Float]
 def names_of(model: Model) -> tuple[str, ...]:
     """Return the names of the numbers of an increment, readings included."""
     own = [name for name in PressStep.__dataclass_fields__ if name.split("_")[-1] in _UNITS]
-    readings = {
-        "gauges": {g.name: 0.0 for g in model.gauges},
-        "markers": {m.name: (0.0, 0.0, 0.0) for m in model.markers},
-        "taxels": {t.name: 0.0 for t in model.taxels},
-    }
-    return (*own, *flat_readings(readings))
+    return (*own, *by_key(in_space(in_order(dict.fromkeys(model.columns, 0.0)))))
 
 
 @dataclass
@@ -151,8 +147,7 @@ class Simulation:
             return {"values": list(point), "outcome": outcome, "curve": {}}
         rows = []
         for number, frame in enumerate(frames, start=1):
-            entry = measure(body.problem.points, frame)
-            rows.append({"step": float(number)} | without_readings(entry) | flat_readings(entry))
+            rows.append({"step": float(number)} | table_row(body.problem.points, frame))
         columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
         return {"values": list(point), "outcome": "converged", "curve": columns}
 

@@ -26,7 +26,7 @@ from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 from finger3d.objects import Plane
 from finger3d.progress import Progress
-from finger3d.sensor.information import ReadingEffects
+from finger3d.sensor.likelihood import ReadingEffects
 from finger3d.sensor.maps import Reader
 
 _STEPS = 20

@@ -22,7 +22,7 @@ from finger3d.plotting.gauge_places import GaugeMap, draw
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tables_of, tree
-from finger3d.scene.parts import largest_spread
+from finger3d.scene.derived import largest_spread
 from finger3d.sensor.curve import LARGEST_STRAIN
 
 MOST = 8

@@ -17,7 +17,7 @@ from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 from finger3d.progress import Progress
-from finger3d.sensor.information import ReadingEffects, mu_sd, prior
+from finger3d.sensor.likelihood import ReadingEffects, mu_sd, prior
 
 NOWHERE = "no gauge within these bounds lies in the finger"
 

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d.analyses.free_keys import Bounds, free_keys
-from finger3d.analyses.optimise.evaluation import Evaluation, evaluation_of, row_check
 from finger3d.analyses.optimise.search import Search
 from finger3d.analyses.optimise.task import (
     METHODS,
     MUS,
+    Evaluation,
     OptimisationProblem,
     checked_start,
+    evaluation_of,
     objective_of,
+    row_check,
 )
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_json

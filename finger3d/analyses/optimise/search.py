@@ -14,9 +14,9 @@ import numpy as np
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.evaluation import Evaluation
 from finger3d.analyses.optimise.task import (
     METHODS,
+    Evaluation,
     Objective,
     ObjectiveTable,
     OptimisationProblem,
@@ -25,6 +25,7 @@ from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
+from finger3d.mechanics.columns import strain_columns
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, measure
@@ -62,7 +63,7 @@ class _DesignBody(PressedBody):
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
         """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
         if self._own_press:
-            return lambda g: np.array([end.gauges[g.name] for end in ends])
+            return lambda g: np.array([end.readings[strain_columns(g.name)[0]] for end in ends])
         mesh, axes = self.problem.mesh, self.problem.axes  # all that is kept of the body
         fields = formulation_of(self.problem.model).unknowns(self.problem, [end.meshed_state for end in ends])
         u = np.array([x[: mesh.points.size] for x in fields])

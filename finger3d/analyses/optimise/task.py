@@ -1,4 +1,4 @@
-"""Problem of a design search: free keys, bounds and objective, checked before anything is solved."""
+"""Problem of a design search: free keys, bounds, objective and evaluations; checked before anything is solved."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
 from finger3d.errors import Finger3dError
+from finger3d.results.journal import Row, number_in
 from finger3d.scene import Scene, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN
 
@@ -162,3 +163,42 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
         if "no such key" in str(error) or "must be a " in str(error):
             raise
     return tuple(values)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Evaluation of one design.
+
+    Attributes
+    ----------
+    values : values of the free keys
+    value : objective, NaN where it is undefined
+    outcome : "converged", or the reason why there is no objective
+    """
+
+    values: tuple[float, ...]
+    value: float
+    outcome: str
+
+
+def row_check(problem: OptimisationProblem) -> Callable[[object], str]:
+    """Return a function that describes the mistake in a line of evaluations.jsonl, or returns an empty string."""
+
+    def found(row: object) -> str:
+        if not isinstance(row, dict):
+            return "is no JSON object"
+        values = row.get("values")
+        if not isinstance(values, list) or len(values) != len(problem.free):
+            return f"values must be {len(problem.free)} numbers"
+        if not all(isinstance(v, float) for v in (*values, row.get("objective"))):
+            return "values and objective must be numbers"
+        return "" if isinstance(row.get("outcome"), str) else "outcome must be text"
+
+    return found
+
+
+def evaluation_of(row: Row) -> Evaluation:
+    """Return the evaluation of a line of evaluations.jsonl."""
+    values = row["values"]
+    assert isinstance(values, list)
+    return Evaluation(tuple(values), number_in(row, "objective"), str(row["outcome"]))

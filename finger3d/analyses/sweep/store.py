@@ -13,6 +13,7 @@ from finger3d.analyses.sweep.points import Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
 from finger3d.results.journal import Journal, Row, journal_rows, number_in, opened
+from finger3d.results.summary import PressStep
 from finger3d.scene.messages import shown
 
 JOURNAL, TASK = "points.jsonl", "sweep.json"
@@ -121,11 +122,11 @@ class ResultStore:
                 pq.write_table(pa.table(columns), temporary)
 
     def columns(self) -> dict[str, Column]:
-        """Return the table by column: point, varied keys, numbers of the last step, gauges, outcome and times."""
+        """Return the table by column: point, varied keys, numbers of the last step, readings, outcome and times."""
         rows = [row for _, row in sorted((self.rows | self.lost).items())]
         points = [self.sweep.points[_number_of(row)] for row in rows]
         names = list(dict.fromkeys(name for row in rows for name in row if name not in ("point", *_LAST)))
-        names.sort(key=lambda name: name.startswith("gauge_"))
+        names.sort(key=lambda name: name not in PressStep.__dataclass_fields__)  # readings follow the other numbers
         found: dict[str, Column] = {"point": [point.number for point in points]}
         for vary in self.sweep.vary:
             found[vary.key] = _alike([point.values[vary.key] for point in points])

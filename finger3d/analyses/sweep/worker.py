@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.columns import by_key
 from finger3d.results.journal import Row
 from finger3d.scene import parse
 
@@ -60,7 +61,7 @@ def _columns(body: SharedBody, result: VariantResult | Exception) -> Row:
         return {"outcome": _reason(result)}
     return {
         **result.numbers,
-        **{f"gauge_{name}": strain for name, strain in result.gauges.items()},
+        **by_key(dict(sorted(result.readings.items(), key=lambda item: item[0].kind == "gauge"))),
         "outcome": result.outcome,
         "residual": result.residual,
         "seconds": result.seconds,

@@ -1,4 +1,4 @@
-"""Tables of parts in a scene."""
+"""Materials of parts and legs of a press follow from the tables of a scene."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.material import RIGID_RATIO, Isotropic
 from finger3d.materials.elastic import elastic_constants
 from finger3d.materials.shore import modulus_of_shore_A
-from finger3d.scene import load
-from finger3d.scene.parts import check_parts, largest_spread, moduli, parts_of
-from finger3d.scene.scene import parse
+from finger3d.mechanics.model import Leg
+from finger3d.scene import load, parse
+from finger3d.scene.derived import check_parts, largest_spread, moduli, parts_of
 from finger3d.scene.tables import SceneTable
 from tests.designs import GOOD
+from tests.scene_tables import SMALL
 
 SCENE: dict[str, Any] = {
     "finger": {"geometry": "block", "half_length_mm": 5.0, "height_mm": 4.0, "width_mm": 3.0},
@@ -96,3 +97,9 @@ def test_the_modulus_of_a_part_is_told_and_its_scene_loads_as_the_same(tmp_path:
     assert load(path) == scene
     replaced = load(path, ["parts.skin.E_MPa=0.2"]).as_dict()["parts"]["skin"]
     assert replaced == {"E_MPa": 0.2, "nu": 0.49, "rigid": False}
+
+
+def test_legs_press_slide_and_release() -> None:
+    legs = [{"depth_mm": 10.0}, {"depth_mm": 10.0, "slide_x_mm": 2.0, "steps": "auto"}, {"depth_mm": 0.0, "steps": 5}]
+    model = parse({**SMALL, "press": {"leg": legs}}).model()
+    assert model.legs == (Leg(10.0, steps="auto"), Leg(10.0, slide_x_mm=2.0, steps="auto"), Leg(0.0, steps=5))

@@ -1,15 +1,19 @@
-"""Command ``new``: an example scene that loads and explains every key."""
+"""Commands that help to write: a new scene, its schema, and completion."""
 
 from __future__ import annotations
 
+import json
 import re
+import subprocess
 
 import pytest
 
+from finger3d.cli import app, main
+from finger3d.effects import effect_names
 from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
 from finger3d.scene.reference import reference
-from finger3d.scene.registry import effect_names
+from finger3d.scene.schema import schema
 from tests.commands import run
 
 
@@ -67,3 +71,39 @@ def test_a_core_install_gets_a_scene_that_it_can_press(tmp_path, monkeypatch: py
     monkeypatch.setattr(_extras, "available", lambda *modules: False)
     assert run("new", tmp_path / "core.toml") == 0
     assert load(tmp_path / "core.toml").mesh.mesher == "swept"
+
+
+COMMANDS = [name for name in app if not name.startswith("-")]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_prints_a_script(shell, capsys) -> None:
+    assert run("completion", shell) == 0
+    script = capsys.readouterr().out
+    for command in COMMANDS:
+        assert command in script
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [(["pre"], "press"), (["press", "scene.toml", "--no"], "--no-figures"), (["completion", "b"], "bash")],
+)
+def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, capsys) -> None:
+    """bash reads the script, and is asked what it offers after what was typed."""
+    run("completion", "bash")
+    script = tmp_path / "completion.bash"
+    script.write_text(capsys.readouterr().out)
+    words = " ".join(["finger3d", *typed])
+    ask = (
+        f"source '{script}'; COMP_WORDS=({words}); COMP_CWORD={len(typed)}; COMP_LINE='{words}'; "
+        'COMP_POINT=${#COMP_LINE}; f=$(complete -p finger3d | sed "s/.*-F \\([^ ]*\\).*/\\1/"); $f finger3d; '
+        'printf "%s\\n" "${COMPREPLY[@]}"'
+    )
+    done = subprocess.run(["bash", "--norc", "-c", ask], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert offered in done.stdout.split()
+
+
+def test_schema_prints_the_json_schema_of_a_scene(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == schema()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from finger3d.mold.screws import standard_length
+from finger3d.mold.hardware import standard_length
 
 
 def test_the_longest_screw_that_stays_inside_is_chosen() -> None:
