@@ -37,8 +37,15 @@ class Progress:
         """Report that `done` of `total` steps are finished, with a remark on the last one."""
         self.steps_done, self.steps_total = done, total
 
+    def remark(self, text: str) -> None:
+        """Remark on what is tried within a step; shown at most once a second."""
+
     def say(self, text: str) -> None:
         """Print a permanent line, for instance that a mesh was read from the cache."""
+
+
+QUIET = Progress()
+"""Receiver that prints nothing, for what only announces stages."""
 
 
 class PlainProgress(Progress):
@@ -46,11 +53,12 @@ class PlainProgress(Progress):
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream if stream is not None else sys.stdout
-        self.start = time.perf_counter()
+        self.start = self.shown = time.perf_counter()
 
     def _line(self, text: str) -> None:
         # in one piece: an interruption may fall between the text and the end that print() adds
-        line = f"[{time.perf_counter() - self.start:7.1f} s] {printable(text)}\n"
+        self.shown = time.perf_counter()
+        line = f"[{self.shown - self.start:7.1f} s] {printable(text)}\n"
         print(line, end="", file=self.stream, flush=True)
 
     def stage(self, text: str) -> None:
@@ -61,6 +69,11 @@ class PlainProgress(Progress):
         """Print the step and its remark."""
         super().step(done, total, text)
         self._line(f"step {done} of {total}" + (f": {text}" if text else ""))
+
+    def remark(self, text: str) -> None:
+        """Print the remark, unless another line was printed in the last second."""
+        if time.perf_counter() - self.shown > 1.0:
+            self._line(text)
 
     def say(self, text: str) -> None:
         """Print the remark."""
@@ -107,6 +120,10 @@ class BarProgress(Progress):
         """Move the bar."""
         super().step(done, total, text)
         self.progress.update(self.task, completed=done, total=total, count=f"{done}/{total}", remark=printable(text))
+
+    def remark(self, text: str) -> None:
+        """Show the remark beside the bar, which is drawn some times a second only."""
+        self.progress.update(self.task, remark=printable(text))
 
     def say(self, text: str) -> None:
         """Print a line above the bar."""

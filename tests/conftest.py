@@ -109,10 +109,11 @@ def real() -> tuple[Mesh, Any, list[str]]:
     """The quarter of the Fig. 9 finger by pytetwild, its report, and what was said."""
     from finger3d.meshing.generate import mesh_solid
     from tests.designs import FIG9, OPTIONS, ZONE
+    from tests.logs import Log
 
-    said: list[str] = []
-    mesh, report = mesh_solid(FIG9, OPTIONS, ZONE, ("x", "z"), said.append)
-    return mesh, report, said
+    said = Log()
+    mesh, report = mesh_solid(FIG9, OPTIONS, ZONE, ("x", "z"), said)
+    return mesh, report, said.lines
 
 
 @pytest.fixture(scope="session")

@@ -56,7 +56,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the bodies that had to be meshed; sweeping stands in for pytetwild, of a roller for a ball."""
     names: list[str] = []
 
-    def mesh(design: Any, options: Any, zone: Any, symmetry: tuple[str, ...], say: Any) -> tuple[Mesh, float, float]:
+    def mesh(design: Any, options: Any, zone: Any, symmetry: tuple[str, ...], report: Any) -> tuple[Mesh, float, float]:
         names.append(design.name)
         if isinstance(design, Lump):
             body = design.block

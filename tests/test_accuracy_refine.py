@@ -21,6 +21,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.solve import march
 from finger3d.scene import load
+from tests.logs import Log
 
 SCENE = """
 [finger]
@@ -52,12 +53,12 @@ def section(size: float) -> Model:
 
 
 def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
-    said: list[str] = []
-    found = refine_mesh(section(1.0), 2e-3, say=said.append)
+    said = Log()
+    found = refine_mesh(section(1.0), 2e-3, report=said)
     assert found.met
     assert found.stopped == "met"
     assert found.warning == ""
-    assert len(said) == len(found.rounds) > 1
+    assert len(said.lines) == len(found.rounds) > 1
     assert found.rounds[0].error > 2e-3 >= found.rounds[-1].error
     assert found.rounds[-1].dofs > found.rounds[0].dofs
     assert found.mesh.grading is not None
@@ -81,9 +82,7 @@ def test_a_mesh_that_is_finer_than_the_tolerance_asks_for_is_made_coarser(adjoin
     # and the error is below the tolerance
     coarse, fine = (build(replace(model, mesh=mesh)) for mesh in (found.mesh, MeshOptions(0.04, 0.2, "swept")))
     ends = [list(march(p))[-1] for p in (coarse, fine)]
-    numbers = [
-        e.target.depth_mm * -e.meshed_state.contact.scene_force[:, 1].sum() for e in ends
-    ]  # the one that is not given
+    numbers = [e.target.depth_mm * -e.meshed_state.contact.scene_force[:, 1].sum() for e in ends]
     assert numbers[0] == pytest.approx(numbers[1], rel=0.02)
 
 

@@ -14,7 +14,7 @@ from finger3d.analyses.calibrate.increments import choose_increments, error_of_i
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.run import optimise
+from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.mechanics.build import build
 from finger3d.sensor import estimate, load
@@ -125,13 +125,13 @@ def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
 def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_path: Path) -> None:
     given = {**SCENE, "press": {"depth_mm": 2.0, "steps": count}, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
     free = (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),)
-    found = optimise(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
+    found = find_best(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
     told = json.loads((tmp_path / "design.json").read_text())["increments"]
     assert told["chosen"] is (count == "auto")
     assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 40
     assert told["strain_error"] >= 0.0
     assert found.scene.as_dict()["press"]["steps"] == count
     # the same number again, where the start is remembered and the search goes on
-    more = optimise(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
+    more = find_best(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
     assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
     assert more.evaluations[: len(found.evaluations)] == found.evaluations

@@ -14,8 +14,10 @@ from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_sha
 from finger3d.analyses.calibrate.run import calibrate
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.progress import QUIET
 from finger3d.scene import load
 from finger3d.sensor import Calibration, Tolerance
+from tests.logs import Log
 from tests.models import fig9
 from tests.sensor_cases import FEW, NONE, SCENE, curve, scene, straight
 
@@ -40,14 +42,14 @@ class Fake:
 
 
 def test_the_mesh_is_refined_until_it_makes_less_than_a_tenth_of_the_variance() -> None:
-    fake, said = Fake(), []
-    found = choose_mesh(SECTION, True, fake, said.append)
+    fake, said = Fake(), Log()
+    found = choose_mesh(SECTION, True, fake, said)
     assert mesh_share(found.calibration) <= SHARE
     assert found.note == ""
     assert fake.sizes[0] == SECTION.mesh.size_mm
     assert 2 <= len(fake.sizes) <= 3  # the order of convergence tells how fine
-    assert len(said) == len(fake.sizes) - 1
-    assert "again" in said[0]
+    assert len(said.lines) == len(fake.sizes) - 1
+    assert "again" in said.lines[0]
 
 
 @pytest.mark.parametrize(("automatic", "longest_s"), [(False, 60.0), (True, 0.0)])
@@ -61,7 +63,7 @@ def test_a_finer_mesh_that_is_not_made_is_named_with_its_time(automatic: bool, l
 
 def test_a_mesh_that_cannot_be_made_leaves_the_calibration_before() -> None:
     fake = Fake(fails_below=1.0)
-    found = choose_mesh(SECTION, True, fake, lambda text: None)
+    found = choose_mesh(SECTION, True, fake, QUIET)
     assert fake.sizes == [SECTION.mesh.size_mm]
     assert "large" in found.note
     with pytest.raises(Finger3dError, match="large"):

@@ -16,8 +16,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.build import build
 from finger3d.mechanics.solve import march
-from finger3d.progress import Progress
 from finger3d.sensor import Calibration, estimate
+from tests.logs import Log
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
 
@@ -76,18 +76,12 @@ def test_a_viscous_curve_is_read_after_the_hold_and_tells_mu() -> None:
 
 
 def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None:
-    class Told(Progress):
-        lines: list[str] = []
-
-        def say(self, text: str) -> None:
-            self.lines.append(text)
-
     coarse = {"size_mm": 5.0, "base_size_mm": 15.0, "mesher": "swept"}
     large = scene(effects={"large_deformation": {}}, mesh=coarse, press={"depth_mm": 3.0, "steps": 2})
-    found = calibrate(large, "g36", tmp_path, FEW[:4], tolerances=NONE, report=Told())
+    found = calibrate(large, "g36", tmp_path, FEW[:4], tolerances=NONE, report=(said := Log()))
     assert found.about["factorizations"] > 2  # one of the build, and those of the increments, which all mu share
     assert len(found.mu) == 4
-    assert any("full" in line for line in Told.lines)
+    assert any("full" in line for line in said.lines)
     assert not (tmp_path / "reduced.npz").exists()
     with pytest.raises(Finger3dError, match="effects.large_deformation"):
         calibrate(large, "g36", maps=True)

@@ -110,3 +110,9 @@ def test_the_scenes_own_domain_does_not_matter(scene, tmp_path) -> None:
     as_strain = compare(load(scene, ["model.domain=plane-strain"]), tmp_path / "a", ())
     as_solid = compare(load(scene), tmp_path / "b", ())
     assert [c.numbers for c in as_strain.cases] == [c.numbers for c in as_solid.cases]
+
+
+def test_a_scene_that_leaves_the_mesh_to_a_tolerance_is_refused(scene: Path, tmp_path: Path) -> None:
+    with pytest.raises(Finger3dError, match=r"scene.toml: mesh.tolerance = 0.01: compare needs fixed edge lengths"):
+        compare(scene, tmp_path / "out", overrides=["mesh={tolerance=0.01}"])
+    assert not (tmp_path / "out").exists()

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
+from finger3d.analyses.pressed_body import presses
 from finger3d.mechanics.build import build
 from finger3d.mechanics.gauges import Gauge
+from finger3d.progress import QUIET
 from tests.sensor_cases import NONE, scene
 
 FEW = {**NONE, "depth_mm": 0.1, "nu": 0.003, "gauge_x_mm": 0.3, "gauge_y_mm": 0.3, "gauge_angle_deg": 2.0}
@@ -37,7 +38,7 @@ def test_fields_judge_as_a_calibration_does() -> None:
     gauges = tuple(Gauge(f"g{i}", x, 32.0, angle=a) for i, (x, a) in enumerate(((-25.0, 2.2), (25.0, 0.9))))
     mus = np.linspace(0.1, 0.7, 7)
     given = {name: sd for name, sd in FEW.items() if sd}
-    fields = GaugeFields.of(model, mus, 1.5e-4, given, lambda text: None)
+    fields = GaugeFields.of(model, mus, 1.5e-4, given, QUIET)
     joint, _ = calibrated(replace(model, gauges=gauges), ["g0", "g1"], mus, tolerances=FEW)
     for gauge, own in zip(gauges, joint.readings, strict=True):
         effects = fields.effects(np.array([gauge.middle]), np.array([gauge.angle]))

@@ -1,91 +1,21 @@
-"""Design search: what is refused, what is judged, and that gauges cost no body."""
+"""Optimisation: the files of a search, in which a design that cannot be built has a line, too."""
 
 from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import optimise
-from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
-from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
-from finger3d.scene import load, tree
 from tests.scenes import words
-from tests.sensor_cases import objective_table
 
 SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
-ANGLE = FreeKey("gauge.g36.angle_deg", 0.0, 90.0)
-MUS = (0.1, 0.5, 1.0)
 
 
-@pytest.fixture
-def problem(root: Path) -> OptimisationProblem:
-    path = root / "geometries" / "fig9.toml"
-    return OptimisationProblem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
-
-
-def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path) -> None:
-    found = optimise(problem, tmp_path)
-    assert found.bodies == 1
-    assert len(found.evaluations) == 13
-    assert found.best.value == max(e.value for e in found.evaluations) >= found.start.value
-    model = found.scene.model()
-    strain = []
-    for mu in MUS:
-        own = build(replace(model, friction=replace(model.friction, mu=mu)))
-        strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(
-        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
-    )
-    assert load(tmp_path / "best.toml").tables.gauge[0].angle_deg == found.best.values[0]
-
-
-@pytest.mark.parametrize("bulk", [True, False])
-def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, bulk, tmp_path) -> None:
-    """Ten time constants long, so that the instantaneous field is far from the one the press ends with."""
-    visco = f"effects.viscosity={{prony = [[0.5, 0.1]], bulk = {str(bulk).lower()}}}"
-    given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
-    found = optimise(replace(problem, given=given, budget=1), tmp_path)
-    assert found.bodies == 1
-    model = found.scene.model()
-    strain = []
-    for mu in MUS:
-        own = build(replace(model, friction=replace(model.friction, mu=mu)))
-        strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(
-        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
-    )
-
-
-def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path) -> None:
-    whole = optimise(replace(problem, budget=10), tmp_path / "whole")
-    first = optimise(replace(problem, budget=4), tmp_path / "parts")
-    kept = tmp_path / "parts" / "evaluations.jsonl"
-    torn = kept.read_text()
-    kept.write_text(torn + '{"values": [12.5], "obj')
-    second = optimise(replace(problem, budget=10), tmp_path / "parts")
-    assert kept.read_text() == (tmp_path / "whole" / "evaluations.jsonl").read_text()
-    assert [e.values for e in second.evaluations] == [e.values for e in whole.evaluations]
-    assert second.evaluations[: len(first.evaluations)] == first.evaluations
-    with pytest.raises(Finger3dError, match="task"):
-        optimise(replace(problem, noise=1.0), tmp_path / "parts")
-
-
-def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path) -> None:
-    free = (FreeKey("finger.edge_height_mm", 30.0, 40.0), ANGLE)
-    found = optimise(replace(problem, free=free, budget=2), tmp_path)
-    assert 2 <= found.bodies <= 3
-    assert len(found.evaluations) > 50
-
-
-def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_path) -> None:
-    found = optimise(replace(problem, free=(FreeKey("gauge.0.y_mm", 40.0, 60.0),), budget=8), tmp_path)
+def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(root: Path, tmp_path: Path) -> None:
+    scene = root / "geometries" / "fig9.toml"
+    found = optimise(scene, ["gauge.0.y_mm=40:60"], tmp_path, mus=(0.1, 0.5, 1.0), budget=8, overrides=SETS)
+    assert found.keys == ("gauge.0.y_mm",)
     with (tmp_path / "evaluations.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert any("gauge.0.y_mm" in row["outcome"] for row in rows)
@@ -96,10 +26,3 @@ def test_a_design_that_cannot_be_built_is_a_line_with_its_reason(problem, tmp_pa
     assert f"gauge.0.y_mm 40 60 {found.start.values[0]:.5g} {found.best.values[0]:.5g}" in page
     assert f"{failed} of {len(rows)} designs" in page
     assert (tmp_path / "design.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize("method", ["dual-annealing", "nelder-mead"])
-def test_other_optimisers_stay_within_bounds_and_budget(method, problem, tmp_path) -> None:
-    found = optimise(replace(problem, method=method), tmp_path)
-    assert len(found.evaluations) <= problem.budget + 1
-    assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)

@@ -53,13 +53,13 @@ def test_the_papers_rule_takes_a_fixed_number_of_increments(tmp_path: Path) -> N
 
 def test_contact_beyond_the_candidate_points_is_solved_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from finger3d.analyses import press
-    from finger3d.mechanics import build as module
+    from finger3d.analyses import pressed_body as module
 
     scene = written(tmp_path, SECTION)
     build = module.build
 
-    def narrow(model, say, margin=-0.8):  # candidates only where the rigid overlap is deep
-        return build(model, say, margin)
+    def narrow(model, report, margin=-0.8):  # candidates only where the rigid overlap is deep
+        return build(model, report, margin)
 
     monkeypatch.setattr(module, "build", narrow)
     result = press.press(scene, tmp_path / "narrow", figures=False)

@@ -13,12 +13,13 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.recover import displacement
 from finger3d.fem.traces import surface
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, check_surface
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.solve import march
 from finger3d.scene import Scene, parse, tree
+from tests.logs import Log
 
 BLOCK = {
     "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
@@ -98,12 +99,12 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
 def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) -> None:
     model = scene("friction.mu=0.0").model()
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
-    said = []
-    first = [lambda m, say, margin=-0.8: build(m, say, margin)]
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, *margin: first[0](m, say, *margin))
-    narrow = SharedBody(model, [Variant.of(model)], said.append)
+    said = Log()
+    first = [lambda m, report, margin=-0.8: build(m, report, margin)]
+    monkeypatch.setattr("finger3d.analyses.pressed_body.build", lambda m, report, *margin: first[0](m, report, *margin))
+    narrow = SharedBody(model, [Variant.of(model)], said)
     again = narrow.press(Variant.of(model))
-    assert any("beyond" in text for text in said)
+    assert any("beyond" in text for text in said.lines)
     assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
 
 
@@ -202,11 +203,8 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
             kinematics.gap(problem, displacement(problem.mesh, x), frame.target, face)[0] for x in (unknowns, alone)
         )
         assert np.abs(found - expected).max() <= 1e-12 * frame.target.depth_mm
-    assert (
-        contact_within_candidates(problem, ends)
-        == [contact_within_candidates(problem, [frame])[0] for frame in ends]
-        == [True] * 3
-    )
+    assert all(check.within_candidates for check in check_surface(problem, ends))
+    assert all(check_surface(problem, [end])[0].within_candidates for end in ends)
 
 
 def test_one_solver_proves_as_the_other(monkeypatch) -> None:
@@ -233,7 +231,9 @@ NARROW = -0.8
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.build.build", lambda m, say, margin=NARROW: build(m, say, margin))
+    monkeypatch.setattr(
+        "finger3d.analyses.pressed_body.build", lambda m, report, margin=NARROW: build(m, report, margin)
+    )
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -249,20 +249,15 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     wide = SharedBody(models[1], variants)
     alone = [wide.press(v) for v in variants]
     narrowed(monkeypatch)
-    said: list[str] = []
-    body = SharedBody(models[1], variants, said.append)
+    said = Log()
+    body = SharedBody(models[1], variants, said)
     together = list(body.presses(variants))
-    assert sum("beyond" in text for text in said) == 1
+    assert sum("beyond" in text for text in said.lines) == 1
     for one, other in zip(alone, together, strict=True):
         assert other.numbers == pytest.approx(one.numbers, rel=1e-9)
         assert strains(other) == pytest.approx(strains(one), rel=1e-9)
     assert together[1].readings != together[3].readings
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
-    # frames speak of the body as it is in the end
-    again = SharedBody(models[1], variants)
-    assert {f[-1].meshed_state.contact.force.shape for f in again.frames(variants)} == {
-        (len(again.problem.surface.nodes), 2)
-    }
 
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
@@ -300,7 +295,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
         raise MemoryError("no proof")
 
     monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.mechanics.coverage.check_surface", unproved)
+    monkeypatch.setattr("finger3d.analyses.shared_body.check_surface", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
@@ -308,12 +303,12 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
     models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
     variants = [Variant.of(m) for m in models]
 
-    def once(model, say, margin=NARROW):
+    def once(model, report, margin=NARROW):
         if margin == math.inf:
             raise MemoryError
-        return build(model, say, margin)
+        return build(model, report, margin)
 
-    monkeypatch.setattr("finger3d.mechanics.build.build", once)
+    monkeypatch.setattr("finger3d.analyses.pressed_body.build", once)
     found = list(SharedBody(models[0], variants).presses(variants))
     assert [isinstance(p, MemoryError) for p in found] == [True, False, True]
     assert found[1].outcome == "converged"

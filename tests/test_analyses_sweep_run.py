@@ -83,5 +83,5 @@ def test_one_worker_is_this_process(paper_scene, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.analyses.sweep.local._pool", none)
     sweep = points_of(paper_scene, "material.nu=0.3,0.4")
     with pytest.raises(MissingError, match="Read-only file system; --workers 1 "):
-        running.sweep(sweep, tmp_path, workers=2)
-    assert sorted(running.sweep(sweep, tmp_path, workers=1).rows) == [0, 1]
+        running.press_points(sweep, tmp_path, workers=2)
+    assert sorted(running.press_points(sweep, tmp_path, workers=1).rows) == [0, 1]

@@ -44,6 +44,13 @@ def test_every_command_is_a_function_with_documented_parameters(name: str) -> No
     assert all(re.search(rf"^(\w+, )*{p}(, \w+)* :", inspect.getdoc(function) or "", re.M) for p in parameters)
 
 
+@pytest.mark.parametrize("name", [name for name in (*COMMANDS, "place_gauges") if name != "estimate"])
+def test_every_analysis_takes_a_scene_and_overrides(name: str) -> None:
+    parameters = inspect.signature(getattr(finger3d, name)).parameters
+    assert next(iter(parameters)) == "scene"
+    assert parameters["overrides"].default == ()
+
+
 def test_a_calibration_is_estimated_from(tmp_path: Path) -> None:
     calibration = finger3d.calibrate(
         written(tmp_path, SECTION), "<g>", tmp_path / "cal", mus=(0.05, 0.2, 0.4, 0.8), noise=1e-9

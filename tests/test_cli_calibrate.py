@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from finger3d.analyses.calibrate import presses as pressing
+from finger3d.analyses import pressed_body as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
@@ -128,7 +128,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
 def test_mistakes_are_one_line_before_any_work(
     options: list[str], told: str, tmp_path: Path, scene_file: Path, capsys: Any, monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(runs, "build", lambda *a: pytest.fail("work was done"))
+    monkeypatch.setattr(runs, "PressedBody", lambda *a: pytest.fail("work was done"))
     assert run("calibrate", scene_file, "--out", tmp_path / "cal", *options) == 2
     err = capsys.readouterr().err
     assert told in err

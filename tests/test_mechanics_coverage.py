@@ -7,7 +7,7 @@ import math
 import pytest
 
 from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import beyond_candidates, contact_within_candidates
+from finger3d.mechanics.coverage import beyond_candidates, check_surface
 from finger3d.mechanics.model import Domain, Leg
 from finger3d.mechanics.solve import march
 from tests.models import fig9
@@ -19,10 +19,9 @@ def test_too_few_candidate_points_are_noticed(domain: Domain) -> None:
     narrow, usual, whole = (build(model, margin=margin) for margin in (-0.6, 0.3, math.inf))
     assert len(narrow.surface.nodes) < len(usual.surface.nodes) < len(whole.surface.nodes)
     steps = [list(march(problem)) for problem in (narrow, usual, whole)]
-    covered = [contact_within_candidates(p, s)[-1] for p, s in zip((narrow, usual, whole), steps, strict=True)]
-    assert covered == [False, True, True]
+    checks = [check_surface(p, s) for p, s in zip((narrow, usual, whole), steps, strict=True)]
+    assert [every[-1].within_candidates for every in checks] == [False, True, True]
     assert 0 not in beyond_candidates(whole).face
     assert 0 in beyond_candidates(usual).face
     # the first increments stay within the few points
-    assert contact_within_candidates(narrow, steps[0])[0]
-    assert not contact_within_candidates(narrow, steps[0])[-1]
+    assert checks[0][0].within_candidates

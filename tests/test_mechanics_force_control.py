@@ -24,6 +24,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.solve import march
 from finger3d.objects import Plane
 from finger3d.scene import load
+from tests.logs import Log
 from tests.models import block, fig9
 
 
@@ -63,7 +64,10 @@ def test_a_force_is_reached_with_an_effect(effect: LargeDeformation | Viscosity)
 
 
 def test_a_force_beyond_the_height_ends_the_press_with_the_largest_that_was_found() -> None:
-    last = list(march(build(block(legs=(Leg(1.0, steps=1, force_N=1e6),)))))[-1]
+    said = Log()
+    last = list(march(build(block(legs=(Leg(1.0, steps=1, force_N=1e6),))), report=said))[-1]
+    assert said.lines
+    assert all(line.startswith("1e+06 N wanted, ") for line in said.lines)
     assert last.outcome is Outcome.FORCE_NOT_REACHED
     assert "1e+06 N asked; the largest force is" in last.detail
 

@@ -17,20 +17,21 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.sizing import rounded_zone
 from tests.commands import loaded
 from tests.designs import FIG9, OPTIONS, ZONE, make
+from tests.logs import Log
 
 BOTH = ("x", "z")
 
 
 def test_the_second_time_the_mesh_comes_from_the_cache(real: tuple[Mesh, Any, list[str]]) -> None:
     mesh, report, _ = real
-    said: list[str] = []
-    again, cached = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)
+    said = Log()
+    again, cached = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said)
     assert cached.from_cache
     assert not report.from_cache
     assert cached.hash == report.hash
     assert cached.cache_path == report.cache_path
     assert Path(str(cached.cache_path)).is_file()
-    (line,) = said
+    (line,) = said.lines
     assert str(cached.cache_path) in line
     np.testing.assert_array_equal(again.points, mesh.points)
     for label, facets in mesh.facets.items():
@@ -131,10 +132,10 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
 ) -> None:
     monkeypatch.setenv("FINGER3D_CACHE", str(stored[0]))  # a file where a folder should be
     monkeypatch.setattr(tetwild, "new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
-    said: list[str] = []
-    report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)[1]
+    said = Log()
+    report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said)[1]
     assert report.cache_path is None
-    assert "kept" in said[-1]
+    assert "kept" in said.lines[-1]
 
 
 def test_the_key_knows_all_that_shapes_the_mesh() -> None:

@@ -22,6 +22,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.sizing import sizing
 from finger3d.meshing.snap import UnusableMeshError
 from finger3d.meshing.solids import box, glued_solids
+from finger3d.progress import QUIET
 from tests.bodies import box as box_of
 from tests.bodies import write_stl
 from tests.designs import FIG9, ZONE, make
@@ -107,7 +108,7 @@ def test_stl_is_left_to_ftetwild(tmp_path: Path) -> None:
 def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finger3d._extras.available", lambda module: module != "netgen")
     with pytest.raises(MissingError, match=r'-m pip install .*\[netgen\]".*mesh.mesher = "swept"'):
-        netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, print)
+        netgen.new_mesh(FIG9, OPTIONS, ZONE, BOTH, QUIET)
 
 
 @pytest.mark.parametrize(("limit", "text"), [(0.01, " within 0 s"), (60.0, "netgen .*return code 1.: .*Error")])

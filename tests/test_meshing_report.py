@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.meshing.report import content_hash, report
+from finger3d.meshing.report import content_hash, mesh_report
 from tests.meshes import grid
 
 
 def test_a_report_of_a_quarter_is_that_of_the_whole_body() -> None:
     mesh = quadratic(grid((2, 2, 2)))
-    found = report(mesh, 4.0, 4.0, {"mesh": 0.1})
+    found = mesh_report(mesh, 4.0, 4.0, {"mesh": 0.1})
     assert (found.points, found.cells) == (125, 48)
     assert found.volume_mm3 == pytest.approx(4.0, rel=1e-12)
     # Kuhn's cells have dihedral angles of 45, 60 and 90 degrees

@@ -19,6 +19,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.snap import UnusableMeshError, check_closed
 from tests.bodies import CUBE, SIDES
 from tests.designs import FIG9, OPTIONS, ZONE
+from tests.logs import Log
 
 BALL = designs()["hemisphere"](5.0)
 BOTH = ("x", "z")
@@ -115,11 +116,11 @@ def test_three_attempts_and_then_one_line(monkeypatch: pytest.MonkeyPatch, tmp_p
         raise UnusableMeshError("pytetwild crashed (return code -11): no message")
 
     monkeypatch.setattr(tetwild, "run_child", crash)
-    said: list[str] = []
+    said = Log()
     with pytest.raises(Finger3dError, match="3 .* -11.*mesher = 'swept'") as failed:
-        mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said.append)
+        mesh_solid(FIG9, OPTIONS, ZONE, BOTH, said)
     assert len(calls) == 3
-    assert sum("again" in text for text in said) >= 2
+    assert sum("again" in text for text in said.lines) >= 2
     assert "\n" not in str(failed.value)
     assert not list(tmp_path.rglob("*.npz"))
 

@@ -21,6 +21,7 @@ def test_a_path_a_dict_and_a_scene_are_the_same_scene(tmp_path: Path) -> None:
     for source in (path, loaded, dict(loaded.given)):
         given, _ = tables_of(source, ["friction.mu=0.7"])
         assert given["friction"]["mu"] == 0.7
+        assert scene_of(source, ["friction.mu=0.7"]).tables.friction.mu == 0.7
     assert loaded.given["friction"]["mu"] == 0.25
 
 

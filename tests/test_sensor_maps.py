@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate import presses as pressing
+from finger3d.analyses import pressed_body as pressing
 from finger3d.mechanics.build import build
 from finger3d.sensor.maps import Reader, StrainMap
 from tests.sensor_cases import SCENE, scene

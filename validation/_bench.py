@@ -28,7 +28,7 @@ import numpy as np
 import trimesh
 
 from finger3d._machine import cores
-from finger3d.analyses.calibrate.presses import presses
+from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.material import Isotropic

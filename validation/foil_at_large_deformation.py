@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.presses import presses
+from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation

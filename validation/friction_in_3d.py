@@ -29,6 +29,7 @@ from finger3d.fem.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Marker
+from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
 from ._paper import columns
@@ -88,10 +89,10 @@ def run(quick: bool) -> Result:
 def _gauge_sets(body: Model, most: int) -> dict[str, tuple[Gauge, ...]]:
     """Return the paper's gauge, and the best one, two and so on."""
     tolerances = with_defaults({"increments": 0.0})
-    fields = GaugeFields.of(body, MUS[::2], NOISE, tolerances, lambda text: None)
+    fields = GaugeFields.of(body, MUS[::2], NOISE, tolerances, QUIET)
     found = {PAPER: (Gauge("p", 36.0, 40.0, angle=math.radians(30.0)),)}
     for count in range(1, most + 1):
-        chosen, _ = search(fields, Region.of(body), count, lambda text: None)
+        chosen, _ = search(fields, Region.of(body), count, QUIET)
         found[f"{count} best gauge{'s' if count > 1 else ''}"] = tuple(
             Gauge(f"g{count}{i}", float(g.place[0]), float(g.place[1]), float(g.place[2]), g.angle)
             for i, g in enumerate(chosen.gauges)

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.run import CurvePoints, calibrated
+from finger3d.analyses.calibrate.curve_points import CurvePoints
+from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel

@@ -34,6 +34,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
 from finger3d.objects import Cylinder, Plane, vertical_frame
+from finger3d.progress import QUIET
 
 from ._common import held_at, solve
 from ._halfplane import Profile, under
@@ -190,7 +191,7 @@ def _third_law_rows() -> list[Row]:
     assert frame.outcome.ok
     forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
-    other, _ = ObjectBody(model, 5.0, model.first_contact.contact_box, (), lambda text: None).mesh()
+    other, _ = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh()
     axes = vertical_frame(2)
     ends, moved = [], np.zeros_like(force)
     for mesh, rows, (modulus, nu) in (

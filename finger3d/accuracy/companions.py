@@ -22,8 +22,7 @@ from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.swept import mesh_section
-
-Say = Callable[[str], None]
+from finger3d.progress import QUIET, Progress
 
 FACTOR = 2.0
 """Edge length of the coarser companion over that of the mesh."""
@@ -68,7 +67,7 @@ def coarser(model: Model, factor: float = FACTOR) -> Model:
     return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
 
 
-def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
+def companion(problem: Problem, report: Progress = QUIET) -> Problem:
     """Return the condensed problem on the companion mesh: coarser, or finer where no coarser mesh can be made.
 
     Unstructured meshes are kept in the cache of meshes.
@@ -81,7 +80,7 @@ def companion(problem: Problem, say: Say = lambda text: None) -> Problem:
     coarse, fine = companions(problem.model, problem.mesh.points.size)
     for chosen, enough in ((coarse, lambda r: r >= LEAST_RATIO), (fine, lambda r: r <= 1.0 / LEAST_RATIO)):
         for options in chosen:
-            if beside := _built_if(problem, replace(problem.model, mesh=options), enough, say):
+            if beside := _built_if(problem, replace(problem.model, mesh=options), enough, report):
                 return beside
     raise Finger3dError("no other mesh differs enough from this one for an estimate; change mesh.size_mm")
 
@@ -120,7 +119,7 @@ def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
     return replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm)
 
 
-def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], say: Say) -> Problem | None:
+def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], report: Progress) -> Problem | None:
     """Return a condensed companion if the ratio of edge lengths is enough and its points resolve the contact.
 
     A structured mesh is counted before it is condensed.
@@ -131,17 +130,17 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], s
         if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
             return None
     try:
-        beside = built_like(problem, model, say if is_unstructured(model) else lambda text: None)
+        beside = built_like(problem, model, report if is_unstructured(model) else QUIET)
     except UnresolvedError:
         return None
     return beside if enough(edge_ratio(problem, beside)) else None
 
 
-def built_like(problem: Problem, model: Model, say: Say = lambda text: None) -> Problem:
+def built_like(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
     """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
     face = surface(problem.mesh, "contact", problem.body.thickness)
     everything = len(face.nodes) == len(contact_face(problem.surface).nodes)
-    return build(model, say, margin=math.inf) if everything else build(model, say)
+    return build(model, report, margin=math.inf) if everything else build(model, report)
 
 
 def edge_ratio(problem: Problem, beside: Problem) -> float:

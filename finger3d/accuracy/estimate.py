@@ -20,7 +20,7 @@ import numpy as np
 from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float, Tree
 from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
-from finger3d.accuracy.companions import Say, companion, edge_ratio, is_unstructured
+from finger3d.accuracy.companions import companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
@@ -40,6 +40,7 @@ from finger3d.mechanics.step_halving import (
     with_increments_of,
 )
 from finger3d.meshing.given import GivenMesh
+from finger3d.progress import QUIET, Progress
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
@@ -117,7 +118,7 @@ def reading_error(
 def estimate(
     problem: Problem,
     steps: Sequence[StepResult],
-    say: Say = lambda text: None,
+    report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
 ) -> ErrorEstimate:
@@ -126,7 +127,7 @@ def estimate(
     Parameters
     ----------
     problem, steps : the press as it was solved, all increments converged
-    say : called with a line before a long stage
+    report : receives the messages
     numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
     runs : runs that chose automatic increments
 
@@ -144,7 +145,7 @@ def estimate(
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
     beside, where = None, ""
     try:
-        found, beside, where = discretisation(own, steps, say, numbers, used)
+        found, beside, where = discretisation(own, steps, report, numbers, used)
     except _FAILURES as error:
         found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
     try:
@@ -205,7 +206,7 @@ def _reason(error: Exception) -> str:
 def discretisation(
     own: Problem,
     steps: Sequence[StepResult],
-    say: Say = lambda text: None,
+    report: Progress = QUIET,
     numbers: Measure = main_numbers,
     runs: Sequence[Run] = (),
 ) -> tuple[ErrorEstimate, Problem, str]:
@@ -226,7 +227,7 @@ def discretisation(
             replace(bars.coarse, model=own.model, contact_geometry=None),  # it is pressed to other poses
             "with every second multiplier",
         )
-    beside = companion(own, say)
+    beside = companion(own, report)
     last = last_step(beside)
     ratio = edge_ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
@@ -26,6 +26,7 @@ from finger3d.mechanics.build import build
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import last_step
+from finger3d.progress import QUIET, Progress
 
 MAX_ROUNDS = 8
 GOAL = "normal_force_N"
@@ -130,7 +131,7 @@ def refine_mesh(
     model: Model,
     tolerance: float,
     max_seconds: float | None = None,
-    say: Callable[[str], None] = lambda text: None,
+    report: Progress = QUIET,
     goal: str = GOAL,
 ) -> Refinement:
     """Refine the mesh of a model until the estimated error of the goal is below a tolerance.
@@ -140,7 +141,7 @@ def refine_mesh(
     model : with the edge lengths of the first round
     tolerance : relative, see `relative_error`
     max_seconds : no round is begun that is forecast to end later, output included
-    say : receives a line for each round
+    report : receives the messages
     goal : name of a number of the press, as in `finger3d.accuracy.estimate.press_numbers`; for the normal force under
         a prescribed one, the depth takes its place
 
@@ -173,7 +174,7 @@ def refine_mesh(
             break
         rounds.append(done)
         meshes.append(options)
-        say(done.line(len(rounds)))
+        report.say(done.line(len(rounds)))
         coarsest = done.error <= tolerance and (
             done.error > _COARSEN * tolerance
             or any(r.error > tolerance for r in rounds)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed
 from finger3d.progress import Progress
-
-if TYPE_CHECKING:
-    from finger3d.scene import Scene
+from finger3d.scene import Source, scene_of
 
 MESH_FILES = ("finger.vtu", "finger.msh")
 DECK_FILE = "press.inp"
@@ -36,10 +34,19 @@ class ModelFiles:
     remarks: tuple[str, ...]
 
 
-def export_mesh(scene: Scene, out: str | Path, report: Progress | None = None) -> ModelFiles:
+def export_mesh(
+    scene: Source, out: str | Path, report: Progress | None = None, overrides: Sequence[str] = ()
+) -> ModelFiles:
     """Write the mesh of the whole finger, its facets and its parts by name, as finger.vtu and finger.msh.
 
     Both may be the finger of another scene.  Where symmetry halves the press, the mesh is unfolded.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    out : folder for the files
+    report : told about stages
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Raises
     ------
@@ -51,7 +58,8 @@ def export_mesh(scene: Scene, out: str | Path, report: Progress | None = None) -
     from finger3d.mechanics.symmetry import symmetry
     from finger3d.meshing.mesh_output import write_mesh_msh, write_mesh_vtu
 
-    out, report, model = Path(out), report or Progress(), scene.model()
+    out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
+    model = scene.model()
     if model.domain != "solid":
         raise Finger3dError(f'--mesh: a section has no tetrahedra; set model.domain = "solid", not "{model.domain}"')
     own = Path(getattr(scene.design, "path", "")).resolve()
@@ -59,7 +67,7 @@ def export_mesh(scene: Scene, out: str | Path, report: Progress | None = None) -
         raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
     report.stage("meshing")
     axes = symmetry(model)
-    part, _ = mesh_part(model, model.first_contact.contact_box, axes, report.say)
+    part, _ = mesh_part(model, model.first_contact.contact_box, axes, report)
     whole, _, _ = unfold(part, axis_numbers(axes))
     with claimed(out):
         write_mesh_vtu(out / MESH_FILES[0], whole)
@@ -68,8 +76,17 @@ def export_mesh(scene: Scene, out: str | Path, report: Progress | None = None) -
     return ModelFiles(files, len(whole.points), len(whole.cells), None, ())
 
 
-def export_deck(scene: Scene, out: str | Path, report: Progress | None = None) -> ModelFiles:
+def export_deck(
+    scene: Source, out: str | Path, report: Progress | None = None, overrides: Sequence[str] = ()
+) -> ModelFiles:
     """Write press.inp, the same mesh, materials, object and path as an input deck of CalculiX.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    out : folder for the files
+    report : told about stages
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Raises
     ------
@@ -78,9 +95,9 @@ def export_deck(scene: Scene, out: str | Path, report: Progress | None = None) -
     """
     from finger3d.analyses.calculix.press import press_deck
 
-    out, report = Path(out), report or Progress()
+    out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     report.stage("meshing")
-    made = press_deck(scene.model(), scene.title, report.say)
+    made = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
     with claimed(out), atomic(out / DECK_FILE) as temporary:
         temporary.write_text(made.deck.text(), encoding="ascii")

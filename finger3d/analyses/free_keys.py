@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,6 +54,17 @@ class FreeKey:
     def middle(self) -> float:
         """Middle of the bounds."""
         return 0.5 * (self.low + self.high)
+
+
+Bounds = Mapping[str, tuple[float, float]] | Sequence[str]
+"""Lower and upper bound by key, or texts such as ``material.E_MPa=0.05:5``."""
+
+
+def free_keys(bounds: Bounds) -> tuple[FreeKey, ...]:
+    """Return the free keys with these bounds."""
+    if isinstance(bounds, Mapping):
+        bounds = [f"{key}={low!r}:{high!r}" for key, (low, high) in bounds.items()]
+    return tuple(map(FreeKey.of, bounds))
 
 
 def check_distinct(keys: Sequence[str]) -> None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.resolution import warnings_before_meshing
 from finger3d.mechanics.symmetry import symmetry
+from finger3d.scene import Source, scene_of
 from finger3d.scene.derived import moduli
-
-if TYPE_CHECKING:
-    from finger3d.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -67,8 +64,20 @@ class Plan:
         }
 
 
-def plan(scene: Scene) -> Plan:
-    """Forecast size, time and memory of a press without solving anything."""
+def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
+    """Forecast size, time and memory of a press without solving anything.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+
+    Returns
+    -------
+    Plan
+        For instance ``plan.dofs``, ``plan.total_s`` and ``plan.memory_MB``.
+    """
+    scene = scene_of(scene, overrides)
     model = scene.model()
     expected, warnings = forecast(model), warnings_before_meshing(model, symmetry(model))
     expected = {"finger": extent(model.design)} | expected

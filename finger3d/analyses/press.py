@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from finger3d._types import Tree
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
+from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.result import PressResult
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
@@ -35,6 +35,7 @@ def press(
     report: Progress | None = None,
     figures: bool | None = None,
     error: bool = True,
+    overrides: Sequence[str] = (),
 ) -> PressResult:
     """Press a scene, and write its results into a folder.
 
@@ -45,6 +46,7 @@ def press(
     report : receives the progress
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors due to the mesh and the increments
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Returns
     -------
@@ -56,14 +58,13 @@ def press(
     >>> import finger3d
     >>> finger3d.press("scene.toml", "out").last.outcome
     'converged'
-    >>> stiff = finger3d.load("scene.toml", ["material.E_MPa=2.0"])
-    >>> len(finger3d.press(stiff).steps)
+    >>> len(finger3d.press("scene.toml", overrides=["material.E_MPa=2.0"]).steps)
     4
     """
     from finger3d.scene import scene_of
 
     started = time.perf_counter()
-    scene = scene_of(scene)
+    scene = scene_of(scene, overrides)
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
@@ -110,34 +111,21 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     """Build the problem and march through its increments, again with all points of the free faces if contact reaches
     beyond the candidate points.
     """
-    from finger3d.mechanics.build import build
-    from finger3d.mechanics.coverage import check_surface
-    from finger3d.mechanics.force_control import at_depth_reached
-
     refinement = _refine_mesh(scene, report)
     if refinement:
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
-    model = scene.model()
     report.stage("meshing")
-    problem = (refinement.problem if refinement else None) or build(model, report.say)
-    record = PressRecord(scene, problem, started, refinement)
-    _march(record, writer, report)
-    reached = max((step.target.depth_mm for step in record.converged_steps), default=0.0)
-    if legs := at_depth_reached(problem.model.legs, reached):
-        report.say(f"the force is reached at {reached:.3g} mm, deeper than was forecast; meshing again")
-        report.stage("meshing")
-        problem = build(replace(problem.model, legs=legs), report.say)
-        record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
+    body = PressedBody(scene.model(), report, refinement.problem if refinement else None)
+
+    def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:
+        spent = before.all_factorizations if before else 0
+        record = PressRecord(scene, problem, started, refinement, spent)
         _march(record, writer, report)
-    record.surface_checks = check_surface(problem, record.converged_steps)
-    if not all(check.within_candidates for check in record.surface_checks):
-        report.say("contact reached beyond the candidate points; solving again with all points of the free faces")
-        report.stage("meshing")
-        problem = build(problem.model, report.say, math.inf)
-        record = PressRecord(scene, problem, started, refinement, record.all_factorizations)
-        _march(record, writer, report)
-        record.surface_checks = check_surface(problem, record.converged_steps)
+        return record, record.converged_steps
+
+    record, checks = body.pressed(press_all)
+    record.surface_checks = checks
     record.keep_penetration()
     writer.progress(record)
     return record
@@ -152,7 +140,7 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
 
     goal = mesh.goal or GOAL
     report.stage(f"refining to an error of {mesh.tolerance:g} in {goal}")
-    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report.say, goal)
+    return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report, goal)
 
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
@@ -179,8 +167,7 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
     begin = time.perf_counter()
-    trial = _now_and_then(lambda text: report.step(len(record.steps), total, text))
-    for step in march(record.problem, workspace=record.workspace, trial=trial):
+    for step in march(record.problem, workspace=record.workspace, report=report):
         record.steps.append(step)
         record.seconds["contact"] += time.perf_counter() - begin
         writer.progress_if_due(record)
@@ -259,7 +246,7 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
-    found = estimate(record.problem, record.steps, report.say, press_numbers, runs)
+    found = estimate(record.problem, record.steps, report, press_numbers, runs)
     spread = record.scene.tables.material.constants.spread
     by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers)
     record.error_estimate = replace(found, modulus=by_modulus)

@@ -15,6 +15,7 @@ from typing import Any, cast
 
 from finger3d._machine import versions
 from finger3d._types import TreeView
+from finger3d.analyses.pressed_body import under
 from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
@@ -26,7 +27,6 @@ from finger3d.mechanics.history import History
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem, rigid_gap
-from finger3d.mechanics.resolution import check
 from finger3d.mechanics.solve import march
 
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm", "turn_x", "turn_y", "turn_z")
@@ -126,16 +126,14 @@ class ReducedModel:
         law = model.friction if mu is None else model.friction.with_mu(mu)
         if ratio is not None or branch is not None:
             law = _kinetic(law, ratio, branch)
-        problem = replace(self.problem, model=replace(model, friction=law, legs=tuple(legs or model.legs)))
         if legs is not None:
-            self._check(problem)
-            system = problem.system
-            check(problem.model, problem.surface, system.first_contact_mm, system.place_mm, problem.axes)
+            self._check(tuple(legs))
+        problem = under(self.problem, law, tuple(legs or ()))
         return History(problem.points, tuple(march(problem)))
 
-    def _check(self, problem: Problem) -> None:
+    def _check(self, legs: tuple[Leg, ...]) -> None:
         """Raise Finger3dError if contact could leave the candidate points of `finger3d.mechanics.build.build`."""
-        legs = problem.model.legs
+        problem = self.problem
         for leg in legs:
             if not all(math.isfinite(getattr(leg, k)) for k in _PATH) or leg.depth_mm < 0.0:
                 raise Finger3dError(

@@ -8,29 +8,31 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
 
+from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.columns import Column, in_space, strain_columns
+from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, table_row
+from finger3d.mechanics.marker_grid import grid_readings
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.parallel import map_parallel
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.step_halving import march_automatic
+from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
-
-if TYPE_CHECKING:
-    from finger3d.mechanics.formulation import Workspace
-    from finger3d.mechanics.problem import Problem
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
 """Tables of the scene that do not change the compliance."""
@@ -105,14 +107,14 @@ def finest(models: Sequence[Model]) -> MeshOptions:
     return replace(models[0].mesh, size_mm=min(sizes), base_size_mm=min(bases))
 
 
-class SharedBody:
+class SharedBody(PressedBody):
     """A condensed body that is pressed as several variants.
 
     Parameters
     ----------
     model : any model of the family, with the mesh that all share
     variants : all variants that will be pressed
-    say : receives messages about meshing and condensation
+    report : receives the messages
     grid_mm : spacing of a grid of markers, whose displacements are among the numbers; None without one
 
     Attributes
@@ -125,44 +127,18 @@ class SharedBody:
         self,
         model: Model,
         variants: Sequence[Variant],
-        say: Callable[[str], None] = lambda text: None,
+        report: Progress = QUIET,
         grid_mm: float | None = None,
     ) -> None:
-        # Scenes are sorted by body without loading SciPy and the solver.
-        from finger3d.mechanics.build import build
-
-        start = time.perf_counter()
-        self._say, self._grid_mm = say, grid_mm
         gauges = model.gauges
         if model.inclusions is None:
             # Each place has one gauge, whose name is a number; variants may use one name for different places.
             places = dict.fromkeys(replace(g, name="") for v in variants for g in v.gauges)
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
-        self._gauges_are_inclusions = model.inclusions is not None
-        self.problem = build(replace(model, legs=shared_legs(variants), gauges=gauges), say)
-        self.seconds = time.perf_counter() - start
+        self._gauges_are_inclusions, self._grid_mm = model.inclusions is not None, grid_mm
+        super().__init__(replace(model, legs=shared_legs(variants), gauges=gauges), report)
         self._results: dict[Variant, VariantResult | Exception] = {}
-
-    def problem_of(self, variant: Variant) -> Problem:
-        """Return the body under the friction, path and rule of a variant, with the gauges of all variants."""
-        model = replace(self.problem.model, friction=variant.friction, legs=variant.legs, rule=variant.rule)
-        return replace(self.problem, model=model)
-
-    def frames(self, variants: Sequence[Variant]) -> list[tuple[StepResult, ...]]:
-        """Return the steps of each variant, all on the same candidate points.
-
-        Raises
-        ------
-        Exception
-            The reason why a press failed, one of `TROUBLE`.
-        """
-        found: list[_Run | None] = [None] * len(variants)
-        # Presses are repeated if a later one has added candidate points.
-        while left := [i for i, run in enumerate(found) if run is None or run.problem is not self.problem]:
-            for i, run in zip(left, self._runs([variants[i] for i in left], None), strict=True):
-                found[i] = run
-        return [run.steps_or_raise() for run in found if run]
 
     def press(self, variant: Variant) -> VariantResult:
         """Return the result of a variant.
@@ -213,49 +189,30 @@ class SharedBody:
 
     def _runs(self, variants: Sequence[Variant], most: int | None) -> Iterator[_Run]:
         """Press each variant; condense the whole contact face once contact goes beyond the candidate points."""
-        from finger3d.mechanics.parallel import map_parallel
-
         left = deque(variants)
         while left:
             with closing(map_parallel(self.problem, self._run, tuple(left), most)) as runs:
                 for run in runs:
                     checked, covered = run.with_coverage()
                     if not covered:
-                        reason = self._widen()
-                        if reason is None:
+                        try:
+                            self.widen()
+                        except TROUBLE as error:
+                            checked = replace(run, frames=error.with_traceback(None))
+                        else:
                             break  # and press the variants that are left on the new body
-                        checked = replace(run, frames=reason)
                     left.popleft()
                     yield checked
 
     def _run(self, variant: Variant, before: Sequence[_Run], workspace: Workspace, cancel: Event) -> _Run:
-        from finger3d.mechanics.resolution import check
-        from finger3d.mechanics.step_halving import march_automatic
-
         start = time.perf_counter()
         frames: tuple[StepResult, ...] | Exception
         try:
-            problem = self.problem_of(variant)
-            if variant.legs != self.problem.model.legs:  # the mesh was checked for the path of all variants
-                system = problem.system
-                check(problem.model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
+            problem = under(self.problem, variant.friction, variant.legs, variant.rule)
             frames = march_automatic(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
         return _Run(self.problem, frames, time.perf_counter() - start)
-
-    def _widen(self) -> Exception | None:
-        """Condense the body to all points of the contact face; return the reason if that fails."""
-        from finger3d.mechanics.build import build
-
-        start = time.perf_counter()
-        self._say("contact reached beyond the candidate points; condensing all of the contact face")
-        try:
-            self.problem = build(self.problem.model, self._say, math.inf)
-        except TROUBLE as error:
-            return error.with_traceback(None)
-        self.seconds += time.perf_counter() - start
-        return None
 
 
 @dataclass(frozen=True)
@@ -271,8 +228,6 @@ class _Run:
 
         The check counts as part of the run.
         """
-        from finger3d.mechanics.coverage import check_surface
-
         if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok:
             return self, True
         start = time.perf_counter()
@@ -283,12 +238,6 @@ class _Run:
         last = replace(self.frames[-1], penetration_mm=check.penetration_mm)
         seconds = self.seconds + time.perf_counter() - start
         return replace(self, frames=(*self.frames[:-1], last), seconds=seconds), check.within_candidates
-
-    def steps_or_raise(self) -> tuple[StepResult, ...]:
-        """Return the steps, or raise the reason why there are none."""
-        if isinstance(self.frames, Exception):
-            raise self.frames
-        return self.frames
 
     def result(self, grid_mm: float | None) -> VariantResult | Exception:
         """Return the quantities of the last step, those of a grid of markers included."""
@@ -305,8 +254,6 @@ class _Run:
             numbers.pop(key)
         readings = in_space(last.readings)
         if grid_mm is not None:
-            from finger3d.mechanics.marker_grid import grid_readings
-
             readings |= grid_readings(self.problem, last, grid_mm)
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, readings, self.seconds)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -12,17 +11,17 @@ import numpy as np
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import GAUGE_PLACES, displaced_gauges, tolerance_of
+from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
-from finger3d.mechanics.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import march_automatic
 from finger3d.plotting.figures import middle_line
+from finger3d.progress import QUIET, Progress
 from finger3d.sensor.curve import ReadingCurve
 from finger3d.sensor.model import SensorModel
 
@@ -102,7 +101,7 @@ class LiveBody:
     steps: int
 
     @classmethod
-    def of(cls, scene: Scene, say: Callable[[str], None] = lambda text: None) -> LiveBody:
+    def of(cls, scene: Scene, report: Progress = QUIET) -> LiveBody:
         """Condense the finger of a scene.
 
         Raises
@@ -116,12 +115,11 @@ class LiveBody:
             name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
         if len(model.legs) > 1 or model.legs[0].moves_sideways:
-            depth = model.largest_depth_mm
-            return cls(scene.title, build(replace(model, legs=(Leg(depth, steps=STEPS),)), say), depth, STEPS)
-        problem = build(model, say)
-        steps, _ = march_automatic(problem)
+            model = replace(model, legs=(Leg(model.largest_depth_mm, steps=STEPS),))
+        body = PressedBody(model, report)
+        steps = body.steps()
         _check(steps[-1], scene.tables.friction.mu)
-        return cls(scene.title, problem, steps[-1].target.depth_mm, len(steps))
+        return cls(scene.title, body.problem, steps[-1].target.depth_mm, len(steps))
 
     def press(self, mu: float, depth_mm: float) -> LivePress:
         """Press with a coefficient of friction to a depth; the last presses are kept.
@@ -170,9 +168,8 @@ class LiveBody:
 @lru_cache(maxsize=_KEPT)
 def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     problem = body.problem
-    friction = problem.model.friction.with_mu(mu)
-    legs = (Leg(depth_mm, steps=body.steps),)
-    steps = list(march(replace(problem, model=replace(problem.model, friction=friction, legs=legs))))
+    pressed = under(problem, problem.model.friction.with_mu(mu), (Leg(depth_mm, steps=body.steps),))
+    steps = list(march(pressed))
     _check(steps[-1], mu)
     measured = measure(problem.points, steps[-1])
     table = contact_table(problem.points, steps[-1].state)

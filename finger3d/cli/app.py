@@ -41,7 +41,7 @@ def app_(
 
     with job(False, lambda report: "nothing was to be written") as report:
         report.stage("condensing")
-        body = LiveBody.of(loaded, report.say)
+        body = LiveBody.of(loaded, report)
     server = local_server(page(body, loaded.tables.friction.mu), port)
     print(f"open {server.url}", flush=True)
     if browser:

@@ -34,11 +34,6 @@ def compare(
     """
     chosen = None if widths is None else [_width(text) for text in widths.split(",")]
     loaded = load(scene, set_, out)
-    if loaded.tables.mesh.tolerance is not None:
-        raise Finger3dError(
-            f"{scene}: mesh.tolerance = {loaded.tables.mesh.tolerance:g}: compare needs fixed edge lengths; press "
-            "determines them and writes them to the scene.toml of its results, which compare accepts"
-        )
     from finger3d.analyses.compare.run import compare as run
     from finger3d.results.summary import read_json
 

@@ -44,17 +44,13 @@ def identify(
     scene
         The scene file (TOML).
     """
-    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.identify.run import DEVIATIONS
     from finger3d.analyses.identify.run import identify as run
-    from finger3d.scene import tree
 
-    tables = tree.override(tree.read(scene), set_ or [])
-    keys = [FreeKey.of(text) for text in free]
     check_writable(out, scene)
     kept = f"every press is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
-        result = run(tables, measured, keys, out, scene, report)
+        result = run(scene, measured, free, out, set_ or (), report)
     if json_:
         print_json(result.as_dict())
         return

@@ -13,7 +13,6 @@ from finger3d.errors import Finger3dError
 
 if TYPE_CHECKING:
     from finger3d.analyses.optimise.run import OptimisationResult
-    from finger3d.analyses.optimise.task import OptimisationProblem
 
 
 @app.command
@@ -68,38 +67,24 @@ def optimise(
     if gauges is not None:
         _place_gauges(scene, gauges, free or [], out, mu, noise, tolerance, set_, json_)
         return
-    from finger3d.analyses.free_keys import FreeKey
-    from finger3d.analyses.optimise.run import optimise
-    from finger3d.analyses.optimise.task import MUS, OptimisationProblem
-    from finger3d.scene import tree
+    from finger3d.analyses.optimise.run import optimise as run
 
-    problem = OptimisationProblem(
-        given=tree.override(tree.read(scene), set_ or []),
-        free=tuple(FreeKey.of(text) for text in free or ()),
-        objective=objective,
-        path=scene,
-        gauge=gauge,
-        mus=_mus(mu) if mu else MUS,
-        noise=noise,
-        budget=budget,
-        method=method,
-        seed=seed,
-    )
     check_writable(out, scene)
     kept = f"every evaluated design is kept in {out}; the same command continues"
+    mus = _mus(mu) if mu else None
     with job(json_, lambda _: kept) as report:
-        result = optimise(problem, out, report)
-    _print_design(problem, result, out, json_)
+        result = run(scene, free or (), out, objective, gauge, mus, noise, budget, method, seed, set_ or (), report)
+    _print_design(result, out, json_)
 
 
-def _print_design(problem: OptimisationProblem, result: OptimisationResult, out: Path, json_: bool) -> None:
+def _print_design(result: OptimisationResult, out: Path, json_: bool) -> None:
     """Print the best design."""
     from finger3d.results.summary import read_json
 
     if json_:
         print_json(read_json(out / "design.json"))
         return
-    chosen = zip((f.key for f in problem.free), result.best.values, strict=True)
+    chosen = zip(result.keys, result.best.values, strict=True)
     print_rows(
         result.scene.title,
         [
@@ -125,17 +110,12 @@ def _place_gauges(
     json_: bool,
 ) -> None:
     """Find the places of several gauges, and print them."""
-    from finger3d.analyses.free_keys import FreeKey
     from finger3d.analyses.optimise.gauge_run import place_gauges
-    from finger3d.analyses.optimise.task import MUS
-    from finger3d.scene import tree
 
-    tables = tree.override(tree.read(scene), set_ or [])
-    keys = [FreeKey.of(text) for text in free]
     check_writable(out, scene)
     with job(json_, lambda _: "nothing was written") as report:
-        mus, tolerances = _mus(mu) if mu else MUS, parsed_tolerances(tolerance)
-        result = place_gauges(tables, count, out, keys, mus, noise, tolerances, scene, report)
+        mus, tolerances = _mus(mu) if mu else None, parsed_tolerances(tolerance)
+        result = place_gauges(scene, count, out, free, mus, noise, tolerances, set_ or (), report)
     data = result.as_dict()
     if json_:
         print_json(data)

@@ -72,20 +72,14 @@ def sweep(
         )
     if range_ is not None and sample is None:
         raise Finger3dError("--range: only with --sample, for instance --sample lhs:200")
-    from finger3d.analyses.sweep.points import combinations, listed_points
+    if sample in ("grid", "list"):
+        raise Finger3dError(f"--sample {sample}: must be lhs:NUMBER or random:NUMBER; --vary and --points list points")
     from finger3d.analyses.sweep.run import sweep as run
-    from finger3d.analyses.sweep.samples import drawn, rows_of
 
+    check_writable(out, scene)
+    given = points or (vary if sample is None else range_) or ()
     with job(json_, lambda done: _kept(done, out)) as report:
-        report.stage("checking every point")
-        if points is not None:
-            checked = listed_points(scene, set_ or [], rows_of(points), "--points")
-        elif sample is not None:
-            checked = listed_points(scene, set_ or [], drawn(sample, range_ or [], seed), "--sample")
-        else:
-            checked = combinations(scene, set_ or [], vary or [])
-        check_writable(out, scene)
-        store = run(checked, out, scheduler, workers, report)
+        store = run(scene, given, out, set_ or (), scheduler, workers, report, sample or "grid", seed).store
     if json_:
         print_json(_as_dict(store, out))
     else:
@@ -94,7 +88,8 @@ def sweep(
     failed = [row for row in (store.rows | store.lost).values() if row["outcome"] != "converged"]
     if failed:
         raise MissingError(
-            f"{scene}: {len(failed)} of {len(checked.points)} points gave no numbers, the first: {failed[0]['outcome']}"
+            f"{scene}: {len(failed)} of {len(store.sweep.points)} points gave no numbers, "
+            f"the first: {failed[0]['outcome']}"
         )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -40,12 +39,11 @@ from finger3d.meshing.limits import check_rows
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, vertical_frame
+from finger3d.progress import QUIET, Progress
 
 if TYPE_CHECKING:
     from finger3d.mechanics.elastic_object import ObjectResponse
     from finger3d.mechanics.foils import EmbeddedBars
-
-Say = Callable[[str], None]
 
 MARGIN = 0.3
 """Largest rigid gap of candidate points, in depths of the press; whether it suffices is checked after the solution."""
@@ -60,12 +58,12 @@ _MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
 
 
-def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) -> Problem:
+def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
     """Mesh, assemble and condense a model.
 
     Parameters
     ----------
-    say : called with a line about each stage
+    report : receives the messages
     margin : rigid gap that candidate points reach to, in depths of the press; infinite for all of the contact face
 
     Raises
@@ -74,11 +72,11 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
         If the object passes between the contact points.
     """
     contact, axes = model.first_contact, symmetry(model)
-    mesh, report = mesh_part(model, contact.contact_box, axes, say)
+    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
-    say("assembling")
+    report.say("assembling")
     start = time.perf_counter()
     elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
@@ -88,10 +86,10 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
     check_rows(len(active), count)
     bars = _bars(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
-    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, say)
+    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, report)
     rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
-    say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
+    report.say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
     fixed = held_dofs(mesh, axes, model.held_ends)
     condensed = condense(matrix, fixed, rows)
     delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
@@ -100,7 +98,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
         model=model,
         condensed_body=CondensedBody(
             mesh=mesh,
-            report=report,
+            report=mesh_report,
             elastic=elastic,
             stiffness=matrix,
             thickness=thickness,
@@ -117,7 +115,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
             first_contact_mm=contact.first_contact_mm,
             place_mm=contact.place,
         ),
-        seconds={**report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+        seconds={**mesh_report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )
     whole = with_bars(problem, bars) if bars else problem
     thing = model.object_compliance
@@ -125,7 +123,7 @@ def build(model: Model, say: Say = lambda text: None, margin: float = MARGIN) ->
         return whole
     from finger3d.mechanics.elastic_object import object_response  # a press imports only what its scene names
 
-    return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, say))
+    return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, report))
 
 
 def _bars(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
@@ -180,7 +178,7 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
 
 
 def mesh_part(
-    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], say: Say = lambda text: None
+    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], report: Progress = QUIET
 ) -> tuple[Mesh, MeshReport]:
     """Mesh the part of the finger on one side of its symmetry planes.
 
@@ -190,16 +188,16 @@ def mesh_part(
     axes : normals of the symmetry planes, "x" and "z"
     """
     if model.domain == "solid":
-        mesh, report = mesh_solid(model.design, model.mesh, zone, axes, say)
+        mesh, mesh_report = mesh_solid(model.design, model.mesh, zone, axes, report)
     else:
-        mesh, report = mesh_section(model.design, model.mesh, zone, axes)
-    return refined_at_gauges(model, mesh, report, axes)
+        mesh, mesh_report = mesh_section(model.design, model.mesh, zone, axes)
+    return refined_at_gauges(model, mesh, mesh_report, axes)
 
 
-def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, say: Say) -> list[sp.csr_matrix]:
+def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, report: Progress) -> list[sp.csr_matrix]:
     """Rows of the readings, and of the bars if there are any."""
     if len(model.readings) >= _MANY_READINGS:
-        say(f"placing {len(model.readings)} gauges, markers and taxels")
+        report.say(f"placing {len(model.readings)} gauges, markers and taxels")
     if not bars:
         return [reading.rows(body) for reading in model.readings]
     others = model.readings[: len(model.readings) - len(model.gauges)]

@@ -78,15 +78,6 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
     return out
 
 
-def contact_within_candidates(problem: Problem, steps: Sequence[StepResult]) -> list[bool]:
-    """Return, for each step, whether no point of the free surface outside the candidates went through the object."""
-    _, others = _surfaces(problem, steps)
-    if not len(others.nodes):
-        return [True] * len(steps)
-    fields = _displacements(problem, steps)
-    return [_stays_out(problem, u, step.target, others) for u, step in zip(fields, steps, strict=True)]
-
-
 def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
     """Return warnings about penetration between the contact points during a press."""
     return _penetration(problem, checks, _WARN_ABOVE, np.inf)

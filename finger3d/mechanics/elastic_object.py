@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,10 +30,9 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.options import Mesher
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
+from finger3d.progress import Progress
 
 Zone = tuple[float, float, float, float]
-Say = Callable[[str], None]
-
 _SURFACE = 401  # places along x and z where the highest point of a wedge or wave is looked for
 _SWAPPED = {
     "x": "z",
@@ -67,18 +65,18 @@ class ObjectResponse:
         freeze_arrays(self)
 
 
-def object_response(problem: Problem, thing: ElasticObject, zone: Zone, say: Say) -> ObjectResponse:
+def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> ObjectResponse:
     """Mesh and condense an elastic object; return its compliance at the contact points of the finger.
 
     Parameters
     ----------
     zone : (x_min, x_max, z_min, z_max), mm
         Where the object touches the finger; its mesh is fine there.
-    say : called with a line about each stage
+    report : receives the messages
     """
     model, axes, d = problem.model, problem.axes, problem.dim
     start = time.perf_counter()
-    body = ObjectBody(model, thing.height_mm or model.design.height_mm, zone, axes, say)
+    body = ObjectBody(model, thing.height_mm or model.design.height_mm, zone, axes, report)
     mesh, whole = body.mesh()
     meshing = time.perf_counter() - start
     trace = facing_trace(problem.surface, mesh, "contact")
@@ -88,7 +86,7 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, say: Say
     if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
         rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
     elastic = Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
-    say(f"condensing the object's {mesh.points.size} unknowns")
+    report.say(f"condensing the object's {mesh.points.size} unknowns")
     matrix = stiffness(mesh, elastic, problem.body.thickness)
     held = held_dofs(mesh, () if whole else axes, model.held_ends)
     condensed = condense(matrix, held, rows[problem.system.active_dofs])
@@ -123,7 +121,7 @@ class ObjectBody:
     height_mm: float
     zone: Zone
     axes: tuple[str, ...]
-    say: Say
+    report: Progress
 
     def mesh(self) -> tuple[Mesh, bool]:
         """Return the mesh, and whether it is a whole object although only a part of the finger is meshed."""
@@ -137,9 +135,9 @@ class ObjectBody:
         size = min([self.model.mesh.size_mm, *(0.5 * e for e in extents), *([0.5 * design.width_mm] if solid else [])])
         options = MeshOptions(size, max(size, min(self.model.mesh.base_size_mm, *extents)), mesher)
         axes = self.axes if axes is None else axes
-        self.say("meshing the object")
+        self.report.say("meshing the object")
         return (
-            mesh_solid(design, options, zone, axes, self.say)[0]
+            mesh_solid(design, options, zone, axes, self.report)[0]
             if solid
             else mesh_section(design, options, zone, axes)[0]
         )

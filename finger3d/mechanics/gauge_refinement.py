@@ -24,7 +24,7 @@ from finger3d.mechanics.model import Model
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.grading import SizedPlaces
 from finger3d.meshing.limits import check_count
-from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.report import MeshReport, mesh_report
 
 _REACH = 2.5
 """Distance from a gauge up to which the contact face is refined, over the depth of the gauge under it."""
@@ -57,7 +57,7 @@ def refined_at_gauges(
         return mesh, made
     size = edge_lengths_at_gauges(model, mesh, axes)
     finer = refined(mesh, size, lambda cells: check_count(cells, mesh.dim, options))
-    whole = report(finer, made.volume_mm3 / curved_volume(mesh), made.cad_volume_mm3, made.seconds)
+    whole = mesh_report(finer, made.volume_mm3 / curved_volume(mesh), made.cad_volume_mm3, made.seconds)
     return finer, replace(whole, from_cache=made.from_cache, cache_path=made.cache_path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from threading import Event
@@ -24,6 +24,7 @@ from finger3d.mechanics.path import Load, Station, stations
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.state import State
 from finger3d.objects import Move, ObjectPose
+from finger3d.progress import QUIET, Progress
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
@@ -52,7 +53,7 @@ def march(
     near: Sequence[Float] = (),
     workspace: Workspace | None = None,
     cancel: Event | None = None,
-    trial: Callable[[str], None] = lambda text: None,
+    report: Progress = QUIET,
 ) -> Iterator[StepResult]:
     """Yield the result of every increment of all legs; ends after the first that does not converge.
 
@@ -63,14 +64,14 @@ def march(
     problem : Problem
     near : sequence of (c, d) arrays, N
         Contact forces at the ends of the increments of a similar press, as initial guesses.
-    workspace, cancel, trial : see `Press`
+    workspace, cancel, report : see `Press`
 
     Raises
     ------
     CancelledError
         If `cancel` is set.
     """
-    press = Press(problem, workspace, cancel, trial)
+    press = Press(problem, workspace, cancel, report)
     for number, station in enumerate(stations(problem.model.legs)):
         yield press.advance(station, near[number] if number < len(near) else None)
         if press.has_failed:
@@ -87,8 +88,8 @@ class Press:
         What an earlier press of the same body left; empty unless given.
     cancel : Event, optional
         Once it is set, the press ends before its next increment.
-    trial : function of a text, optional
-        Called with the depth and the force of every trial while a prescribed force is searched for.
+    report : Progress, optional
+        Receives remarks on the depth and the force of every trial while a prescribed force is searched for.
 
     Attributes
     ----------
@@ -101,13 +102,13 @@ class Press:
         problem: Problem,
         workspace: Workspace | None = None,
         cancel: Event | None = None,
-        trial: Callable[[str], None] = lambda text: None,
+        report: Progress = QUIET,
     ) -> None:
         self.problem, self.formulation = problem, formulation_of(problem.model)
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed = False
-        self._cancel, self._trial = cancel, trial
+        self._cancel, self._report = cancel, report
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
         body = problem.without_inclusions
@@ -211,7 +212,7 @@ class Press:
             found, parts[depth] = self._increment(start, there, cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
-            self._trial(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
+            self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
             return Trial(depth, found, reached)
 
         most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)

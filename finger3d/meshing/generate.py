@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable
 
 from finger3d.fem.simplex import Mesh
 from finger3d.geometry.design import Design
@@ -12,9 +11,10 @@ from finger3d.meshing import cache
 from finger3d.meshing.given import GivenMesh, mesh_given
 from finger3d.meshing.limits import check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.report import MeshReport, mesh_report
 from finger3d.meshing.sizing import rounded_zone
 from finger3d.meshing.swept import mesh_swept
+from finger3d.progress import QUIET, Progress
 
 
 def mesh_solid(
@@ -22,7 +22,7 @@ def mesh_solid(
     options: MeshSizes,
     zone: Zone,
     symmetry: tuple[str, ...] = (),
-    say: Callable[[str], None] = lambda text: None,
+    report: Progress = QUIET,
 ) -> tuple[Mesh, MeshReport]:
     """Mesh a design with quadratic tetrahedra.
 
@@ -32,7 +32,7 @@ def mesh_solid(
     options : edge lengths and mesher
     zone : (x_min, x_max, z_min, z_max) mm where contact is predicted
     symmetry : "x", "z": mesh only x >= 0, z >= 0
-    say : called with a line at every stage
+    report : receives the messages
 
     Returns
     -------
@@ -42,13 +42,13 @@ def mesh_solid(
     if isinstance(design, GivenMesh):
         return mesh_given(design, options, zone)
     if options.mesher == "swept":
-        say("meshing (swept)")
+        report.say("meshing (swept)")
         return mesh_swept(design, options, zone, symmetry)
-    return _mesh_unstructured(design, options, zone, symmetry, say)
+    return _mesh_unstructured(design, options, zone, symmetry, report)
 
 
 def _mesh_unstructured(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, MeshReport]:
     """Mesh a design by fTetWild or netgen, or read the mesh from the cache."""
     check_sizes(design, options, 3)
@@ -58,13 +58,13 @@ def _mesh_unstructured(
     start = time.perf_counter()
     if (found := cache.load(path)) is not None:
         mesh, volume = found
-        say(f"mesh from the cache, {path}")
+        report.say(f"mesh from the cache, {path}")
         seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
-        return mesh, report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
+        return mesh, mesh_report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
     mesher = importlib.import_module(f"finger3d.meshing.{'netgen' if options.mesher == 'netgen' else 'tetwild'}")
-    mesh, volume, cad_seconds = mesher.new_mesh(design, options, zone, symmetry, say)
+    mesh, volume, cad_seconds = mesher.new_mesh(design, options, zone, symmetry, report)
     stored = cache.save(path, mesh, volume)
     if not stored:
-        say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
+        report.say(f"the mesh could not be kept in {path.parent}; the next run will mesh again")
     seconds = {"cad": cad_seconds, "mesh": time.perf_counter() - start - cad_seconds}
-    return mesh, report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)
+    return mesh, mesh_report(mesh, multiple, volume, seconds, cache_path=str(path) if stored else None)

@@ -24,7 +24,7 @@ from finger3d.meshing.grading import SizedPlaces
 from finger3d.meshing.limits import check_count
 from finger3d.meshing.mesh_files import MeshContents, read_contents
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.report import MeshReport, mesh_report
 from finger3d.meshing.sizing import RATE
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def mesh_given(design: GivenMesh, options: MeshSizes, zone: Zone) -> tuple[Mesh,
     if min(finer, everywhere) < 1.0 - _SAME:
         wanted = _wanted(design, zone, min(finer, 1.0), min(everywhere, 1.0))
         mesh = refined(mesh, wanted, lambda cells: check_count(cells, 3, options))
-    return mesh, report(mesh, 1.0, design.volume_mm3, {"cad": 0.0, "mesh": 0.0})
+    return mesh, mesh_report(mesh, 1.0, design.volume_mm3, {"cad": 0.0, "mesh": 0.0})
 
 
 def _wanted(design: GivenMesh, zone: Zone, finer: float, everywhere: float) -> Callable[[Float], Float]:

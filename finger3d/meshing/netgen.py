@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +31,7 @@ from finger3d.meshing.solids import (
     run_mesher,
     tessellated,
 )
+from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -42,7 +42,7 @@ _MOST_POINTS = 2_000_000  # of the size field
 
 
 def new_mesh(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError
@@ -54,14 +54,14 @@ def new_mesh(
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
     checked_tets(design, field, options)
-    say("building the CAD solid")
+    report.say("building the CAD solid")
     glued = glued_solids(design, symmetry)
     body = tessellated(design, glued, _CHORD_ERROR * float(np.linalg.norm(high - low)))
     check_volume(design, body, symmetry)
     field = finer_in_layers(field, body)
     cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
-    say(f"meshing by netgen, about {cells:.0f} tetrahedra")
+    report.say(f"meshing by netgen, about {cells:.0f} tetrahedra")
     try:
         points, tets = run_child(glued, field, netgen_limit_s(cells))
         return on_cad(points, tets, body, "netgen"), design.volume_mm3, cad_seconds

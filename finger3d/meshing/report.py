@@ -45,7 +45,7 @@ def content_hash(mesh: Mesh) -> str:
     return digest.hexdigest()[:16]
 
 
-def report(
+def mesh_report(
     mesh: Mesh,
     multiple: float,
     cad_volume_mm3: float,

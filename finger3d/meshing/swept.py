@@ -17,7 +17,7 @@ from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.grid import Grid, Sizes, folded_zone, rows, triangulate
 from finger3d.meshing.limits import check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.report import MeshReport, report
+from finger3d.meshing.report import MeshReport, mesh_report
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh
@@ -45,7 +45,7 @@ def mesh_section(
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = design.width_mm * (2 - len(axes))
-    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+    return whole, _fit(mesh_report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
 def mesh_swept(
@@ -68,7 +68,7 @@ def mesh_swept(
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = 4.0 / 2 ** len(axes)
-    return whole, _fit(report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+    return whole, _fit(mesh_report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
 def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:

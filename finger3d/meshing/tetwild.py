@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +32,7 @@ from finger3d.meshing.solids import (
     run_mesher,
     tessellated,
 )
+from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -52,7 +52,7 @@ _DECIMATION_SHARE = 0.02  # of the envelope: displacement of an STL surface by t
 
 
 def new_mesh(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], say: Callable[[str], None]
+    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.snap import UnusableMeshError
@@ -62,7 +62,7 @@ def new_mesh(
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
     cells = checked_tets(design, field, options)
-    say("building the CAD solid")
+    report.say("building the CAD solid")
     body, epsilon = _body(design, symmetry, field)
     if body.part_labels:
         field = finer_in_layers(field, body)
@@ -70,7 +70,7 @@ def new_mesh(
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.surface)
     check_volume(design, body, symmetry)
-    say(f"meshing, about {cells:.0f} tetrahedra")
+    report.say(f"meshing, about {cells:.0f} tetrahedra")
     reasons = []
     limit = meshing_limit_s(cells, len(body.triangles))
     for _ in range(ATTEMPTS):
@@ -79,7 +79,7 @@ def new_mesh(
             return on_cad(points, tets, body, "pytetwild"), design.volume_mm3, cad_seconds
         except UnusableMeshError as error:
             reasons.append(str(error))
-            say(f"this mesh will not do: {error}; meshing again")
+            report.say(f"this mesh will not do: {error}; meshing again")
     raise Finger3dError(
         f"{design.name}: {ATTEMPTS} attempts to mesh with size_mm = {options.size_mm:g} failed, the last because "
         f"{reasons[-1]}; try other sizes, or mesher = 'swept'"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.materials.silicones import silicone_named
 from finger3d.mold.options import MoldOptions
 from finger3d.progress import Progress
+from finger3d.scene import Source, scene_of
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -51,21 +53,26 @@ class Exported:
 
 
 def export(
-    scene: Scene,
+    scene: Source,
     out: str | Path,
     mold: MoldOptions | None = None,
     text: bool = False,
     tolerance_mm: float | None = None,
     report: Progress | None = None,
+    overrides: Sequence[str] = (),
 ) -> Exported:
-    """Write finger.step and finger.stl and, if asked, a mold's parts, plate, sheet and picture; all in mm.
+    """Write the finger as STEP and STL and, if asked, the printable parts of a mold; all in mm.
 
     Parameters
     ----------
-    mold : choices for a mold; None for the finger alone
-    text : STL as text instead of binary
-    tolerance_mm : largest distance of triangles from the CAD surface; less where the volume asks for it; None for
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    out : folder for finger.step and finger.stl, and for the parts, plate, sheet and picture of a mold
+    mold : `finger3d.MoldOptions`; None: no mold
+    text : whether the STL file is text instead of binary
+    tolerance_mm : largest distance of the triangles from the CAD surface, smaller where the volume asks for it; None:
         0.05 mm, or with a mold the printer's
+    report : told about stages
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Raises
     ------
@@ -75,20 +82,20 @@ def export(
     Examples
     --------
     >>> import tempfile, finger3d
-    >>> from finger3d.mold.export import export
-    >>> scene = finger3d.parse({
+    >>> scene = {
     ...     "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 8.0, "width_mm": 6.0},
     ...     "material": {"E_MPa": 1.0, "nu": 0.4}, "press": {"depth_mm": 1.0},
-    ... })
+    ... }
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     done = export(scene, folder)
+    ...     done = finger3d.export(scene, folder)
     >>> [file.name for file in done.files], round(done.stl_volume_mm3, 6)
     (['finger.step', 'finger.stl'], 960.0)
     """
     from finger3d.io import claimed
     from finger3d.mold.shell import Shell, shell, write_step, write_stl
 
-    out, report, design = Path(out), report or Progress(), scene.design
+    out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
+    design = scene.design
     triangles = design.surface if isinstance(design, Imported) and design.cad is None else None
     if tolerance_mm is None:
         tolerance_mm = _TOLERANCE_MM if mold is None else mold.machine.tolerance_mm
@@ -116,16 +123,9 @@ def export(
         files.append(out / "finger.stl")
         silicone = None
         if assembly is not None:
-            from finger3d.mold.extras import extra_parts, write_extras
-            from finger3d.mold.output import write_mold
-
-            name = scene.tables.material.silicone
-            named = silicone_named(name) if name else None
-            extras = extra_parts(scene, assembly, out)
-            written, told = write_mold(scene.title, assembly, body, out, text, report, extras.parts, named)
-            more, also = write_extras(scene, assembly, solid, out)
-            files += written + more
-            remarks += [*told, *extras.remarks, *also]
+            written, told = _write_mold(scene, assembly, body, solid, out, text, report)
+            files += written
+            remarks += told
             silicone = assembly.silicone_mm3 / 1e3
     return Exported(
         tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
@@ -145,6 +145,21 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
     source = Path(design.path).resolve() if isinstance(design, Imported) else None
     if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
         raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
+
+
+def _write_mold(
+    scene: Scene, made: Mold, body: Shell, solid: Solid | None, out: Path, text: bool, report: Progress
+) -> tuple[list[Path], list[str]]:
+    """Write a mold with its extras; return the paths of the files, and remarks."""
+    from finger3d.mold.extras import extra_parts, write_extras
+    from finger3d.mold.output import write_mold
+
+    name = scene.tables.material.silicone
+    named = silicone_named(name) if name else None
+    extras = extra_parts(scene, made, out)
+    files, remarks = write_mold(scene.title, made, body, out, text, report, extras.parts, named)
+    more, also = write_extras(scene, made, solid, out)
+    return [*files, *more], [*remarks, *extras.remarks, *also]
 
 
 def _clear(out: Path) -> None:

@@ -145,25 +145,6 @@ class Scene:
         return tree.written(self.tables.model_dump() if defaults else self.given)
 
 
-def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
-    """Read and check a scene file.
-
-    Parameters
-    ----------
-    path : TOML file
-    overrides : texts such as ``friction.mu=0.5``, applied before anything is checked
-
-    Raises
-    ------
-    Finger3dError
-        With one line that names the file, the key, the value and what is allowed.
-    """
-    path = Path(path)
-    overrides = list(overrides)
-    document = tree.override(tree.read(path), overrides)
-    return parse(document, path=path, set_keys=[o.partition("=")[0].strip() for o in overrides])
-
-
 def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | Mapping[str, str] = ()) -> Scene:
     """Check a tree of tables (lists or tuples for arrays) and return it as a Scene.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from finger3d._types import TreeView
@@ -14,15 +14,34 @@ Source = Scene | TreeView | str | Path
 """A scene: loaded, as the tables of a scene file, or the path of the file."""
 
 
-def scene_of(source: Source) -> Scene:
-    """Return the scene that an argument stands for.
+def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : TOML file
+    overrides : texts such as ``friction.mu=0.5``, applied before anything is checked
+
+    Raises
+    ------
+    Finger3dError
+        With one line that names the file, the key, the value and what is allowed.
+    """
+    return scene_of(Path(path), overrides)
+
+
+def scene_of(source: Source, overrides: Iterable[str] = ()) -> Scene:
+    """Return the scene that an argument stands for, with values of other keys as for ``--set``.
 
     Raises
     ------
     Finger3dError
         If it has a mistake, or is no scene.
     """
-    return source if isinstance(source, Scene) else parse(*tables_of(source))
+    overrides = list(overrides)
+    if isinstance(source, Scene) and not overrides:
+        return source
+    return parse(*tables_of(source, overrides), [o.partition("=")[0].strip() for o in overrides])
 
 
 def tables_of(source: Source, overrides: Sequence[str] = ()) -> tuple[TreeView, Path | None]:

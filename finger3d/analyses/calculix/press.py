@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +19,7 @@ from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import Move, ObjectPose, PlacedObject
+from finger3d.progress import QUIET, Progress
 
 PENALTY = 200.0
 """Pressure over overlap, times the depth over Young's modulus: the surfaces overlap by less than a percent of the
@@ -61,7 +61,7 @@ class PressDeck:
     remarks: tuple[str, ...]
 
 
-def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambda text: None) -> PressDeck:
+def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> PressDeck:
     """Mesh a model as a press does, and return it as a deck.
 
     Raises
@@ -71,7 +71,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
     """
     _check(model)
     contact, axes = model.first_contact, symmetry(model)
-    mesh, report = mesh_part(model, contact.contact_box, axes, say)
+    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
     finite = model.finite_strain
     law = _law(model)
     laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
@@ -101,7 +101,7 @@ def press_deck(model: Model, title: str = "", say: Callable[[str], None] = lambd
         remarks=tuple(_ascii(line) for line in (*_head(title, axes, multiple), *_remarks(model))),
         fields=True,
     )
-    return PressDeck(deck, report, multiple, _remarks(model))
+    return PressDeck(deck, mesh_report, multiple, _remarks(model))
 
 
 def _check(model: Model) -> None:

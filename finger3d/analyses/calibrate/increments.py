@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.analyses.pressed_body import under
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.problem import Problem
@@ -126,7 +127,7 @@ def scale_increments(problem: Problem, ratio: float) -> tuple[float, Problem]:
     legs = problem.model.legs
     scaled = tuple(replace(leg, steps=max(1, round(ratio * int(leg.steps)))) for leg in legs)
     actual = sum(int(leg.steps) for leg in scaled) / sum(int(leg.steps) for leg in legs)
-    return actual, replace(problem, model=replace(problem.model, legs=scaled))
+    return actual, under(problem, legs=scaled)
 
 
 def error_of_increments(problem: Problem, own: Float, chosen: bool, read: Read) -> Float:

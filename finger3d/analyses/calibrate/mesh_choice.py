@@ -5,19 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._cost import CALIBRATION_S
 from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.richardson import ORDER
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
-
-if TYPE_CHECKING:
-    from finger3d.analyses.calibrate.run import CurvePoints
 
 SHARE = 0.1
 """Largest share of the mesh in the variance of mu."""
@@ -44,7 +42,7 @@ def choose_mesh(
     model: Model,
     automatic: bool,
     calibrated: Callable[[Model], tuple[CurvePoints, Calibration]],
-    say: Callable[[str], None],
+    report: Progress,
     longest_s: float = CALIBRATION_S,
 ) -> CalibratedMesh:
     """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.
@@ -78,7 +76,7 @@ def choose_mesh(
         found = CalibratedMesh(curve, calibration, note)
         if not automatic or seconds > longest_s:
             return found
-        say(f"{note}; calibrating again")
+        report.say(f"{note}; calibrating again")
         model = finer
 
 

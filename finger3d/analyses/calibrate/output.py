@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d._types import Tree
+from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.io import atomic, write_csv
 from finger3d.mechanics.gauges import Gauge
@@ -20,7 +21,6 @@ from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.files import save, write_table
 
 if TYPE_CHECKING:
-    from finger3d.analyses.calibrate.run import CurvePoints
     from finger3d.analyses.calibrate.settings import CalibrationSettings
     from finger3d.scene import Scene
 

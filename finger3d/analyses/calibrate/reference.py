@@ -11,7 +11,7 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.accuracy.companions import built_like
-from finger3d.analyses.calibrate.presses import PressesByMu, presses
+from finger3d.analyses.pressed_body import PressesByMu, presses
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem

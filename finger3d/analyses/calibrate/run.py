@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,18 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d._types import Float
-from finger3d.analyses.calibrate.increments import Increments, choose_increments
+from finger3d.analyses.calibrate.curve_points import CurvePoints
+from finger3d.analyses.calibrate.increments import choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
 from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
-from finger3d.analyses.calibrate.presses import Press, presses
 from finger3d.analyses.calibrate.reference import ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
+from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
-from finger3d.mechanics.build import MARGIN, build
-from finger3d.mechanics.coverage import contact_within_candidates
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
@@ -53,50 +50,6 @@ _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 _SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are evaluated, in small and finite strain
 
 
-@dataclass(frozen=True)
-class CurvePoints:
-    """Presses of one condensed body, one for every mu that is finished.
-
-    Attributes
-    ----------
-    problem : the condensed body; its gauges include the displaced ones, which give the tolerances of position
-    mus, increments : all values of mu of the calibration, ascending; the increments of every press
-    presses : ascending in mu
-    seconds : wall time of the build and of the presses
-    factorizations_before : factorisations of an earlier attempt with too few candidate points
-    """
-
-    problem: Problem
-    mus: tuple[float, ...]
-    increments: Increments
-    presses: tuple[Press, ...]
-    seconds: Mapping[str, float]
-    factorizations_before: int = 0
-
-    @property
-    def frames(self) -> dict[float, StepResult]:
-        """Last increment of every press that converged, by mu."""
-        return {p.mu: p.frame for p in self.presses if p.frame.outcome.ok}
-
-    @property
-    def failed(self) -> dict[float, str]:
-        """Outcome of every press that did not converge, by mu."""
-        return {
-            p.mu: f"at depth {p.frame.target.depth_mm:.4g} mm: {p.frame.outcome}"
-            for p in self.presses
-            if not p.frame.outcome.ok
-        }
-
-    @property
-    def factorizations(self) -> int:
-        """Factorisations of the body, in its build and in the presses."""
-        return self.factorizations_before + self.problem.factorizations + sum(p.factorizations for p in self.presses)
-
-    def reading(self, name: str) -> Float:
-        """Return a reading (n,) in the presses that converged."""
-        return np.array([frame.named_readings[name] for frame in self.frames.values()])
-
-
 def calibrate(
     scene: Source,
     gauge: str | Sequence[str],
@@ -109,6 +62,7 @@ def calibrate(
     maps: bool = False,
     marker_noise_mm: float = MARKER_NOISE_MM,
     taxel_noise_MPa: float = TAXEL_NOISE_MPA,
+    overrides: Sequence[str] = (),
 ) -> Calibration:
     """Calibrate a gauge, or several readings together: their values at the end of the scene's path, for every mu.
 
@@ -124,6 +78,7 @@ def calibrate(
     report : receives the progress
     maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Raises
     ------
@@ -136,7 +91,7 @@ def calibrate(
     from finger3d.scene.derived import largest_spread
 
     report = report or Progress()
-    scene = scene_of(scene)
+    scene = scene_of(scene, overrides)
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)
@@ -167,7 +122,7 @@ def _calibrate_scene(
         return curve, _calibration(curve, settings, report)
 
     automatic = not _SIZES & set(scene.given.get("mesh", {}))
-    chosen = choose_mesh(model, automatic, calibrate_model, report.say)
+    chosen = choose_mesh(model, automatic, calibrate_model, report)
     curve, calibration, used = chosen.curve, chosen.calibration, chosen.curve.problem.model.mesh
     if used != model.mesh:
         scene = scene.with_mesh(used)
@@ -220,21 +175,19 @@ def _press_all(
     chosen = [] if model.inclusions else [g for g in model.gauges if g.name in settings.names]
     extra = [d.gauge for gauge in chosen for d in displaced_gauges(model, gauge, settings.tolerances)]
     model = replace(model, gauges=(*model.gauges, *extra))
-    spent = 0
-    for margin in (MARGIN, math.inf):
-        start = time.perf_counter()
-        report.stage("condensing")
-        problem = build(model, report.say, margin)
-        seconds = {"build": time.perf_counter() - start}
+    report.stage("condensing")
+    body = PressedBody(model, report)
+
+    def press_all(problem: Problem, before: CurvePoints | None) -> tuple[CurvePoints, list[StepResult]]:
+        spent = before.factorizations if before else 0
         for curve in _curve_points(problem, settings, report):
-            curve = replace(curve, seconds={**seconds, **curve.seconds}, factorizations_before=spent)
+            seconds = {"build": body.seconds, **curve.seconds}
+            curve = replace(curve, seconds=seconds, factorizations_before=spent)
             if folder:
                 write_points(folder, curve, settings)
-        if all(contact_within_candidates(curve.problem, list(curve.frames.values()))):
-            break
-        spent = curve.factorizations
-        report.say("contact reached beyond the candidate points; once more with all of the contact face")
-    return curve
+        return curve, list(curve.frames.values())
+
+    return body.pressed(press_all)[0]
 
 
 def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progress) -> Iterator[CurvePoints]:
@@ -246,7 +199,7 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     increments = choose_increments(problem, lambda p: (read(p, settings.names, three) / settings.noise).ravel())
     if increments.chosen:
         report.say(str(increments))
-    problem = replace(problem, model=replace(problem.model, legs=increments.legs))
+    problem = under(problem, legs=increments.legs)
     if problem.model.finite_strain:
         formulation = dict(problem.model.filled).get("hyperelastic_law", "this body")
         report.say(
@@ -283,7 +236,7 @@ def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Prog
             pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
         )
         every = evaluate_tolerances(
-            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report.stage
+            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report
         )
         for name, tolerance in every:
             found[name].append(tolerance)

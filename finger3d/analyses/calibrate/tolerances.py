@@ -22,11 +22,11 @@ from finger3d._types import Float
 from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import reading_error
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
-from finger3d.analyses.calibrate.presses import PressesByMu
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.history import StepResult
@@ -34,6 +34,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.problem import Problem
 from finger3d.objects import Plane
+from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
 
 _LEAST_POINTS = {2: 150, 3: 500}
@@ -115,7 +116,7 @@ def evaluate_tolerances(
     tolerances: Mapping[str, float],
     base: ReferenceReadings,
     increments: Increments,
-    say: Callable[[str], None],
+    report: Progress,
 ) -> Iterator[tuple[str, Tolerance]]:
     """Yield the name of a reading and a tolerance, with its effect at all values of mu of `base`.
 
@@ -126,7 +127,7 @@ def evaluate_tolerances(
     tolerances : standard deviations by name
     base : readings of the nominal body; without inclusions they include those of displaced gauges
     increments : of its path
-    say : receives a line about each tolerance
+    report : receives the messages
 
     Notes
     -----
@@ -139,15 +140,15 @@ def evaluate_tolerances(
     others = set(tolerances) - {*GAUGE_PLACES, "increments"}
     if others and increments.comparison_legs != problem.model.legs:
         legs = increments.comparison_legs
-        body = ReferenceBody.of(replace(problem, model=replace(problem.model, legs=legs)), names, mu)
+        body = ReferenceBody.of(under(problem, legs=legs), names, mu)
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
-        say("a coarser body")
-        coarse = _on_coarser_mesh(body, say)
+        report.stage("a coarser body")
+        coarse = _on_coarser_mesh(body, report)
     varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
-        say(f"tolerance {name}")
+        report.stage(f"tolerance {name}")
         known = mu
         if name == "mesh":
             effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
@@ -221,7 +222,7 @@ def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: 
     shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
     for step in (sd, -min(sd, 0.5 * shallowest)):
         legs = deeper(model.legs, step)
-        yield step, body.change(replace(problem, model=replace(model, legs=legs)), _scaled_to_path(body, legs))
+        yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
@@ -321,10 +322,10 @@ def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
     return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
 
 
-def _on_coarser_mesh(body: ReferenceBody, say: Callable[[str], None]) -> ReferenceBody | None:
+def _on_coarser_mesh(body: ReferenceBody, report: Progress) -> ReferenceBody | None:
     """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
     try:
-        return ReferenceBody.of(companion(body.problem, say), body.names, body.mu)
+        return ReferenceBody.of(companion(body.problem, report), body.names, body.mu)
     except Finger3dError:
         return None
 

@@ -72,7 +72,11 @@ class Comparison:
 
 
 def compare(
-    scene: Source, out: str | Path, widths: Sequence[float] | None = None, report: Progress | None = None
+    scene: Source,
+    out: str | Path,
+    widths: Sequence[float] | None = None,
+    report: Progress | None = None,
+    overrides: Sequence[str] = (),
 ) -> Comparison:
     """Solve a scene in plane stress, in plane strain and as a solid, and compare the results.
 
@@ -82,6 +86,7 @@ def compare(
     out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
     widths : further widths of the finger, mm; None takes multiples of its height
     report : progress of the cases
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
     Returns
     -------
@@ -91,7 +96,14 @@ def compare(
     from finger3d.scene import scene_of
 
     report = report or Progress()
-    solid = _as_solid(scene_of(scene))
+    scene = scene_of(scene, overrides)
+    tolerance = scene.tables.mesh.tolerance
+    if tolerance is not None:
+        raise Finger3dError(
+            f"{scene.path or scene.title}: mesh.tolerance = {tolerance:g}: compare needs fixed edge lengths; press "
+            "determines them and writes them to the scene.toml of its results, which compare accepts"
+        )
+    solid = _as_solid(scene)
     model = solid.model()
     other_widths = _other_widths(model, widths)
     _check(model, other_widths)

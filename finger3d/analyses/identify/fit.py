@@ -108,10 +108,10 @@ Residuals = Callable[[Float], Float]
 """Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
 
 
-def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, say: Callable[[Float], None]) -> Float:
+def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, announce: Callable[[Float], None]) -> Float:
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
 
-    `say` is called with the values of each iteration.
+    `announce` is called with the values of each iteration.
     """
     count = len(residuals(values_at(scales, start)))
 
@@ -122,7 +122,7 @@ def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, say: Callab
             return np.full(count, _FAILED)
 
     def slope(shares: Float) -> Float:
-        say(values_at(scales, shares))
+        announce(values_at(scales, shares))
         return jacobian(scales, shares, residuals)
 
     inside = np.clip(start, _INSIDE, 1.0 - _INSIDE)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.analyses.free_keys import FreeKey, check_distinct
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
 from finger3d.analyses.identify.fit import FittedValues, Scale, fit, jacobian, misfit_text, uncertainty, values_at
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.simulated import (
@@ -31,7 +31,7 @@ from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, parse, tree
+from finger3d.scene import Scene, Source, parse, tables_of, tree
 
 DEVIATIONS = (
     "of the noise of the data alone; errors of the mesh and of the increments come on top: fit on a finer mesh, too"
@@ -110,23 +110,30 @@ class Identification:
 
 
 def identify(
-    given: TreeView,
+    scene: Source,
     measured: str | Path,
-    free: Sequence[FreeKey],
+    free: Bounds,
     out: str | Path,
-    path: Path | None = None,
+    overrides: Sequence[str] = (),
     report: Progress | None = None,
 ) -> Identification:
     """Find the values of free keys with which a scene reproduces a measured press, by weighted least squares.
 
     Parameters
     ----------
-    given : the scene as written, overrides included
-    measured : CSV file; its columns are named as those of history.csv, with optional ``..._std``
-    free : keys and bounds; ``depth_offset_mm`` is added to the measured depths
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    measured : CSV file with columns named as in history.csv, and optionally their standard deviations, ``..._std``
+    free : key -> lower and upper bound, for instance ``{"material.E_MPa": (0.05, 5.0)}``, or texts such as
+        ``"material.E_MPa=0.05:5"``; ``depth_offset_mm`` is added to the measured depths
     out : folder for presses.jsonl (every press once it is solved), identify.json, identify.csv, identified.toml,
         identify.png and report.html; the same identification is continued there
-    path : of the scene file
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : receives the progress at every iteration
+
+    Returns
+    -------
+    Identification
+        With the values, their standard deviations and correlation, and notes on values that the data do not determine.
 
     Raises
     ------
@@ -134,25 +141,27 @@ def identify(
         For a mistake in the file or in the free keys, or if the press fails at the start.
     """
     report = report or Progress()
-    start = _checked_start(given, free, path)
+    given, path = tables_of(scene, overrides)
+    keys = free_keys(free)
+    start = _checked_start(given, keys, path)
     model = parse(given, path).model()
     data = read_measured(Path(measured), names_of(model))
-    if OFFSET in (f.key for f in free) and data.index != "depth_mm":
+    if OFFSET in (f.key for f in keys) and data.index != "depth_mm":
         raise Finger3dError(f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm")
-    if data.count <= len(free):
-        raise Finger3dError(f"{data.path}: {data.count} measured values for {len(free)} free keys; give more rows")
-    for values in (start, [f.low for f in free], [f.high for f in free]):
-        check_rows(fitted_scene(given, free, values, path).model().legs, free, data)
+    if data.count <= len(keys):
+        raise Finger3dError(f"{data.path}: {data.count} measured values for {len(keys)} free keys; give more rows")
+    for values in (start, [f.low for f in keys], [f.high for f in keys]):
+        check_rows(fitted_scene(given, keys, values, path).model().legs, keys, data)
     task = {
         "scene": tree.plain(given),
-        "free": [[f.key, f.low, f.high] for f in free],
+        "free": [[f.key, f.low, f.high] for f in keys],
         "measured": hashlib.sha256(data.path.read_bytes()).hexdigest()[:16],
     }
     with (
         claimed(out, "identify") as folder,
-        opened(folder / "presses.jsonl", folder / "task.json", task, row_mistake(free)) as journal,
+        opened(folder / "presses.jsonl", folder / "task.json", task, row_mistake(keys)) as journal,
     ):
-        simulation = Simulation(given, path, tuple(free), journal)
+        simulation = Simulation(given, path, keys, journal)
         found = _fitted(simulation, data, start, report)
         _write(folder, found)
         return found
@@ -190,18 +199,18 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         simulated = simulation.at(values, data)
         return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
 
-    def say(values: Float) -> None:
+    def announce(values: Float) -> None:
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
 
     tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
     costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
     shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
-    shares = fit(scales, shares, residuals, say)
+    shares = fit(scales, shares, residuals, announce)
     weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     if weighted:
         stds |= weighted
-        shares = fit(scales, shares, residuals, say)
+        shares = fit(scales, shares, residuals, announce)
         stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     values = values_at(scales, shares)
     fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals), residuals)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from scipy.interpolate import PchipInterpolator
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
-from finger3d.analyses.shared_body import SharedBody, Variant, body_key
+from finger3d.analyses.pressed_body import PressedBody
+from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.columns import by_key, in_order, in_space
@@ -73,7 +74,7 @@ class Simulation:
     free: tuple[FreeKey, ...]
     journal: Journal
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
-    _bodies: dict[str, SharedBody] = field(default_factory=dict)
+    _bodies: dict[str, PressedBody] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take over the solutions of an earlier run."""
@@ -137,7 +138,7 @@ class Simulation:
             scene = self.scene(point)
             model = scene.model()
             body = self._body(scene, model)
-            (frames,) = body.frames([Variant.of(model)])
+            frames = body.steps(model.friction, model.rule)
         except Finger3dError as error:
             return {"values": list(point), "outcome": " ".join(str(error).split()), "curve": {}}
         bad = next((f for f in frames if not f.outcome.ok), None)
@@ -146,18 +147,17 @@ class Simulation:
             return {"values": list(point), "outcome": outcome, "curve": {}}
         rows = []
         for number, frame in enumerate(frames, start=1):
-            own = replace(frame, readings=body.readings_of(Variant.of(model), frame.readings))
-            rows.append({"step": float(number)} | table_row(body.problem.points, own))
+            rows.append({"step": float(number)} | table_row(body.problem.points, frame))
         columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
         return {"values": list(point), "outcome": "converged", "curve": columns}
 
-    def _body(self, scene: Scene, model: Model) -> SharedBody:
+    def _body(self, scene: Scene, model: Model) -> PressedBody:
         """Return the condensed body of a scene; the last ones are kept."""
         key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
         if key not in self._bodies:
             while len(self._bodies) >= _MAX_STORED:
                 self._bodies.pop(next(iter(self._bodies)))
-            self._bodies[key] = SharedBody(model, [Variant.of(model)])
+            self._bodies[key] = PressedBody(model)
         return self._bodies[key]
 
     def _keep(self, row: Mapping[str, Any]) -> None:

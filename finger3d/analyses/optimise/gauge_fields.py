@@ -15,22 +15,19 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.accuracy.companions import built_like, companion, edge_ratio
 from finger3d.accuracy.richardson import ORDERS, Kind, gain
-from finger3d.analyses.calibrate.presses import presses
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.recover import displacement
-from finger3d.mechanics.build import MARGIN, build
-from finger3d.mechanics.coverage import contact_within_candidates
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.problem import Problem
 from finger3d.mechanics.step_halving import with_steps
 from finger3d.objects import Plane
+from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects
 from finger3d.sensor.maps import Reader
-
-Say = Callable[[str], None]
 
 _STEPS = 20
 """Number of increments of a leg with automatic increments; few suffice, as places are only compared."""
@@ -96,22 +93,25 @@ class GaugeFields:
 
     @classmethod
     def of(
-        cls, model: Model, mus: Sequence[float], noise: float, tolerances: Mapping[str, float], say: Say
+        cls, model: Model, mus: Sequence[float], noise: float, tolerances: Mapping[str, float], report: Progress
     ) -> GaugeFields:
         """Press the body of a model, and those that its tolerances make of it."""
         model = replace(model, gauges=(), markers=(), taxels=())
-        say("pressing the body")
-        nominal = _nominal(model, mus, say)
+        report.stage("pressing the body")
+        body = PressedBody(model, report)
+        legs = with_steps(body.problem, _STEPS).model.legs
+        ends = body.ends(list(mus), legs)
+        nominal = StrainField.of_frames(under(body.problem, legs=legs), ends, mus)
         problem, shared = nominal.problem, {}
         for name, make in (("depth_mm", _depth), ("E_percent", _modulus), ("nu", _nu), ("tilt_deg", _tilt)):
             if name in tolerances:
-                say(f"tolerance {name}")
+                report.stage(f"tolerance {name}")
                 found = make(nominal, mus, tolerances[name])
                 if found is not None:
                     shared[name] = found
         coarse, ratio = None, 1.0
         if "mesh" in tolerances:
-            say("tolerance mesh")
+            report.stage("tolerance mesh")
             beside = companion(problem)
             coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside), ORDERS[Kind.STRAIN])
         return cls(nominal, tuple(mus), noise, tolerances, shared, coarse, ratio)
@@ -160,18 +160,6 @@ class GaugeFields:
         return 0.5 * (self.nominal.strain(points + step, angles) - self.nominal.strain(points - step, angles))
 
 
-def _nominal(model: Model, mus: Sequence[float], say: Say) -> StrainField:
-    """Press the body; again with all of the contact face if contact leaves the candidate points."""
-    for margin in (MARGIN, math.inf):
-        problem = build(model, say, margin)
-        if any(leg.steps == "auto" for leg in model.legs):
-            problem = with_steps(problem, _STEPS)
-        frames = [p.frame for p in sorted(presses(problem, list(mus)), key=lambda p: p.mu)]
-        if all(contact_within_candidates(problem, [f for f in frames if f.outcome.ok])):
-            break
-    return StrainField.of_frames(problem, frames, mus)
-
-
 Effect = Callable[[Float, Float], Float]
 
 
@@ -179,7 +167,7 @@ def _depth(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
     """Press deeper by one standard deviation."""
     problem = nominal.problem
     legs = deeper(problem.model.legs, sd)
-    other = StrainField.of(replace(problem, model=replace(problem.model, legs=legs)), mus)
+    other = StrainField.of(under(problem, legs=legs), mus)
     return lambda points, angles: other.strain(points, angles) - nominal.strain(points, angles)
 
 

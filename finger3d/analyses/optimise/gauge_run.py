@@ -11,7 +11,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.tolerances import with_defaults
-from finger3d.analyses.free_keys import FreeKey
+from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import NOWHERE, Candidates, GaugeSet, Region, objectives, search
 from finger3d.analyses.optimise.task import MUS
@@ -21,7 +21,7 @@ from finger3d.mechanics.model import Model
 from finger3d.plotting.gauge_places import GaugeMap, draw
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
-from finger3d.scene import Scene, parse, tree
+from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene.derived import largest_spread
 from finger3d.sensor.curve import LARGEST_STRAIN
 
@@ -77,29 +77,35 @@ class GaugePlaces:
 
 
 def place_gauges(
-    given: TreeView,
+    scene: Source,
     count: int,
     out: str | Path,
-    free: Sequence[FreeKey] = (),
-    mus: Sequence[float] = MUS,
+    free: Bounds | None = None,
+    mus: Sequence[float] | None = None,
     noise: float = 1.5e-4,
     tolerances: Mapping[str, float] | None = None,
-    path: Path | None = None,
+    overrides: Sequence[str] = (),
     report: Progress | None = None,
 ) -> GaugePlaces:
-    """Find the places and directions of gauges that together determine mu best.
+    """Find the places and directions of gauges that together determine mu best, as ``finger3d optimise --gauges``.
 
     Parameters
     ----------
-    given : the scene as written, overrides included
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
     count : number of gauges
     out : folder for gauges.json, best.toml, map.csv, map.png and report.html
     free : bounds of ``gauge.x_mm``, ``gauge.y_mm``, ``gauge.z_mm`` and ``gauge.angle_deg``; without them the whole body
         at z = 0, in all directions
-    mus : coefficients of friction at which the gauges are judged, ascending
+    mus : friction coefficients at which the gauges are judged, ascending; None: nine from 0.05 to 1
     noise : standard deviation of a strain reading
-    tolerances : standard deviations by name, in place of those of a calibration; 0 omits one
-    path : of the scene file
+    tolerances : standard deviations by name, in place of the defaults of `calibrate`; 0 omits one
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : told about stages
+
+    Returns
+    -------
+    GaugePlaces
+        With the scene that has these gauges, and the standard deviation of mu.
 
     Raises
     ------
@@ -107,6 +113,8 @@ def place_gauges(
         For a mistake in the scene or the numbers, or if a press fails.
     """
     report = report or Progress()
+    given, path = tables_of(scene, overrides)
+    keys, mus = free_keys(free or ()), MUS if mus is None else mus
     _check(count, mus, noise)
     scene = parse(given, path)
     model = scene.model()
@@ -115,12 +123,10 @@ def place_gauges(
             "optimise --gauges: not with effects.embedded_gauge, whose foils change the body wherever they lie; "
             "find the places without it, or optimise one gauge with --free gauge.NAME.x_mm"
         )
-    region = _region(model, free)
+    region = _region(model, keys)
     with claimed(out, "optimise") as folder:
-        fields = GaugeFields.of(
-            model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report.stage
-        )
-        found, everywhere = search(fields, region, count, report.stage)
+        fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report)
+        found, everywhere = search(fields, region, count, report)
         maps = tuple(_map(found, i, everywhere) for i in range(count))
         result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
         report.stage("writing")

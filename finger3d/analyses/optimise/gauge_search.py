@@ -16,6 +16,7 @@ from finger3d._types import Float
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects, mu_sd, prior
 
 NOWHERE = "no gauge within these bounds lies in the finger"
@@ -152,12 +153,12 @@ def objectives(fixed: Float, candidates: Candidates) -> Float:
     return np.asarray(mu_sd(fixed + candidates.effects.fisher).mean(axis=-1))
 
 
-def search(fields: GaugeFields, region: Region, count: int, say: Callable[[str], None]) -> tuple[GaugeSet, Candidates]:
+def search(fields: GaugeFields, region: Region, count: int, report: Progress) -> tuple[GaugeSet, Candidates]:
     """Return the best `count` gauges, and the candidates of the whole region.
 
     The prior standard deviation of mu is that of a uniform distribution over the range of the pressed values.
     """
-    say("comparing places")
+    report.stage("comparing places")
     spread = (fields.mus[-1] - fields.mus[0]) / math.sqrt(12.0)
     found = GaugeSet((), prior(len(fields.shared), spread))
     points, spacing = region.grid()
@@ -166,7 +167,7 @@ def search(fields: GaugeFields, region: Region, count: int, say: Callable[[str],
         raise Finger3dError(f"optimise --gauges: {NOWHERE}; widen the bounds")
     for number in range(count):
         found = found.placed(_best(found.fisher(), everywhere)[0])
-        say(f"{number + 1} gauge{'s' if number else ''}: mu +- {found.objective:.3g} in the mean")
+        report.stage(f"{number + 1} gauge{'s' if number else ''}: mu +- {found.objective:.3g} in the mean")
     found = _exchanged(found, lambda _: everywhere)
     turn = math.radians(7.5)
     for _ in range(_REFINEMENTS):
@@ -175,7 +176,7 @@ def search(fields: GaugeFields, region: Region, count: int, say: Callable[[str],
             found,
             lambda g, s=spacing, t=turn: Candidates.of(fields, *region.around(g.place, g.angle, s, t)),  # type: ignore[misc]
         )
-    say(f"polished: mu +- {found.objective:.3g} in the mean")
+    report.stage(f"polished: mu +- {found.objective:.3g} in the mean")
     return found, everywhere
 
 

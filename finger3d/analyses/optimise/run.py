@@ -1,56 +1,40 @@
-"""Search for the best design: designs are evaluated one by one, and each evaluation is stored at once."""
+"""Optimisation of the free keys of a scene: the search and its files."""
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
-import numpy as np
-
-from finger3d._types import Float, Tree
-from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
-from finger3d.analyses.free_keys import FreeKey
+from finger3d.analyses.free_keys import Bounds, free_keys
+from finger3d.analyses.optimise.search import Search
 from finger3d.analyses.optimise.task import (
     METHODS,
+    MUS,
     Evaluation,
-    Objective,
-    ObjectiveTable,
     OptimisationProblem,
     checked_start,
     evaluation_of,
     objective_of,
     row_check,
 )
-from finger3d.analyses.shared_body import SharedBody, Variant, body_key
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv, write_json
-from finger3d.mechanics.columns import strain_columns
-from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Leg, Model
+from finger3d.io import atomic, claimed, write_json
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
 from finger3d.report.optimise import optimise_page
-from finger3d.results.journal import Journal, opened
-from finger3d.scene import Scene
-
-_GAUGE_BUDGET = 60  # evaluations of gauges on one body
-_INFEASIBLE = 1e30  # cost of a design that cannot be built: finite, as annealing asks
-_MAX_STORED = 4  # bodies with their increments
+from finger3d.results.journal import opened
+from finger3d.scene import Scene, Source, tables_of
 
 
 @dataclass(frozen=True)
 class OptimisationResult:
-    """Result of a search; `scene` is the best design.
+    """Result of a search over the free `keys`; `scene` is the best design.
 
     `evaluations` are in the order of the search and may repeat; evaluations.csv has `distinct_designs` lines.
     """
 
+    keys: tuple[str, ...]
     best: Evaluation
     start: Evaluation
     evaluations: tuple[Evaluation, ...]
@@ -59,244 +43,65 @@ class OptimisationResult:
     scene: Scene
 
 
-@dataclass(frozen=True)
-class _PressedBody:
-    """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
+def optimise(
+    scene: Source,
+    free: Bounds,
+    out: str | Path,
+    objective: str | Path = "sensitivity",
+    gauge: str | None = None,
+    mus: Sequence[float] | None = None,
+    noise: float = 1.5e-4,
+    budget: int = 60,
+    method: str = METHODS[0],
+    seed: int = 0,
+    overrides: Sequence[str] = (),
+    report: Progress | None = None,
+) -> OptimisationResult:
+    """Search for the values of free keys with the largest objective.
 
-    steps: tuple[dict[str, float], ...] = ()
-    read: Callable[[Gauge], Float] | None = None
-    outcome: str = "converged"
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene; the start of the search
+    free : key -> lower and upper bound, for instance ``{"gauge.g36.x_mm": (10.0, 48.0)}``, or texts such as
+        ``"gauge.g36.x_mm=10:48"``
+    out : folder for evaluations.csv, best.toml and report.html; the same search is continued there
+    objective : "sensitivity", or a Python file with a function ``objective(table) -> number``
+    gauge : name of the gauge that the objective reads; None: the first
+    mus : friction coefficients, ascending; None: nine from 0.05 to 1
+    noise : standard deviation of a strain reading
+    budget : number of designs, or of bodies if gauges are searched in each
+    method : "differential-evolution", "dual-annealing" or "nelder-mead"
+    seed : of the random numbers
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    report : receives the progress at every design
 
+    Returns
+    -------
+    OptimisationResult
+        With the best design as a scene that can be pressed.
 
-def _gauges_need_own_press(model: Model) -> bool:
-    """Return whether a displaced gauge needs a press of its own."""
-    return model.inclusions is not None or model.finite_strain
-
-
-class _DesignBody:
-    """Body of a design, built once and pressed with several values of mu."""
-
-    def __init__(self, model: Model, mus: Sequence[float], say: Callable[[str], None]) -> None:
-        self._model, self._own_press = model, _gauges_need_own_press(model)
-        variants = self._variants(mus, model.legs)
-        self.shared = SharedBody(model, variants if self._own_press else [replace(v, gauges=()) for v in variants], say)
-
-    def _variants(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[Variant]:
-        laws = [self._model.friction.with_mu(mu) for mu in mus]
-        return [Variant.of(replace(self._model, friction=law, legs=legs)) for law in laws]
-
-    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...]) -> list[StepResult]:
-        """Return the last increment for every mu."""
-        return [frames[-1] for frames in self.shared.frames(self._variants(mus, legs))]
-
-    def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
-        """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
-        body = self.shared
-        if self._own_press:
-            (variant,) = self._variants((0.0,), self._model.legs)
-            read = [body.readings_of(variant, frame.readings) for frame in ends]
-            return lambda g: np.array([readings[strain_columns(g.name)[0]] for readings in read])
-        mesh, axes = body.problem.mesh, body.problem.axes
-        fields = formulation_of(body.problem.model).unknowns(body.problem, [f.meshed_state for f in ends])
-        u = np.array([x[: mesh.points.size] for x in fields])
-        return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
-
-    def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
-        """Return the strain (m,) of a gauge for values of mu (m,), NaN where a press failed."""
-        ends = self.ends(mus, legs)
-        return np.where([f.outcome.ok for f in ends], self.reader(ends)(gauge), math.nan)
-
-
-class _BudgetExhausted(Exception):
-    """The budget of evaluations is used up."""
-
-
-@dataclass
-class _Search:
-    problem: OptimisationProblem
-    report: Progress
-    objective: Objective
-    journal: Journal
-    known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
-    done: list[Evaluation] = field(default_factory=list)
-    bodies: int = 0
-    evaluated: int = 0
-    chosen: tuple[int | Literal["auto"], ...] | None = None
-    _stored: dict[str, _PressedBody] = field(default_factory=dict)
-
-    def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
-        """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
-        point = tuple(float(v) for v in values)
-        if point not in self.known:
-            self._record(self._evaluate_new(point))
-        found = self.known[point]
-        self.done.append(found)
-        return found
-
-    def _evaluate_new(self, point: tuple[float, ...]) -> Evaluation:
-        try:
-            scene = self.problem.scene(point)
-        except Finger3dError as error:
-            return Evaluation(point, math.nan, " ".join(str(error).split()))
-        pressed = self._press(scene)
-        if pressed.read is None:
-            return Evaluation(point, math.nan, pressed.outcome)
-        strain = {g.name: pressed.read(g) for g in scene.model().gauges}
-        gauge = self.problem.gauge or next(iter(strain))
-        table = ObjectiveTable(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
-        value = self.objective(table)
-        return Evaluation(point, value, "converged" if math.isfinite(value) else "the objective is no finite number")
-
-    def _press(self, scene: Scene) -> _PressedBody:
-        key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
-        model = scene.model()
-        if _gauges_need_own_press(model):
-            key += repr(model.gauges)
-        if key not in self._stored:
-            while len(self._stored) >= _MAX_STORED:
-                self._stored.pop(next(iter(self._stored)))
-            self._stored[key] = self._press_body(model)
-            self.bodies += 1
-        return self._stored[key]
-
-    def _press_body(self, model: Model) -> _PressedBody:
-        mus = self.problem.mus
-        try:
-            body = _DesignBody(model, mus, self.report.say)
-            ends = body.ends(mus, self._legs(body, model))
-        except Finger3dError as error:
-            return _PressedBody(outcome=" ".join(str(error).split()))
-        for mu, frame in zip(mus, ends, strict=True):
-            if not frame.outcome.ok:
-                return _PressedBody(outcome=f"mu = {mu:g}: {frame.outcome}")
-        return _PressedBody(tuple(measure(body.shared.problem.points, frame) for frame in ends), body.reader(ends))
-
-    def _gauge(self, model: Model) -> Gauge | None:
-        """Return the gauge that is optimised, if the scene has one."""
-        return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
-
-    def _legs(self, body: _DesignBody, model: Model) -> tuple[Leg, ...]:
-        """Return the path with the increments chosen for the first design, so that errors are comparable."""
-        gauge = self._gauge(model)
-        if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
-            return model.legs
-        if self.chosen is None:
-            mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
-            found = choose_increments(body.shared.problem, lambda p: body.strain(gauge, mus, p.model.legs) / noise)
-            self.report.say(str(found))
-            self.chosen = tuple(leg.steps for leg in found.legs)
-        return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
-
-    def restore_increments(self, start: Sequence[float]) -> None:
-        """Choose the increments at the start design, whose evaluation in the journal does not store them."""
-        try:
-            model = self.problem.scene(start).model()
-            if any(leg.steps == "auto" for leg in model.legs):
-                self._legs(_DesignBody(model, _first_middle_last(self.problem.mus), self.report.say), model)
-        except Finger3dError:
-            pass  # as in a new search, the increments are chosen at the first design that can be built
-
-    def increments(self, values: Sequence[float]) -> Tree:
-        """Return the increments of a design and the resulting error of its strain."""
-        model = self.problem.scene(values).model()
-        gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
-        if gauge is None:
-            return {}
-        body = _DesignBody(model, mus, self.report.say)
-        legs = self._legs(body, model)
-        problem = replace(body.shared.problem, model=replace(body.shared.problem.model, legs=legs))
-
-        def strain(other: Any) -> Float:
-            return body.strain(gauge, mus, other.model.legs)
-
-        left = error_of_increments(problem, strain(problem), legs != model.legs, strain)
-        return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
-
-    def _record(self, found: Evaluation) -> None:
-        self.known[found.values] = found
-        self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
-
-    def write_table(self, path: Path) -> None:
-        """Write every evaluated design as a line of a CSV file."""
-        known = list(self.known.values())
-        columns: dict[str, list[float] | list[str]] = {
-            key.key: [e.values[i] for e in known] for i, key in enumerate(self.problem.free)
-        }
-        write_csv(path, {**columns, "objective": [e.value for e in known], "outcome": [e.outcome for e in known]})
-
-    def best(self) -> Evaluation | None:
-        """Return the evaluation with the largest objective so far."""
-        return max((e for e in self.done if math.isfinite(e.value)), key=lambda e: e.value, default=None)
-
-    def run(self, start: Sequence[float]) -> None:
-        """Search until the optimiser converges or the budget is used up."""
-        p = self.problem
-        gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
-        body = [i for i in range(len(p.free)) if i not in gauges]
-        outer = body if body and gauges else list(range(len(p.free)))
-        inner = gauges if body and gauges else []
-        x = np.array(start)
-
-        def cost(values: Float) -> float:
-            if self.evaluated >= p.budget:
-                raise _BudgetExhausted
-            self.evaluated += 1
-            trial = x.copy()
-            trial[outer] = values
-            value = self._search_gauges(trial, inner) if inner else self.evaluate(trial).value
-            best = self.best()
-            text = f"best {best.value:.4g}" if best else "none can be built yet"
-            self.report.step(self.evaluated, p.budget, text)
-            return -value if math.isfinite(value) else _INFEASIBLE
-
-        try:
-            _minimise(p.method, cost, [p.free[i] for i in outer], x[outer], p.seed)
-        except _BudgetExhausted:
-            pass
-
-    def _search_gauges(self, here: Float, inner: list[int]) -> float:
-        """Return the largest objective over the keys of gauges on one body."""
-        count, values = 0, []
-
-        def cost(chosen: Float) -> float:
-            nonlocal count
-            if count >= _GAUGE_BUDGET:
-                raise _BudgetExhausted
-            count += 1
-            trial = here.copy()
-            trial[inner] = chosen
-            value = self.evaluate(trial).value
-            values.append(value if math.isfinite(value) else -_INFEASIBLE)
-            return -values[-1]
-
-        try:
-            free = [self.problem.free[i] for i in inner]
-            _minimise(METHODS[0], cost, free, here[inner], self.problem.seed)
-        except _BudgetExhausted:
-            pass
-        best = max(values)
-        return best if best > -_INFEASIBLE else math.nan
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the arguments, or if no design within the bounds can be built.
+    """
+    given, path = tables_of(scene, overrides)
+    problem = OptimisationProblem(
+        given=given,
+        free=free_keys(free),
+        objective=str(objective),
+        path=path,
+        gauge=gauge,
+        mus=MUS if mus is None else tuple(mus),
+        noise=noise,
+        budget=budget,
+        method=method,
+        seed=seed,
+    )
+    return find_best(problem, out, report)
 
 
-def _first_middle_last(mus: Sequence[float]) -> tuple[float, ...]:
-    """Return the first, the middle and the last value."""
-    return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
-
-
-def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[FreeKey], start: Float, seed: int) -> None:
-    from scipy import optimize
-
-    bounds = [(f.low, f.high) for f in free]
-    if method == "nelder-mead":
-        options = {"maxfev": 10**6, "xatol": 1e-3 * min(h - lo for lo, h in bounds), "fatol": 1e-6}
-        optimize.minimize(cost, start, method="Nelder-Mead", bounds=bounds, options=options)
-    elif method == "dual-annealing":
-        optimize.dual_annealing(cost, bounds, x0=start, rng=seed, no_local_search=True, maxiter=10**4)
-    else:
-        optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)
-
-
-def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | None = None) -> OptimisationResult:
+def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | None = None) -> OptimisationResult:
     """Search within the bounds for the design with the largest objective.
 
     Parameters
@@ -309,7 +114,6 @@ def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | N
     Finger3dError
         For a mistake in the problem, or if no design within the bounds can be built.
     """
-    report = report or Progress()
     objective = objective_of(problem.objective)
     start = checked_start(problem)
     with (
@@ -319,12 +123,12 @@ def optimise(problem: OptimisationProblem, out: str | Path, report: Progress | N
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)
         known = {e.values: e for e in map(evaluation_of, journal.rows)}
-        search = _Search(problem, report, objective, journal, known)
+        search = Search(problem, report or Progress(), objective, journal, known)
         first = _run_search(search, folder, start)
         return _write_result(search, folder, first)
 
 
-def _run_search(search: _Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
+def _run_search(search: Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
     """Search, and write the best design even if interrupted; return the evaluation of the start."""
     if search.known:
         search.report.say(f"{len(search.known)} designs are kept from an earlier run")
@@ -342,7 +146,7 @@ def _run_search(search: _Search, folder: Path, start: tuple[float, ...]) -> Eval
     return first
 
 
-def _write_result(search: _Search, folder: Path, first: Evaluation) -> OptimisationResult:
+def _write_result(search: Search, folder: Path, first: Evaluation) -> OptimisationResult:
     """Write the best design with its increments, the figure and the page."""
     problem, best = search.problem, search.best()
     if best is None:
@@ -360,6 +164,7 @@ def _write_result(search: _Search, folder: Path, first: Evaluation) -> Optimisat
     )
     optimise_page(folder)
     return OptimisationResult(
+        keys=tuple(f.key for f in problem.free),
         best=best,
         start=first,
         evaluations=tuple(search.done),
@@ -370,7 +175,7 @@ def _write_result(search: _Search, folder: Path, first: Evaluation) -> Optimisat
 
 
 def _write_best(
-    search: _Search,
+    search: Search,
     folder: Path,
     best: Evaluation,
     first: Evaluation,

@@ -2,17 +2,120 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from finger3d._extras import require
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Point, Sweep
+from finger3d.analyses.sweep.points import Point, Sweep, combinations, listed_points
 from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.samples import columns_of, drawn, rows_of
 from finger3d.analyses.sweep.store import ResultStore
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
+from finger3d.scene import Source
+
+if TYPE_CHECKING:
+    import pandas
+
+Value = float | int | bool | str
+"""Value of a key of a scene."""
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Rows of a sweep.
+
+    Attributes
+    ----------
+    out : folder of results.csv, report.html and, with pyarrow, results.parquet
+    columns : name -> a value for each point: the varied keys, the numbers of the last step with their units in the
+        name, gauges, outcome
+    failed : number of points without results
+    store : the points and their rows
+    """
+
+    out: Path
+    columns: Mapping[str, Sequence[Value]]
+    failed: int
+    store: ResultStore = field(repr=False)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the columns as a pandas DataFrame, one row for each point."""
+        require("to_dataframe()", "pandas")
+        import pandas
+
+        return pandas.DataFrame(dict(self.columns))
 
 
 def sweep(
+    scene: Source,
+    vary: Mapping[str, Sequence[Value]] | Sequence[str] | str | Path,
+    out: str | Path,
+    overrides: Sequence[str] = (),
+    scheduler: str | None = None,
+    workers: int | None = None,
+    report: Progress | None = None,
+    sample: str = "grid",
+    seed: int = 0,
+) -> SweepResult:
+    """Press many points of a scene: every combination of some values of keys, a list of points, or random samples.
+
+    A sweep that was interrupted continues in the same folder.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    vary : key -> values, for instance ``{"friction.mu": [0.06, 0.25, 1.0], "material.nu": [0.45, 0.49]}``, or texts
+        such as ``"friction.mu=0.06,0.25,1"``, of samples ``"friction.mu=0.06:1"``; or the path of a CSV file with a
+        column for each key and a row for each point
+    out : folder for the results
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    scheduler : address of a Dask scheduler; None: processes on this machine
+    workers : number of these processes; None: one for each core
+    report : receives the progress at every point
+    sample : ``"grid"``, every combination of the values; ``"list"``, values at the same place make a point;
+        ``"lhs:200"`` or ``"random:200"``, that many samples, of a Latin hypercube or independent, where `vary` has the
+        lower and the upper bound of every key
+    seed : of the random numbers
+
+    Raises
+    ------
+    Finger3dError
+        For a mistake in the scene or the values, before any point is solved.
+    MissingError
+        If a file cannot be written, or the cluster is lost; finished points are kept.
+    """
+    report = report or Progress()
+    report.stage("checking every point")
+    if isinstance(vary, str | Path):
+        points = listed_points(scene, overrides, rows_of(Path(vary)), "--points")
+    elif isinstance(vary, Mapping) and sample == "list":
+        lists = {key: [_as_toml(value) for value in values] for key, values in vary.items()}
+        points = listed_points(scene, overrides, columns_of(lists), "vary")
+    elif sample == "grid":
+        points = combinations(scene, overrides, _texts(vary, ","))
+    else:
+        points = listed_points(scene, overrides, drawn(sample, _texts(vary, ":"), seed), "--sample")
+    store = press_points(points, out, scheduler, workers, report)
+    columns = store.columns()
+    return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]), store)
+
+
+def _texts(vary: Mapping[str, Sequence[Value]] | Sequence[str], mark: str) -> Sequence[str]:
+    """Return ``KEY=VALUE,VALUE`` for every key, with `mark` between the values."""
+    if not isinstance(vary, Mapping):
+        return vary
+    return [f"{key}={mark.join(map(_as_toml, values))}" for key, values in vary.items()]
+
+
+def _as_toml(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def press_points(
     points: Sweep,
     out: str | Path,
     scheduler: str | None = None,

@@ -1,0 +1,245 @@
+"""Bodies that are condensed once, and pressed with several coefficients of friction, paths and contact rules.
+
+A body is condensed to the points that may come into contact.  Whether contact stayed within them is checked after the
+solution; if not, the body is condensed again to all points of its free faces, and pressed again.
+
+Presses with several coefficients of friction start from those before: where mu changes by at most 0.1, the forces at
+the previous mu save up to half of the time of a press.  They are an initial guess only: the solution satisfies the
+contact conditions in any case.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from threading import Event
+from typing import TypeVar
+
+from finger3d._types import Float
+from finger3d.contact.friction import FrictionLaw
+from finger3d.contact.rules import RuleName
+from finger3d.mechanics.build import build
+from finger3d.mechanics.coverage import SurfaceCheck, check_surface
+from finger3d.mechanics.force_control import at_depth_reached
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.parallel import map_parallel
+from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.resolution import check
+from finger3d.mechanics.solve import march
+from finger3d.mechanics.step_halving import automatic, march_automatic
+from finger3d.progress import QUIET, Progress
+
+Result = TypeVar("Result")
+
+_FARTHEST = 2.0
+"""Largest extrapolation of forces in mu, over the difference of the last two values."""
+
+_NEAR = 0.1
+"""Largest difference in mu from which a press is started; from farther off its own path is the better start."""
+
+
+@dataclass(frozen=True)
+class PressAtMu:
+    """A press with one mu.
+
+    Attributes
+    ----------
+    mu : coefficient of friction
+    frame : the last increment
+    forces : contact forces (c, d), N, on the meshed part at the end of every increment
+    factorizations : factorisations of the body in the increments
+    """
+
+    mu: float
+    frame: StepResult
+    forces: tuple[Float, ...]
+    factorizations: int = 0
+
+    @classmethod
+    def of(cls, mu: float, steps: Sequence[StepResult], factorizations: int) -> PressAtMu:
+        """Return the press with these increments."""
+        return cls(mu, steps[-1], tuple(step.meshed_state.contact.force for step in steps), factorizations)
+
+
+PressesByMu = Mapping[float, PressAtMu]
+"""Presses by mu, as initial guesses for those of a similar body or path."""
+
+
+def under(
+    problem: Problem,
+    friction: FrictionLaw | None = None,
+    legs: tuple[Leg, ...] | None = None,
+    rule: RuleName | None = None,
+) -> Problem:
+    """Return a condensed body under another friction law, path or contact rule; None leaves each as it is.
+
+    Raises
+    ------
+    UnresolvedError
+        If the object passes between the contact points on another path.
+    """
+    own = problem.model
+    model = replace(own, friction=friction or own.friction, legs=legs or own.legs, rule=rule or own.rule)
+    if _poses(model.legs) != _poses(own.legs):
+        system = problem.system
+        check(model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
+    return replace(problem, model=model)
+
+
+def _poses(legs: tuple[Leg, ...]) -> list[Leg]:
+    """Return the legs without their increments and durations."""
+    return [replace(leg, steps=1, duration_s=None) for leg in legs]
+
+
+def press(
+    problem: Problem,
+    mu: float,
+    near: Sequence[PressAtMu] = (),
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+) -> PressAtMu:
+    """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
+    problem = under(problem, problem.model.friction.with_mu(mu))
+    workspace = workspace or formulation_of(problem.model).workspace()
+    before = workspace.factorizations
+    if automatic(problem.model):
+        steps, _ = march_automatic(problem, workspace, cancel)
+    else:
+        steps = tuple(march(problem, _start(problem, mu, near), workspace, cancel))
+    return PressAtMu.of(mu, steps, workspace.factorizations - before)
+
+
+def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[PressAtMu]:
+    """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any.
+
+    At finite strain they come in another order than that of mu; see `march_in_groups`.
+    """
+    if problem.model.finite_strain and not automatic(problem.model):
+        yield from _together(problem, mus)
+        return
+    known = initial or {}
+
+    def pressed(mu: float, before: Sequence[PressAtMu], workspace: Workspace, cancel: Event) -> PressAtMu:
+        return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
+
+    yield from map_parallel(problem, pressed, mus)
+
+
+def _together(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
+    """Yield the presses with all values of mu, which share factors."""
+    from finger3d.mechanics.groups import march_in_groups  # a press in small strain needs none of it
+
+    workspace, counted = formulation_of(problem.model).workspace(), 0
+    problems = [under(problem, problem.model.friction.with_mu(mu)) for mu in mus]
+    for number, steps in march_in_groups(problems, workspace, Event()):
+        new, counted = workspace.factorizations - counted, workspace.factorizations
+        yield PressAtMu.of(mus[number], steps, new)
+
+
+def _start(problem: Problem, mu: float, near: Sequence[PressAtMu]) -> list[Float]:
+    """Return the forces extrapolated in mu from the last two presses; none if these have other contact points."""
+    shape = problem.delassus.shape[:2]
+    good = [p for p in near if p.forces[0].shape == shape]
+    if not good or abs(good[-1].mu - mu) > _NEAR:
+        return []
+    first, last = good[0], good[-1]
+    if first.mu == last.mu:
+        return list(last.forces)
+    share = min((mu - last.mu) / (last.mu - first.mu), _FARTHEST)
+    return [b + share * (b - a) for a, b in zip(first.forces, last.forces, strict=False)]
+
+
+class PressedBody:
+    """A body that is condensed again where a press shows that it was condensed too narrowly.
+
+    It is meshed again if a force is reached far deeper than was forecast, and condensed to all points of its free
+    faces once contact leaves the candidate points.
+
+    Parameters
+    ----------
+    model : what is meshed and condensed
+    report : receives the messages about meshing and condensation
+    problem : the condensed body of the model, if there is one already
+
+    Attributes
+    ----------
+    problem : the condensed body
+    seconds : time of meshing and condensation
+    """
+
+    def __init__(self, model: Model, report: Progress = QUIET, problem: Problem | None = None) -> None:
+        self._report, self.seconds = report, 0.0
+        self.problem = problem or self._built(model)
+
+    def pressed(
+        self, press: Callable[[Problem, Result | None], tuple[Result, Sequence[StepResult]]]
+    ) -> tuple[Result, list[SurfaceCheck]]:
+        """Press the body, and press it again as often as it has to be condensed again.
+
+        Parameters
+        ----------
+        press : function of the condensed body, and of the result on a narrower one, if there was any
+            Returns its result, and converged increments whose contact must be within the candidate points.
+
+        Returns
+        -------
+        result : the last one
+        checks : of the free surface after each of these increments
+        """
+        result, steps = press(self.problem, None)
+        reached = max((step.target.depth_mm for step in steps), default=0.0)
+        if legs := at_depth_reached(self.problem.model.legs, reached):
+            self._report.say(f"the force is reached at {reached:.3g} mm, deeper than was forecast; meshing again")
+            self.problem = self._built(replace(self.problem.model, legs=legs))
+            result, steps = press(self.problem, result)
+        checks = check_surface(self.problem, steps)
+        if not all(check.within_candidates for check in checks):
+            self.widen()
+            result, steps = press(self.problem, result)
+            checks = check_surface(self.problem, steps)
+        return result, checks
+
+    def steps(self, friction: FrictionLaw | None = None, rule: RuleName | None = None) -> list[StepResult]:
+        """Return the increments of the model's path, under another friction law or contact rule if one is given.
+
+        The last one has the penetration of the finger's surface.
+        """
+
+        def press(problem: Problem, _: object) -> tuple[list[StepResult], list[StepResult]]:
+            steps = list(march_automatic(under(problem, friction, rule=rule))[0])
+            return steps, [step for step in steps[-1:] if step.outcome.ok]
+
+        steps, checks = self.pressed(press)
+        last = [replace(steps[-1], penetration_mm=check.penetration_mm) for check in checks]
+        return [*steps[:-1], *last] if last else steps
+
+    def ends(self, mus: Sequence[float], legs: tuple[Leg, ...] | None = None) -> list[StepResult]:
+        """Return the last increment with every mu, on a path other than the model's own if it is given.
+
+        Those that converged have the penetration of the finger's surface.
+        """
+
+        def press(problem: Problem, _: object) -> tuple[list[StepResult], list[StepResult]]:
+            by_mu = {one.mu: one.frame for one in presses(under(problem, legs=legs), mus)}
+            found = [by_mu[mu] for mu in mus]
+            return found, [end for end in found if end.outcome.ok]
+
+        ends, checks = self.pressed(press)
+        depths = iter(checks)
+        return [replace(end, penetration_mm=next(depths).penetration_mm) if end.outcome.ok else end for end in ends]
+
+    def widen(self) -> None:
+        """Condense the body to all points of its free faces."""
+        self._report.say("contact reached beyond the candidate points; once more with all points of the free faces")
+        self.problem = self._built(self.problem.model, math.inf)
+
+    def _built(self, model: Model, *margin: float) -> Problem:
+        start = time.perf_counter()
+        problem = build(model, self._report, *margin)
+        self.seconds += time.perf_counter() - start
+        return problem
