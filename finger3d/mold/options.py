@@ -5,14 +5,15 @@ from __future__ import annotations
 import functools
 import re
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.hardware import PRINTERS, SCREWS, Printer, PrinterName, Screw, ScrewName
-from finger3d.scene.messages import described
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 BAND_DEPTH_MM = 1.5
 """Depth of the grooves for rubber bands."""
@@ -142,10 +143,14 @@ class MoldOptions:
     bed: str | None = None
 
     def __post_init__(self) -> None:
+        from pydantic import ValidationError  # not for `finger3d --help`
+
         for name, (hint, adapter) in _adapters().items():
             try:
                 adapter.validate_python(getattr(self, name))
             except ValidationError:
+                from finger3d.scene.messages import described
+
                 raise _refused(name, getattr(self, name), described(hint)) from None
         # With more clearance a full peg would fit the thin peg's hole.
         if self.clearance_mm is not None and self.clearance_mm > self.peg_mm / 10.0:
@@ -261,6 +266,8 @@ class MoldOptions:
 @functools.cache
 def _adapters() -> dict[str, tuple[Any, TypeAdapter[Any]]]:
     """Return the type of every option, and its check."""
+    from pydantic import ConfigDict, TypeAdapter
+
     config = ConfigDict(strict=True, allow_inf_nan=False)
     hints = get_type_hints(MoldOptions, include_extras=True)
     return {name: (hint, TypeAdapter(hint, config=config)) for name, hint in hints.items()}
