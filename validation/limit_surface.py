@@ -112,16 +112,17 @@ def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -
 
 def _sliding(problem: Problem, centre: float, frame: StepResult, turn: float) -> Sliding:
     """Evaluate an increment in which the plane has turned by an angle about the centre, or has slid along x."""
-    state, at, arms = frame.meshed_state.contact, problem.surface.points, problem.surface.centroids
+    state, arms = frame.meshed_state.contact, problem.surface.centroids
     normal = state.force[:, 0]
     # the plane's material at a point has come along a chord
-    way = np.tile([1.0, 0.0], (len(at), 1))
+    way = np.tile([1.0, 0.0], (len(arms), 1))
     if turn:
         c, s = math.cos(turn), math.sin(turn)
-        from_centre = at[:, [0, 2]] + [0.0, centre]
+        from_centre = arms[:, [0, 2]] + [0.0, centre]
         way = from_centre - from_centre @ np.array([[c, s], [-s, c]])
     length = np.linalg.norm(way, axis=1)
-    pull = MU * (normal / np.where(length > 0.0, length, 1.0))[:, None] * way
+    moves = length > 1e-9 * length.max()  # all but a point in the centre
+    pull = MU * np.where(moves, normal / np.where(moves, length, 1.0), 0.0)[:, None] * way
     total = float(normal.sum())
     middle = normal @ arms[:, [0, 2]] / total
     arm = arms[:, [0, 2]] - middle

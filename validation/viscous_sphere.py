@@ -25,6 +25,7 @@ from scipy.optimize import brentq
 from scipy.signal import residue
 
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.condense import Condensation, condense
@@ -75,13 +76,14 @@ class StandIn:
     thickness: float = 1.0
     inclusions: AddedStiffness = field(default_factory=AddedStiffness)
     origin: ObjectPose = ObjectPose(0.0)
+    contact_geometry: None = None
 
     @property
     def model(self) -> Any:
         material = Isotropic(1.0, self.nu)
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
-            materials=lambda labels: (material,), object=Plane(),
+            materials=lambda labels: (material,), object=Plane(), contact_law=ContactLaw(Coulomb(0.0)),
         )  # fmt: skip
 
     @property

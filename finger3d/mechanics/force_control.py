@@ -24,8 +24,9 @@ _DEEPEST = 0.99
 FORCE_TOLERANCE = 1e-6
 """Largest relative error of a prescribed force that counts as reached."""
 
-_TARGET = 1e-8
-"""Relative error of the force at which the search ends; where round-off prevents it, one up to `FORCE_TOLERANCE`."""
+TARGET, TARGET_IF_FACTORED = 1e-12, 1e-8
+"""Relative error of the force at which the search ends, in small strain and where increments factor the stiffness;
+where round-off prevents it, one up to a hundred times as large."""
 
 _RESOLUTION, _NEAREST = 1e-12, 1e-6
 """Width of a bracket, over the largest depth, in which the force jumps; distance to a failed trial that ends it."""
@@ -106,6 +107,7 @@ class DepthSearch:
     start : depth before the increment, mm
     begin : state before the increment as a trial, where only the depth changes, from which forces are interpolated too
     most : largest depth, mm; a turn or a slide may lift the object above first touch by as much, to negative depths
+    target : relative error of the force
     """
 
     increment: Callable[[float, Sequence[Trial]], Trial]
@@ -113,6 +115,7 @@ class DepthSearch:
     start: float
     most: float
     begin: Trial | None = None
+    target: float = TARGET
     good: list[Trial] = field(default_factory=list, init=False)
     failed: list[Trial] = field(default_factory=list, init=False)
 
@@ -125,12 +128,15 @@ class DepthSearch:
             trial = self._tried(depth)
             if trial.ok:
                 error = abs(trial.force - self.wanted) / self.wanted
-                if error <= _TARGET or 0.3 * errors[-1] < error <= FORCE_TOLERANCE:
+                if error <= self.target or 0.3 * errors[-1] < error <= 100.0 * self.target:
                     return trial
                 errors.append(error)
             low, high = self._bracket()
             if low and high:
                 if high.depth - low.depth <= _RESOLUTION * self.most:
+                    nearer = min(low, high, key=lambda trial: abs(trial.force - self.wanted))
+                    if abs(nearer.force - self.wanted) <= FORCE_TOLERANCE * self.wanted:
+                        return nearer
                     text = f"{low.force:.6g} N and {high.force:.6g} N on either side of {low.depth:.6g} mm"
                     return self._ended(Outcome.FORCE_JUMPS, text)
             elif (low and low.depth >= self.most) or (high and high.depth <= -self.most):

@@ -105,7 +105,14 @@ def pulls(problem: Problem, before: ContactState, after: ContactState, move: Mov
     """Return whether a convex object that only moves deeper begins to pull the finger, which it cannot."""
     thing = problem.model.object
     moved = move.end.displacement - move.start.displacement
-    if not thing.is_convex or move.start.turns != move.end.turns or moved[0] or moved[2] or moved[1] >= 0.0:
+    if (
+        thing.is_flat
+        or not thing.is_convex
+        or move.start.turns != move.end.turns
+        or moved[0]
+        or moved[2]
+        or moved[1] >= 0.0
+    ):
         return False
     normal = [float(problem.world_force(state)[:, 1].sum()) for state in (before, after)]
     return normal[0] <= 0.0 < normal[1] - _TOUCHES * float(np.abs(after.force).max(initial=0.0))

@@ -16,7 +16,7 @@ from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.columns import Column, in_order, strain_columns
 from finger3d.mechanics.energy import external_work, frictional_dissipation
-from finger3d.mechanics.force_control import DepthSearch, Trial, deepest, first_trial
+from finger3d.mechanics.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
@@ -216,7 +216,8 @@ class Press:
             return Trial(depth, found, reached)
 
         most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
-        search = DepthSearch(trial_at, wanted, start_mm, most, begin)
+        target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
+        search = DepthSearch(trial_at, wanted, start_mm, most, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
         last = search.run(first_trial(start_mm, stride, wanted, begin))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
