@@ -28,7 +28,8 @@ def test_forces_on_the_whole_finger_are_those_of_the_part_and_its_images() -> No
     # a reading by its row, and by the field
     force = problem.upright_force(state)
     (row,) = (gauge.rows(problem.meshed_body) for gauge in problem.model.gauges)
-    assert problem.read(force)["g"] == pytest.approx((row @ problem.unknowns(force)[: row.shape[1]]).item(), rel=1e-9)
+    (reading,) = problem.read(force).values()
+    assert reading == pytest.approx((row @ problem.unknowns(force)[: row.shape[1]]).item(), rel=1e-9)
     together = list(problem.unknowns_of([force, 2.0 * force, 0.0 * force]))
     assert together[1] == pytest.approx(2.0 * together[0], rel=1e-12, abs=1e-15)
     for one, other in zip(together, problem.unknowns_of([force, 2.0 * force, 0.0 * force], block=1), strict=True):
