@@ -14,13 +14,13 @@ from finger3d.contact.friction import Coulomb as Coulomb
 from finger3d.errors import Finger3dError as Finger3dError
 from finger3d.errors import MissingError as MissingError
 from finger3d.errors import Outcome as Outcome
-from finger3d.fem.material import Isotropic as Isotropic
-from finger3d.fem.simplex import Mesh as Mesh
+from finger3d.fem.mesh.simplex import Mesh as Mesh
+from finger3d.fem.solids.material import Isotropic as Isotropic
 from finger3d.geometry.registry import designs as designs
-from finger3d.mechanics.gauges import Gauge as Gauge
 from finger3d.mechanics.model import Leg as Leg
 from finger3d.mechanics.model import MeshOptions as MeshOptions
 from finger3d.mechanics.model import Model as Model
+from finger3d.mechanics.readings.gauges import Gauge as Gauge
 from finger3d.mold.export import export as export
 from finger3d.mold.options import MoldOptions as MoldOptions
 from finger3d.objects import Cylinder as Cylinder

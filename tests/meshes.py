@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d.fem import mumps, pardiso
 from finger3d.fem.assembly import Stiffness, stiffness
-from finger3d.fem.elements import Element, quadrature
-from finger3d.fem.material import Elasticity
-from finger3d.fem.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.traces import local_rows, strain_row, surface
+from finger3d.fem.mesh.elements import Element, quadrature
+from finger3d.fem.mesh.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.solvers import mumps, pardiso
+from finger3d.fem.surface.traces import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 
 SOLVERS = ["superlu", *(["pardiso"] if pardiso.available() else []), *(["mumps"] if mumps.available() else [])]

@@ -9,13 +9,13 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Sphere
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.contact.friction import OPEN, Coulomb
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 
 
 def pad(**changes: object) -> Model:

@@ -10,11 +10,11 @@ import pytest
 from finger3d.accuracy.adjoint import adjoint_loads, forces_of, press_goals
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.readings import Marker, Taxel
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import Sphere
 from tests.models import half_cylinder, swept_fig9
 

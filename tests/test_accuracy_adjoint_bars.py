@@ -13,11 +13,11 @@ from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Outcome
-from finger3d.mechanics.columns import RESULTANTS
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.readings.columns import RESULTANTS
+from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Plane
 from tests.models import half_cylinder, run
 

@@ -9,12 +9,12 @@ import pytest
 
 from finger3d.accuracy.coarse_multipliers import with_coarse_multipliers
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.mechanics.build import build
-from finger3d.mechanics.contact_geometry import ContactGeometry
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.linear_contact import LinearBody, solve_linearised
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_linearised
 from finger3d.objects import Move, Sphere, Wave
 from tests.models import half_cylinder, swept_fig9
 

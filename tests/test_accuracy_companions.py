@@ -13,15 +13,15 @@ from finger3d.accuracy import companions
 from finger3d.accuracy.companions import coarser, companion
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Isotropic
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import last_step
-from finger3d.meshing import tetwild
-from finger3d.meshing.swept import mesh_swept
+from finger3d.meshing.structured.swept import mesh_swept
+from finger3d.meshing.unstructured import tetwild
 from finger3d.objects import Sphere
 from tests.models import run, swept_fig9
 

@@ -19,12 +19,12 @@ from finger3d.accuracy.richardson import mesh_error
 from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import RESULTANTS
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import step_error
+from finger3d.mechanics.readings.columns import RESULTANTS
+from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 from finger3d.scene import load
 from tests.models import half_cylinder, run, swept_fig9

@@ -11,10 +11,10 @@ from finger3d.accuracy.adjoint_bars import adjoint_bars
 from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.refine import refine_mesh
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Isotropic
-from finger3d.mechanics.build import build
+from finger3d.fem.solids.material import Isotropic
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.solve import march
 from tests.models import fig9, half_cylinder, run
 
 

@@ -12,10 +12,10 @@ from finger3d.accuracy.estimate import press_numbers
 from finger3d.accuracy.modulus import modulus_errors
 from finger3d.cli import main
 from finger3d.effects.elastic_object import Effect as ElasticObject
-from finger3d.fem.material import RIGID_RATIO, Isotropic
+from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.materials.shore import SPREAD_A
 from finger3d.mechanics.model import Gauge, Leg, Model
-from finger3d.mechanics.readings import Taxel
+from finger3d.mechanics.readings.reading import Taxel
 from tests.models import half_cylinder, run
 from tests.scenes import HALF_CYLINDER, changed
 

@@ -13,7 +13,7 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.zones import ERROR_AT_ENDS
+from finger3d.mechanics.results.zones import ERROR_AT_ENDS
 from tests.models import half_cylinder, run, swept_fig9
 
 

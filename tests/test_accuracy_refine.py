@@ -14,12 +14,12 @@ from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 from finger3d.scene import load
 from tests.logs import Log
 

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, mesh_error
-from finger3d.mechanics.columns import strain_columns
+from finger3d.mechanics.readings.columns import strain_columns
 
 
 def test_the_order_is_that_of_the_corners_of_the_base() -> None:

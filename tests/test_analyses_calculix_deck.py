@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.analyses.calculix.deck import Contact, Deck, DeckStep, ObjectElements, facet_lines
-from finger3d.fem.simplex import FACETS, quadratic
+from finger3d.fem.mesh.simplex import FACETS, quadratic
 from tests.given_meshes import cube
 
 PLATE = ObjectElements(

@@ -11,9 +11,9 @@ import pytest
 from finger3d.analyses.calculix.deck import OBJECT
 from finger3d.analyses.calculix.laws import law_cards
 from finger3d.analyses.calculix.run import printed_forces, program, solve
-from finger3d.fem.hyperelastic import Hyperelastic
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.hyperelastic import Hyperelastic
+from finger3d.fem.solids.material import Isotropic
 from tests.given_meshes import refused
 
 MATERIAL = Isotropic(3.0, 0.4)

@@ -8,7 +8,7 @@ from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.increments import Increments
 from finger3d.analyses.pressed_body import press
 from finger3d.errors import Outcome
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from tests.sensor_cases import scene
 
 

@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.sensor import estimate, load
 from tests.sensor_cases import NONE, SCENE, scene
 

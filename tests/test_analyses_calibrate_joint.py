@@ -14,8 +14,8 @@ import pytest
 from finger3d.analyses.calibrate.run import calibrate
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.sensor import Calibration, ReadingCurve, load
 from tests.sensor_cases import FEW, NONE, scene
 

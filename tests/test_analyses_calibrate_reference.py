@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from finger3d.analyses.calibrate.variations import with_modulus
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from tests.sensor_cases import SCENE, scene
 
 

@@ -14,8 +14,8 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.sensor import Calibration, estimate
 from tests.logs import Log
 from tests.sensor_cases import FEW, NONE, SCENE, scene

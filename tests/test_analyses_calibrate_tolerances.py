@@ -15,10 +15,10 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
 # --- calibration of a scene ------------------------------------------------------------------------------------------

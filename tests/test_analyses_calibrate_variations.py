@@ -11,12 +11,12 @@ from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings import Taxel
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.readings.reading import Taxel
 from finger3d.objects import Plane
 from tests.models import block
 
@@ -65,7 +65,7 @@ def test_poissons_ratio_stays_in_its_range(nu: float, sd: float, step: float) ->
 
 
 def test_poissons_ratio_keeps_its_element_if_it_can() -> None:
-    from finger3d.fem.material import MIXED_FROM
+    from finger3d.fem.solids.material import MIXED_FROM
 
     assert poisson_step(MIXED_FROM, 0.002) == 0.002
     assert poisson_step(MIXED_FROM - 0.001, 0.002) == -0.002

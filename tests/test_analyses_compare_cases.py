@@ -10,9 +10,9 @@ from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import press_with_errors, resized, widened
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import last_step
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import last_step
 from finger3d.results.comparison import FORCE
 from finger3d.scene import load
 from tests.scenes import SWEPT_FINGER, written

@@ -17,7 +17,7 @@ from finger3d.analyses.compare.verdict import (
     verdict,
 )
 from finger3d.errors import Outcome
-from finger3d.mechanics.columns import strain_columns
+from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.results.comparison import FORCE, Case
 from tests.comparison_cases import case
 

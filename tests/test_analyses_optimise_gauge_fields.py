@@ -11,8 +11,8 @@ import pytest
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
 from finger3d.analyses.pressed_body import presses
-from finger3d.mechanics.build import build
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.progress import QUIET
 from tests.sensor_cases import NONE, scene
 

@@ -11,8 +11,8 @@ from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.scene import load, tree
 from tests.sensor_cases import objective_table
 

@@ -162,7 +162,7 @@ def test_an_interrupted_press_counts_no_step_of_an_earlier_one(tmp_path, monkeyp
     def interrupted(*arguments: object, **settings: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("finger3d.mechanics.solve.march", interrupted)
+    monkeypatch.setattr("finger3d.mechanics.march.solve.march", interrupted)
     capsys.readouterr()
     assert main(words) == 130
     assert "no increment was finished" in capsys.readouterr().err

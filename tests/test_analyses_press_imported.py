@@ -37,8 +37,8 @@ def strange(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def pressed(file: Path, scene: Path, obj: str, depth: float, sizes: tuple[float, float]) -> tuple[Any, list[Any]]:
     """The problem and the frames of a finger from a file."""
-    from finger3d.mechanics.build import build
-    from finger3d.mechanics.solve import march
+    from finger3d.mechanics.discretise.build import build
+    from finger3d.mechanics.march.solve import march
 
     scene.write_text(
         f'[finger]\ngeometry = "{file}"\n[material]\nE_MPa = 0.5\nnu = 0.45\n[object]\n{obj}\n[friction]\nmu = 0.4\n'
@@ -80,7 +80,7 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
 def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(
     strange: Path, tmp_path: Path, name: str, obj: str, depth: float, sizes: tuple[float, float]
 ) -> None:
-    from finger3d.mechanics.history import measure
+    from finger3d.mechanics.results.history import measure
 
     force = {}
     for kind in ("step", "stl"):
@@ -95,7 +95,7 @@ def test_a_twisted_column_has_the_torque_of_its_polar_moment(tmp_path: Path) -> 
     from build123d import Cylinder, Rot
 
     from finger3d.contact.friction import Coulomb
-    from finger3d.fem.material import Isotropic
+    from finger3d.fem.solids.material import Isotropic
     from finger3d.mechanics.model import Leg, MeshOptions, Model
     from tests.models import run
 

@@ -12,7 +12,7 @@ from finger3d.analyses.calibrate import run as runs
 from finger3d.contact import acceleration
 from finger3d.contact.conditions import ContactProblem
 from finger3d.errors import UnresolvedError
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Leg
 from tests.logs import Log
 from tests.sensor_cases import scene

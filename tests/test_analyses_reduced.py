@@ -17,10 +17,10 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere, Wave, Wedge
 from tests.bodies import ball
 from tests.commands import loaded
@@ -86,7 +86,7 @@ def test_loading_and_pressing_need_no_mesher_cad_or_factorisation(tmp_path: Path
     path = ReducedModel.of(build(small_section())).save(tmp_path / "reduced.npz")
     program = f"import finger3d; assert finger3d.ReducedModel.load({str(path)!r}).press(0.3).outcome.ok"
     heavy = ("OCP", "build123d", "vtk", "pyvista", "pytetwild", "trimesh", "pypardiso", "matplotlib")
-    assert not loaded(program, *heavy, "finger3d.fem.pardiso")
+    assert not loaded(program, *heavy, "finger3d.fem.solvers.pardiso")
 
 
 def test_fields_are_refused() -> None:

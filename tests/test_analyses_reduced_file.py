@@ -14,7 +14,7 @@ import pytest
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
 from finger3d.io import read_arrays
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from tests.models import small_section
 
 

@@ -10,14 +10,14 @@ import pytest
 
 from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest, shared_legs
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.recover import displacement
-from finger3d.fem.traces import surface
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import beyond_candidates, check_surface
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.surface.traces import surface
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.penetration import beyond_candidates, check_surface
 from finger3d.scene import Scene, parse, tree
 from tests.logs import Log
 
@@ -240,8 +240,8 @@ def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     """Two reach beyond the candidates, one does not, two differ in their gauges only; in the order asked."""
     if threads:  # a narrow body with enough contact rows for it takes too long
-        monkeypatch.setattr("finger3d.mechanics.parallel._ROWS_FOR_THREADS", 1)
-    monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
+        monkeypatch.setattr("finger3d.mechanics.march.parallel._ROWS_FOR_THREADS", 1)
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
     shallow = "press.depth_mm=0.03"
     changes = [[shallow], ["friction.mu=0.1"], ["friction.mu=1.0"], ["friction.mu=0.1", "gauge.0.x_mm=0.5"]]
     models = [scene(*change).model() for change in changes]
@@ -262,7 +262,7 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
 
 @pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
 def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
     size_mm = 0.003 if threads else 0.4  # with 1000 contact rows presses run at once
     models = [scene(f"friction.mu={mu}", f"mesh.size_mm={size_mm}").model() for mu in (0.1, 0.5, 1.0)]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
@@ -273,7 +273,7 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
             raise MemoryError("none left")
         return march(problem, **arguments)
 
-    monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
+    monkeypatch.setattr("finger3d.mechanics.march.step_halving.march", failing)
     first, second, third = body.presses([Variant.of(m) for m in models])
     assert isinstance(second, MemoryError)
     assert first.outcome == third.outcome == "converged"
@@ -294,7 +294,7 @@ def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_rea
     def unproved(problem, steps):
         raise MemoryError("no proof")
 
-    monkeypatch.setattr("finger3d.mechanics.step_halving.march", failing)
+    monkeypatch.setattr("finger3d.mechanics.march.step_halving.march", failing)
     monkeypatch.setattr("finger3d.analyses.shared_body.check_surface", unproved)
     assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 

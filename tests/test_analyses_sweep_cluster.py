@@ -42,8 +42,8 @@ def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
             pools.append(most)
             super().__init__(most, **settings)
 
-    monkeypatch.setattr("finger3d.mechanics.parallel.ThreadPoolExecutor", Pool)
-    monkeypatch.setattr("finger3d.mechanics.parallel.cores", lambda: 2)
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.ThreadPoolExecutor", Pool)
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
     # from 1000 contact rows on presses run at once
     sweep = combinations(written(tmp_path, HALF_CYLINDER), ["mesh.size_mm=0.0045"], ["friction.mu=0.06,0.3,1"])
     (body,) = sweep.bodies.values()

@@ -222,7 +222,7 @@ def load_points(paper_scene: Path) -> list:
     return list(combinations(paper_scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
 
 
-AT_ONCE = "import finger3d.mechanics.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
+AT_ONCE = "import finger3d.mechanics.march.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
 AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 
 

@@ -19,7 +19,7 @@ EXAMPLES = (
     "finger3d",
     "finger3d.analyses.press",
     "finger3d.analyses.result",
-    "finger3d.mechanics.step_halving",
+    "finger3d.mechanics.march.step_halving",
     "finger3d.mold.export",
     "finger3d.accuracy.error_bars",
     "finger3d.results.states",

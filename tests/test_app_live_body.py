@@ -11,8 +11,8 @@ import finger3d
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.app.live_body import MU_STEP, STEPS, LiveBody
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.build import build
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.scene import parse
 from tests.models import marched
 

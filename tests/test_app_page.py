@@ -12,7 +12,7 @@ from dash import Dash
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.app.page import numbers_of, page, section_figure, text_of, traction_figure
 from finger3d.app.server import LocalServer, local_server
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.scene import parse
 from tests.test_app_live_body import GAUGE, SCENE
 

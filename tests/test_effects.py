@@ -16,12 +16,12 @@ import finger3d.effects
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type, fill, warn
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
 from finger3d.scene import parse
 from tests.models import block
 from tests.scene_tables import SMALL
@@ -106,8 +106,8 @@ def test_two_effects_in_one_slot_are_named(name: str) -> None:
 
 def test_an_absent_effect_is_not_imported() -> None:
     code = (
-        "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); import finger3d.mechanics.build; "
-        "import finger3d.mechanics.solve; mine = 'viscoelastic', 'elastic_object', 'foils', 'finite_strain'; "
+        "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); "
+        "import finger3d.mechanics.discretise.build; import finger3d.mechanics.march.solve; mine = 'viscoelastic', 'elastic_object', 'foils', 'finite_strain'; "
         "print([m for m in sys.modules if m.startswith('finger3d.effects.') "
         "or m.startswith('finger3d.mechanics.') and m.endswith(mine)])"
     )
@@ -123,7 +123,7 @@ def test_only_the_effects_a_scene_names_are_imported(name: str, tmp_path: Any) -
     code = (
         "import sys; from finger3d.scene import load; from pathlib import Path; load(Path(sys.argv[1]), "
         "(f'effects.{sys.argv[2]}={sys.argv[3]}', 'press.duration_s=1.0', "
-        "'gauge=[{name=\"g\", x_mm=20.0, y_mm=40.0, length_mm=4.0}]')).model(); import finger3d.mechanics.solve; "
+        "'gauge=[{name=\"g\", x_mm=20.0, y_mm=40.0, length_mm=4.0}]')).model(); import finger3d.mechanics.march.solve; "
         "print([m for m in sorted(sys.modules) if m.startswith('finger3d.effects.') and '._' not in m])"
     )
     scene, table = "geometries/fig9.toml", "{" + settings + "}"

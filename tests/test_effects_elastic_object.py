@@ -11,7 +11,7 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model

@@ -9,9 +9,9 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Foils, Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Sphere
 from finger3d.scene import parse

@@ -11,15 +11,15 @@ from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
-from finger3d.fem.material import Isotropic
-from finger3d.fem.simplex import FREE_FACES
+from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.penetration import check_surface
 from finger3d.objects import Cylinder, Plane
 from tests.models import block, large_fig9, last
 

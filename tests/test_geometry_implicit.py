@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from finger3d.geometry.implicit import Freeform, ImplicitCylinder, surface_of
-from finger3d.meshing.snap import project
+from finger3d.meshing.structured.snap import project
 from tests.cad_cases import faces_of
 
 

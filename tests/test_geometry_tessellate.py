@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finger3d.geometry.tessellate import tessellate
-from finger3d.meshing.snap import check_closed
+from finger3d.meshing.structured.snap import check_closed
 from tests.cad_cases import EXACT, body_of
 from tests.designs import FIG9, HALF
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulation import Loads, length_scale
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Move, ObjectPose

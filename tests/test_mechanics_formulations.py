@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
-from finger3d.mechanics.finite_strain import FiniteStrain
+from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.mechanics.viscoelastic import Viscoelastic
+from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
 from tests.models import half_cylinder
 
 

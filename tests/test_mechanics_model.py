@@ -7,9 +7,9 @@ import pytest
 import scipy.sparse as sp
 
 from finger3d.effects.elastic_object import Effect as ElasticObject
-from finger3d.mechanics.foils import EmbeddedBars
+from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.model import Gauge, Leg
-from finger3d.mechanics.readings import Marker, Taxel
+from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import ObjectPose
 from tests.models import block
 

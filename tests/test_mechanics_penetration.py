@@ -10,13 +10,13 @@ import numpy as np
 from finger3d.analyses.press_record import depth_warning
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import SurfaceCheck, check_surface, penetration_advice, penetration_warnings
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface, penetration_advice, penetration_warnings
 from finger3d.objects import Plane, RigidObject, Wedge
 from finger3d.scene import parse
 

@@ -12,12 +12,12 @@ import pytest
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.fem.simplex import FREE_FACES
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import check_surface
-from finger3d.mechanics.history import measure
+from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.penetration import check_surface
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 from tests.bodies import channel, write_stl
 from tests.models import block, fig9

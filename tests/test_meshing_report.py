@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.meshing.report import content_hash, mesh_report
 from tests.meshes import grid
 

@@ -16,13 +16,13 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_type
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.material import RIGID_RATIO, Isotropic
-from finger3d.fem.parts import elasticity_of
-from finger3d.fem.simplex import quadratic
+from finger3d.fem.mesh.parts import elasticity_of
+from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings import Taxel
+from finger3d.mechanics.readings.reading import Taxel
 from tests.meshes import edge_load, full, grid
 from tests.models import last, marched
 

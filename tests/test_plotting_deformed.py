@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.simplex import CONTACT
+from finger3d.fem.mesh.simplex import CONTACT
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing.swept import mesh_section
+from finger3d.meshing.structured.swept import mesh_section
 from finger3d.plotting.deformed import DeformedFinger, draw_fingers
 from finger3d.plotting.panels import palette
 from tests.designs import FIG9

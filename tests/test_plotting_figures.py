@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
 from finger3d.plotting.figures import contact_figure, force_figure, middle_line, zones
 from tests.commands import loaded

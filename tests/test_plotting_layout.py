@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Outcome
-from finger3d.mechanics.columns import strain_columns
 from finger3d.mechanics.model import Gauge
+from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison
 from finger3d.plotting.figures import contact_figure, force_figure

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from finger3d.errors import MissingError
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.plotting import renderer
 from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger
 

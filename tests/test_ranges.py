@@ -15,8 +15,8 @@ from finger3d.cli import main
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.objects import OBJECTS
 from finger3d.scene import parse
 from finger3d.scene.tables import (

@@ -96,10 +96,10 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
 
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
-    from finger3d.fem.material import Isotropic
-    from finger3d.mechanics.build import build
+    from finger3d.fem.solids.material import Isotropic
+    from finger3d.mechanics.discretise.build import build
+    from finger3d.mechanics.march.solve import march
     from finger3d.mechanics.model import Leg, MeshOptions, Model
-    from finger3d.mechanics.solve import march
 
     geometry, effect, study = python(root, "How to add", "CONTRIBUTING.md")
     assert all(len(example.splitlines()) < 20 for example in (geometry, effect, study))

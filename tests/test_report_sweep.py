@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from finger3d.mechanics.columns import strain_columns
+from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.report.chart import Line
 from finger3d.report.sweep import sweep_charts
 

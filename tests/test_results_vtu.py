@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.results.vtu import write_vtu
 from tests.commands import loaded
 
@@ -73,7 +73,7 @@ def test_vtu_refuses_a_field_of_another_length(tmp_path: Path) -> None:
 
 def test_writing_loads_neither_vtk_nor_pyvista(tmp_path: Path) -> None:
     program = (
-        "import numpy as np; from finger3d.results.vtu import write_vtu; from finger3d.fem.simplex import Mesh;"
+        "import numpy as np; from finger3d.results.vtu import write_vtu; from finger3d.fem.mesh.simplex import Mesh;"
         f"write_vtu({str(tmp_path / 'f.vtu')!r}, Mesh(np.eye(3)[:, :2], np.array([[0, 1, 2]]), {{}}), {{}})"
     )
     assert not loaded(program, "vtk", "vtkmodules", "pyvista", "matplotlib")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finger3d.analyses import pressed_body as pressing
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.sensor.maps import Reader, StrainMap
 from tests.sensor_cases import SCENE, scene
 

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness
-from finger3d.fem.condense import condense
+from finger3d.fem.solvers.condense import condense
 from tests.meshes import grid
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
 from finger3d.objects import Sphere
 
 TWO = ((0.5, 1.0), (0.2, 0.1))

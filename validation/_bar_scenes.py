@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings import Marker, Taxel
+from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import Cylinder, Plane, Sphere
 
 MUS = (0.125, 0.5)

@@ -17,13 +17,13 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.condense import condense
-from finger3d.fem.elements import quadrature
-from finger3d.fem.material import Elasticity
-from finger3d.fem.simplex import Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.contact_geometry import contact_geometry
-from finger3d.mechanics.problem import Problem
+from finger3d.fem.mesh.elements import quadrature
+from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.solvers.condense import condense
+from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose, vertical_frame
 
 Float = NDArray[np.float64]

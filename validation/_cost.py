@@ -18,21 +18,21 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import Stiffness, stiffness
-from finger3d.fem.condense import condense
-from finger3d.fem.material import Elasticity, Isotropic
-from finger3d.fem.simplex import Mesh
-from finger3d.fem.traces import BoundarySurface, local_rows
+from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.solids.material import Elasticity, Isotropic
+from finger3d.fem.solvers.condense import condense
+from finger3d.fem.surface.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import MARGIN, candidate_points, contact_rows
+from finger3d.mechanics.discretise.build import MARGIN, candidate_points, contact_rows
+from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
+from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.history import ContactPoints, StepResult, measure
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import CondensedBody, ContactSystem, Problem, free_surface
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.symmetry import active_dofs, held_dofs, symmetry, unfold_points
+from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
-from finger3d.meshing.swept import mesh_section
+from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import vertical_frame
 
 Float = NDArray[np.float64]

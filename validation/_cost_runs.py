@@ -25,7 +25,7 @@ def prepare() -> None:
     from pypardiso import PyPardisoSolver
 
     from finger3d.contact.acceleration import threads_for
-    from finger3d.fem.pardiso import available
+    from finger3d.fem.solvers.pardiso import available
 
     if available():
         PyPardisoSolver().libmkl.MKL_Get_Max_Threads()
@@ -78,7 +78,7 @@ def factored(given: dict[str, Any]) -> dict[str, Any]:
     free = np.setdiff1d(np.arange(parts.stiffness.upper.shape[0]), parts.fixed_dofs)
     upper = parts.stiffness.upper[free][:, free].tocsr()
     solver = PyPardisoSolver(mtype=-2)
-    for k, value in zip((1, 2, 10, 21), (1, 3, 13, 1), strict=True):  # as in finger3d.fem.pardiso
+    for k, value in zip((1, 2, 10, 21), (1, 3, 13, 1), strict=True):  # as in finger3d.fem.solvers.pardiso
         solver.set_iparm(k, value)
     solver.set_phase(12)
     begin = time.perf_counter()

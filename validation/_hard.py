@@ -19,14 +19,14 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from finger3d.scene import load
 

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
-from finger3d.fem.material import Isotropic
-from finger3d.fem.recover import displacement
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import StepResult, contact_table
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import StepResult, contact_table
 
 from ._rows import Measure, Row
 

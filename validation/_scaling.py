@@ -72,7 +72,7 @@ class Watch(Progress):
 
 def prepare() -> None:
     """Load what every press needs, before the first fork."""
-    from finger3d.fem.pardiso import available
+    from finger3d.fem.solvers.pardiso import available
 
     available()
 

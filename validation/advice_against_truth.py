@@ -23,14 +23,14 @@ from finger3d.accuracy.large_deformation import large_deformation
 from finger3d.accuracy.more_increments import more_increments
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn

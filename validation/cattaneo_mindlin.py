@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import STICK
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Problem
 
 from . import _halfplane, _halfspace
 from ._rows import Result, Row

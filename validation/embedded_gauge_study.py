@@ -21,12 +21,12 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 
 from ._foil import alone, by_mesh, wing
 from ._rows import Result, Row

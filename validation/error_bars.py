@@ -26,14 +26,14 @@ import numpy as np
 
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.build import build
-from finger3d.mechanics.columns import AREAS, MAIN
-from finger3d.mechanics.coverage import check_surface
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
+from finger3d.mechanics.readings.columns import AREAS, MAIN
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.penetration import check_surface
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids

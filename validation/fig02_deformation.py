@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.simplex import unfold
+from finger3d.fem.mesh.simplex import unfold
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, moved, said, under
 from ._rows import Result, Row

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Model
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under

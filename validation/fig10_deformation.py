@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.simplex import unfold
+from finger3d.fem.mesh.simplex import unfold
 
 from ._paper import STRAIN, STRESS, Profile, columns, fig9, moved, said, under
 from ._rows import Result, Row

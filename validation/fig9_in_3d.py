@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.results.history import measure
 
 from ._paper import (
     BELOW_FIG9,

@@ -25,10 +25,10 @@ import finger3d
 from finger3d.accuracy.adjoint_bars import adjoint_bars
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.accuracy.refine import GOAL, refine_mesh
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
 
 from ._paper import columns
 from ._rows import Result, Row

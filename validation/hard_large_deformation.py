@@ -24,19 +24,19 @@ from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
-from finger3d.fem.elements import quadrature
-from finger3d.fem.material import Isotropic
-from finger3d.fem.recover import displacement
+from finger3d.fem.mesh.elements import quadrature
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.build import MARGIN, build
-from finger3d.mechanics.coverage import SurfaceCheck, check_surface
+from finger3d.mechanics.discretise.build import MARGIN, build
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 
 from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 from ._rows import Result, Row

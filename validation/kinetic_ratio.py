@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.discretise.problem import Problem
 
 from ._halfplane import compliance, line, loading, under
 from ._rows import Kind, Result, Row

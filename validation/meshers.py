@@ -19,8 +19,8 @@ import numpy as np
 
 import finger3d
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.mechanics.build import build
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.scene import parse
 
 from ._paper import columns

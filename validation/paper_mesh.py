@@ -22,13 +22,13 @@ from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.condense import Condensation, condense
-from finger3d.fem.material import Elasticity
-from finger3d.fem.recover import displacement
-from finger3d.fem.simplex import Mesh, unfold
-from finger3d.fem.traces import strain_row
+from finger3d.fem.mesh.simplex import Mesh, unfold
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.solvers.condense import Condensation, condense
+from finger3d.fem.surface.traces import strain_row
 from finger3d.geometry.registry import designs
-from finger3d.meshing.grid import Sizes, rows, triangulate
+from finger3d.meshing.structured.grid import Sizes, rows, triangulate
 
 from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
 from ._rows import Result, Row

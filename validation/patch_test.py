@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Elasticity, Isotropic
-from finger3d.fem.simplex import Mesh, quadratic
+from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
 from ._rows import Result, Row

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated

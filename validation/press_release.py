@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN, SLIP
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Problem
 
 from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under

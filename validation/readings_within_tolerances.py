@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings import Taxel
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.readings.reading import Taxel
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._paper import columns

@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
 
 from ._paper import columns
 from ._rows import Result, Row

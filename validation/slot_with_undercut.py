@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN, Coulomb
-from finger3d.fem.material import Isotropic
-from finger3d.fem.simplex import FREE_FACES
+from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.penetration import check_surface
 from finger3d.objects import MeshObject
 
 from ._rows import Result, Row

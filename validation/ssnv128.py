@@ -22,10 +22,10 @@ from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.condense import Condensation, condense
-from finger3d.fem.material import Elasticity
-from finger3d.fem.simplex import quadratic
-from finger3d.fem.traces import BoundarySurface, local_rows, surface
+from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.solvers.condense import Condensation, condense
+from finger3d.fem.surface.traces import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
 from ._rows import Result, Row

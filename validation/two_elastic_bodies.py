@@ -23,16 +23,16 @@ from scipy.optimize import brentq
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
-from finger3d.fem.material import Elasticity, Isotropic
-from finger3d.fem.traces import local_rows
-from finger3d.fem.transfer import facing_trace
+from finger3d.fem.solids.material import Elasticity, Isotropic
+from finger3d.fem.surface.traces import local_rows
+from finger3d.fem.surface.transfer import facing_trace
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
-from finger3d.mechanics.elastic_object import ObjectBody
-from finger3d.mechanics.history import measure
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.elastic_object import ObjectBody
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, vertical_frame
 from finger3d.progress import QUIET
 

@@ -28,16 +28,16 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
-from finger3d.fem.condense import Condensation, condense
-from finger3d.fem.material import Elasticity, Isotropic
-from finger3d.fem.simplex import Mesh, quadratic
-from finger3d.fem.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.solids.material import Elasticity, Isotropic
+from finger3d.fem.solvers.condense import Condensation, condense
+from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.discretise.problem import AddedStiffness
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import AddedStiffness
-from finger3d.mechanics.relaxation import Relaxation
-from finger3d.mechanics.small_strain import SmallStrain
-from finger3d.mechanics.viscoelastic import Viscoelastic
+from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.mechanics.small_strain.relaxation import Relaxation
+from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _rings
@@ -59,9 +59,7 @@ COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a".split()
 
 @dataclass(frozen=True)
 class StandIn:
-    """As much of `finger3d.mechanics.problem.Problem` as a press needs, over a surface that no design has; gap (c,) at
-    rest.
-    """
+    """As much of a `Problem` as a press needs, over a surface that no design has; gap (c,) at rest."""
 
     rest: Float
     area: Float
@@ -163,7 +161,7 @@ def _rest(face: BoundarySurface) -> Float:
 
 
 def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:
-    from finger3d.mechanics.problem import scatter_to_points
+    from finger3d.mechanics.discretise.problem import scatter_to_points
 
     return scatter_to_points(small.compliance, kept, count, 3)
 

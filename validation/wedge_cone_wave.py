@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from finger3d.fem.material import Elasticity, Isotropic
+from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.solve import march
 from finger3d.objects import Wave, Wedge
 
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from finger3d.effects import effect_names
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import measure
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.results.history import measure
 from finger3d.scene import parse
 
 from ._rows import Result, Row

@@ -32,11 +32,11 @@ from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
 from finger3d.fem.tensors import rotated_delassus
-from finger3d.mechanics.columns import Column
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.linear_contact import transported
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import vertical_frame
 
 

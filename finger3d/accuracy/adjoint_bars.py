@@ -24,12 +24,12 @@ from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, kinds_of,
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import RESULTANTS, by_key, pressure_column
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import Run
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import Run
+from finger3d.mechanics.readings.columns import RESULTANTS, by_key, pressure_column
+from finger3d.mechanics.results.history import StepResult, measure
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ import numpy as np
 from finger3d._types import Tree
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import by_key, of_kind
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings.columns import by_key, of_kind
+from finger3d.mechanics.results.history import StepResult, measure
 
 FORCES = ("normal_force_N", "friction_sum_N")
 """Forces whose changes are estimated, beside the strains of all gauges."""

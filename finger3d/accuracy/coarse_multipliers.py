@@ -21,12 +21,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.fem.simplex import axis_numbers
+from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.fem.tensors import bases_of
-from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.contact_geometry import ContactGeometry
-from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 
 _LEAST_POINTS = 4
 """Points of a face that are all kept: fewer leave nothing to interpolate between."""

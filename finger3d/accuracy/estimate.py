@@ -26,11 +26,9 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
-from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.path import AUTO_START
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import (
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.path import AUTO_START
+from finger3d.mechanics.march.step_halving import (
     COUNT_RATIOS,
     Run,
     choices_of_counts,
@@ -39,7 +37,9 @@ from finger3d.mechanics.step_halving import (
     step_error,
     with_increments_of,
 )
-from finger3d.meshing.given import GivenMesh
+from finger3d.mechanics.readings.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
+from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.accuracy.adjoint_bars import AdjointBars
-from finger3d.fem.simplex import Mesh, signed_volumes
-from finger3d.mechanics.gauge_refinement import edge_lengths_at_gauges
+from finger3d.fem.mesh.simplex import Mesh, signed_volumes
+from finger3d.mechanics.discretise.gauge_refinement import edge_lengths_at_gauges
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import MeshOptions
-from finger3d.mechanics.problem import Problem
-from finger3d.meshing.grading import Grading
-from finger3d.meshing.grid import STRUCTURED_GROWTH
+from finger3d.meshing.refinement.grading import Grading
+from finger3d.meshing.structured.grid import STRUCTURED_GROWTH
 
 _POWER = 3.0
 """Order p of a share: 4 where the solution is smooth, 2 lambda = 1.2 at the bonded corners."""

@@ -25,10 +25,10 @@ from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_
 from finger3d.accuracy.cost import forecast
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import last_step
+from finger3d.mechanics.results.history import StepResult
 
 _FACTORS = (2.0, 2.83, 4.0)
 """Edge lengths of the coarse mesh over those of the press; the first that is cheap enough is taken."""

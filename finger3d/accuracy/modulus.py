@@ -16,10 +16,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from finger3d.mechanics.columns import QUANTITIES
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings.columns import QUANTITIES
+from finger3d.mechanics.results.history import StepResult
 
 _STRESS_UNITS = ("_N", "_Nmm", "_mJ", "_MPa")
 """Ends of the names of numbers that are proportional to the stresses."""

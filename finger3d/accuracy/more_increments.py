@@ -18,9 +18,9 @@ from dataclasses import replace
 from finger3d._cost import CHANGES
 from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged, scales
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import TOLERANCE, last_step
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import TOLERANCE, last_step
+from finger3d.mechanics.results.history import StepResult
 
 _COUNTS = 4, 8
 """Increments of both further runs over those of the press."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import OPEN, STICK
-from finger3d.mechanics.columns import AREAS, MAIN
-from finger3d.mechanics.history import ContactPoints, StepResult, measure
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.zones import ERROR_AT_ENDS
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.readings.columns import AREAS, MAIN
+from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
+from finger3d.mechanics.results.zones import ERROR_AT_ENDS
 
 _ALONG_Z = 0.5
 """Friction along z has a relative error of about this times (h/b)^2, h the spacing of points along z, b the half extent

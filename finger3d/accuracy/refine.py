@@ -22,10 +22,10 @@ from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, graded_sizes
 from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.mechanics.build import build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import last_step
 from finger3d.progress import QUIET, Progress
 
 MAX_ROUNDS = 8

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 from enum import Enum, auto
 
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.mechanics.columns import RESULTANTS, Column
+from finger3d.mechanics.readings.columns import RESULTANTS, Column
 
 ORDER = 1.2
 """Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""

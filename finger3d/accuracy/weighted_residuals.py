@@ -5,7 +5,8 @@ and the rows of the readings.  By Galerkin orthogonality the error of an entry i
 ``W - W_h = a(e_i, e_j)``, e_i the error of the displacements under the load i.  With the adjoint loads l_k of a number
 (`finger3d.accuracy.adjoint`) its error is the sum over the increments of ``-a(e(l_k), e(r_k))``, the residual of the
 press weighted with the error of the adjoint (Becker and Rannacher 2001; contact: Schroeder and Rademacher 2011).  The
-errors e are those of recovered strains (`finger3d.fem.patch_recovery`), hence known cell by cell and with their sign.
+errors e are those of recovered strains (`finger3d.fem.recovery.patch_recovery`), hence known cell by cell and with
+their sign.
 
 Near a point gauge the adjoint is singular, and its recovery poor.  There, the difference between the recovered strain
 and the strain itself takes its place.
@@ -21,13 +22,13 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
 from finger3d.accuracy.adjoint import adjoint_loads, forces_of, press_goals
-from finger3d.fem.elements import quadrature
-from finger3d.fem.locate import cells_at
-from finger3d.fem.patch_recovery import PatchRecovery, RecoveredErrors
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.readings import Taxel
+from finger3d.fem.mesh.elements import quadrature
+from finger3d.fem.mesh.locate import cells_at
+from finger3d.fem.recovery.patch_recovery import PatchRecovery, RecoveredErrors
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Taxel
+from finger3d.mechanics.results.history import StepResult
 
 _COMPRESSION = 0.05
 """Singular values of loads, over the largest, below which they are neglected: a few per cent of accuracy suffice."""

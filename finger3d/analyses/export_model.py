@@ -53,10 +53,10 @@ def export_mesh(
     Finger3dError
         If the scene is a section, or the folder holds the finger's own file.
     """
-    from finger3d.fem.simplex import axis_numbers, unfold
-    from finger3d.mechanics.build import mesh_part
-    from finger3d.mechanics.symmetry import symmetry
-    from finger3d.meshing.mesh_output import write_mesh_msh, write_mesh_vtu
+    from finger3d.fem.mesh.simplex import axis_numbers, unfold
+    from finger3d.mechanics.discretise.build import mesh_part
+    from finger3d.mechanics.discretise.symmetry import symmetry
+    from finger3d.meshing.given.mesh_output import write_mesh_msh, write_mesh_vtu
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     model = scene.model()

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
 from finger3d.geometry.imported import extent
-from finger3d.mechanics.resolution import warnings_before_meshing
-from finger3d.mechanics.symmetry import symmetry
+from finger3d.mechanics.discretise.resolution import warnings_before_meshing
+from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.scene import Source, scene_of
 from finger3d.scene.derived import moduli
 

@@ -16,12 +16,12 @@ from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.result import PressResult
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
-    from finger3d.mechanics.problem import Problem
+    from finger3d.mechanics.discretise.problem import Problem
     from finger3d.scene import Scene, Source
 
 
@@ -145,7 +145,7 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Solve the increments of a record, and write what there is after each and after an interruption."""
-    from finger3d.mechanics.step_halving import automatic
+    from finger3d.mechanics.march.step_halving import automatic
 
     for warning in record.warnings:
         report.say(f"warning: {warning}")
@@ -161,8 +161,8 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
 
 def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Solve the increments that the scene names."""
-    from finger3d.mechanics.path import targets
-    from finger3d.mechanics.solve import march
+    from finger3d.mechanics.march.path import targets
+    from finger3d.mechanics.march.solve import march
 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
@@ -177,7 +177,7 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
 
 def _march_automatically(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Halve the increments until their error is small; every finer run takes the place of the one before."""
-    from finger3d.mechanics.step_halving import refine
+    from finger3d.mechanics.march.step_halving import refine
 
     report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
@@ -216,10 +216,10 @@ def _remark(problem: Problem, step: StepResult) -> str:
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fields | None:
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
-    from finger3d.mechanics import resolution
-    from finger3d.mechanics.cavity import cavity_warnings
-    from finger3d.mechanics.coverage import penetration_warnings
-    from finger3d.mechanics.failure import fold_warnings
+    from finger3d.mechanics.discretise import resolution
+    from finger3d.mechanics.finite_strain.failure import fold_warnings
+    from finger3d.mechanics.results.cavity import cavity_warnings
+    from finger3d.mechanics.results.penetration import penetration_warnings
 
     begin = time.perf_counter()
     report.stage("writing fields")
@@ -275,7 +275,7 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
 def _advise(record: PressRecord) -> None:
     """Set the lines of advice that follow from the results so far."""
     from finger3d.accuracy.advice import advise
-    from finger3d.mechanics.coverage import penetration_advice
+    from finger3d.mechanics.results.penetration import penetration_advice
 
     record.advice = advise(
         record.problem.model, record.largest_strain, record.large_deformation, record.more_increments

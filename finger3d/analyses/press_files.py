@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from finger3d._types import Array, Float, Tree
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure, table_row
-from finger3d.mechanics.marker_grid import marker_table
+from finger3d.mechanics.readings.marker_grid import marker_table
+from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, measure, table_row
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 

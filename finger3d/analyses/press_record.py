@@ -14,16 +14,16 @@ from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import History, StepResult, measure
+from finger3d.mechanics.results.history import History, StepResult, measure
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
-    from finger3d.mechanics.coverage import SurfaceCheck
+    from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
-    from finger3d.mechanics.problem import Problem
-    from finger3d.mechanics.step_halving import StepEstimate
+    from finger3d.mechanics.march.step_halving import StepEstimate
+    from finger3d.mechanics.results.penetration import SurfaceCheck
     from finger3d.scene import Scene
 
 _SMALL_STRAIN_DEPTH = 0.3
@@ -73,7 +73,7 @@ class PressRecord:
     workspace: Workspace = field(init=False)
 
     def __post_init__(self) -> None:
-        from finger3d.mechanics import resolution
+        from finger3d.mechanics.discretise import resolution
 
         self.workspace = formulation_of(self.problem.model).workspace()
         self.coupling = self.problem.coupling()
@@ -179,7 +179,7 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
     """Return a warning if a press in small strain is deep; `steps` tell the depth of one whose force is given."""
-    from finger3d.mechanics.coverage import reached_depth
+    from finger3d.mechanics.results.penetration import reached_depth
 
     if problem.model.finite_strain:
         return []

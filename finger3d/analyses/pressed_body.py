@@ -20,18 +20,18 @@ from typing import TypeVar
 from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
-from finger3d.mechanics.build import build
-from finger3d.mechanics.coverage import SurfaceCheck, check_surface
-from finger3d.mechanics.force_control import at_depth_reached
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.march.force_control import at_depth_reached
+from finger3d.mechanics.march.parallel import map_parallel
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.parallel import map_parallel
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.resolution import check
-from finger3d.mechanics.solve import march
-from finger3d.mechanics.step_halving import automatic, march_automatic
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
@@ -132,7 +132,7 @@ def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None 
 
 def _together(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
     """Yield the presses with all values of mu, which share factors."""
-    from finger3d.mechanics.groups import march_in_groups  # a press in small strain needs none of it
+    from finger3d.mechanics.march.groups import march_in_groups  # a press in small strain needs none of it
 
     workspace, counted = formulation_of(problem.model).workspace(), 0
     problems = [under(problem, problem.model.friction.with_mu(mu)) for mu in mus]

@@ -1,8 +1,8 @@
 """Reduced model of a press: the compliance of the contact points without the mesh, pressed in milliseconds.
 
 At small strain a press needs only the compliance of the contact points, the gauge rows, and the gap between object and
-surface (`finger3d.fem.condense`).  Without the mesh there are no fields, and no candidate points can be added: a path
-whose contact could reach beyond them is refused.
+surface (`finger3d.fem.solvers.condense`).  Without the mesh there are no fields, and no candidate points can be added:
+a path whose contact could reach beyond them is refused.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from finger3d.analyses.pressed_body import under
 from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
-from finger3d.fem.traces import BoundarySurface
+from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
-from finger3d.mechanics.build import MARGIN
-from finger3d.mechanics.coverage import beyond_candidates
-from finger3d.mechanics.history import History
+from finger3d.mechanics.discretise.build import MARGIN
+from finger3d.mechanics.discretise.problem import Problem, rigid_gap
+from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem, rigid_gap
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.results.history import History
+from finger3d.mechanics.results.penetration import beyond_candidates
 
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm", "turn_x", "turn_y", "turn_z")
 
@@ -41,7 +41,7 @@ class ReducedModel:
 
     Attributes
     ----------
-    problem : the problem that `finger3d.mechanics.solve.march` solves; its mesh and factor are empty
+    problem : the problem that `finger3d.mechanics.march.solve.march` solves; its mesh and factor are empty
     others : the points of the free faces that are no candidates
     about : versions, mesh hash, number of unknowns and effects of the body
     """
@@ -132,7 +132,7 @@ class ReducedModel:
         return History(problem.points, tuple(march(problem)))
 
     def _check(self, legs: tuple[Leg, ...]) -> None:
-        """Raise Finger3dError if contact could leave the candidate points of `finger3d.mechanics.build.build`."""
+        """Raise Finger3dError if contact could leave the candidate points."""
         problem = self.problem
         for leg in legs:
             if not all(math.isfinite(getattr(leg, k)) for k in _PATH) or leg.depth_mm < 0.0:

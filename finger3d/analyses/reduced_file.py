@@ -19,17 +19,17 @@ from finger3d._types import Array, Tree, TreeView
 from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
-from finger3d.fem.simplex import FREE_FACES
-from finger3d.fem.traces import BoundarySurface
+from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import ContactPoints
+from finger3d.mechanics.discretise.problem import ContactSystem, Problem
+from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.problem import ContactSystem, Problem
-from finger3d.mechanics.readings import Marker, Taxel
-from finger3d.mechanics.symmetry import Symmetry
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.results.history import ContactPoints
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
 Made = TypeVar("Made", RigidObject, FrictionLaw)

@@ -13,7 +13,7 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
-from finger3d.mechanics.history import History, contact_table
+from finger3d.mechanics.results.history import History, contact_table
 from finger3d.results.summary import PressStep, read_rows, steps_of
 from finger3d.results.vtu import grid
 

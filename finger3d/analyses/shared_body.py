@@ -21,16 +21,16 @@ from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.mechanics.columns import Column, in_space, strain_columns
-from finger3d.mechanics.coverage import check_surface
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, table_row
-from finger3d.mechanics.marker_grid import grid_readings
+from finger3d.mechanics.march.parallel import map_parallel
+from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.parallel import map_parallel
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import march_automatic
+from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.marker_grid import grid_readings
+from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.mechanics.results.penetration import check_surface
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 

@@ -13,13 +13,13 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import GAUGE_PLACES, displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
-from finger3d.fem.recover import displacement
+from finger3d.fem.recovery.recover import displacement
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, contact_table, measure
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.solve import march
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.results.history import StepResult, contact_table, measure
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
 from finger3d.sensor.curve import ReadingCurve

@@ -22,7 +22,7 @@ def info(*, json_: Json = False) -> None:
     from pathlib import Path
 
     from finger3d._machine import cores, environment_bytes, memory_bytes, versions
-    from finger3d.fem import condense
+    from finger3d.fem.solvers import condense
     from finger3d.meshing.cache import folder
 
     memory, isolated = memory_bytes(), sys.prefix != sys.base_prefix

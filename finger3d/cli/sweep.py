@@ -120,7 +120,7 @@ def _as_dict(store: ResultStore, out: Path) -> dict[str, object]:
 
 def _print_points(store: ResultStore) -> None:
     """Print the varied keys and the main numbers of the first points."""
-    from finger3d.mechanics.columns import MAIN
+    from finger3d.mechanics.readings.columns import MAIN
     from finger3d.report.build import number
     from finger3d.results.summary import strains_of
 

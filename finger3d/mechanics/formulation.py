@@ -10,10 +10,10 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
-from finger3d.fem.traces import BoundarySurface
-from finger3d.mechanics.columns import Column
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.state import B, State
+from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 W = TypeVar("W", bound="Workspace")

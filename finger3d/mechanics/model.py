@@ -11,14 +11,14 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import RuleName
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.solids.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
-from finger3d.mechanics.columns import Column
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.readings import Marker, Reading, Taxel
-from finger3d.mechanics.relaxation import Relaxation
-from finger3d.meshing.grading import Grading
+from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Marker, Reading, Taxel
+from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.meshing.options import Mesher
+from finger3d.meshing.refinement.grading import Grading
 from finger3d.objects import (
     ContactPath,
     InitialContact,
@@ -38,9 +38,9 @@ class Leg:
 
     With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
 
-    With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.step_halving`).  This is
-    the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a scene gives
-    them in degrees.
+    With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).  This
+    is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a scene
+    gives them in degrees.
     """
 
     depth_mm: float

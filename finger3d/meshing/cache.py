@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.io import atomic, read_arrays
 from finger3d.meshing.options import MeshSizes, Zone

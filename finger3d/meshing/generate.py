@@ -5,15 +5,15 @@ from __future__ import annotations
 import importlib
 import time
 
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
-from finger3d.meshing.given import GivenMesh, mesh_given
+from finger3d.meshing.given.given import GivenMesh, mesh_given
 from finger3d.meshing.limits import check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.sizing import rounded_zone
-from finger3d.meshing.swept import mesh_swept
+from finger3d.meshing.structured.swept import mesh_swept
+from finger3d.meshing.unstructured.sizing import rounded_zone
 from finger3d.progress import QUIET, Progress
 
 

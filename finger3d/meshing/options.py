@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, Protocol
 
 if TYPE_CHECKING:
-    from finger3d.meshing.grading import Grading
+    from finger3d.meshing.refinement.grading import Grading
 
 Mesher = Literal["ftetwild", "netgen", "swept"]
 """Unstructured tetrahedra by fTetWild or netgen, or tetrahedra swept along z."""

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d.fem.simplex import FREE_FACES, Mesh
+from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.plotting.camera import WINDOW
 from finger3d.plotting.deformed import DeformedFinger, draw_fingers
 from finger3d.plotting.gauges import marks_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting.camera import WINDOW, flat
 from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
@@ -35,7 +35,7 @@ class DeformedFinger:
     displacement : (n, d) mm
     pressure, shear : (c,) and (c, 3) MPa, at the contact points; the shear is the friction on the finger
     status : (c,) status of these points
-    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.simplex.FREE_FACES` of their faces
+    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces
     thing : (t, 3, 3) corners of the object's triangles, mm; None without it
     title : of the picture
     marks : gauges, from `finger3d.plotting.gauges.marks_of`

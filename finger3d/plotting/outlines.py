@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from finger3d._extras import require
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import gauges_of, read_json
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.elements import TRI3, TRI6, TRIANGLES
-from finger3d.fem.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
+from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
 
@@ -123,7 +123,7 @@ def skin_of(
     status : (c,) array
         Contact status.
     nodes, faces : (c,) arrays
-        Nodes of the contact points, and the numbers in `finger3d.fem.simplex.FREE_FACES` of their faces.
+        Nodes of the contact points, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces.
     thing : (t, 3, 3) array, mm
         Corners of the object's triangles, or None.
     """

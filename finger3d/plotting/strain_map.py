@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.plotting.layout import sheet
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.maps import StrainMap

@@ -12,7 +12,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.mechanics.columns import QUANTITIES
+from finger3d.mechanics.readings.columns import QUANTITIES
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of

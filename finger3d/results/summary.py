@@ -10,8 +10,8 @@ from pathlib import Path
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import Column, displacement_columns, pressure_column, strain_columns
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.readings.columns import Column, displacement_columns, pressure_column, strain_columns
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from finger3d._types import TreeView
-from finger3d.fem.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.solids.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Leg, contact_path
@@ -72,7 +72,7 @@ def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) 
     turns = {f"turn_{axis}": math.radians(table[f"turn_{axis}_deg"]) for axis in "xyz"}
     leg = {key: value for key, value in table.items() if not key.startswith("turn_")} | turns
     if leg["depth_mm"] is None:
-        from finger3d.mechanics.force_control import forecast_depth
+        from finger3d.mechanics.march.force_control import forecast_depth
 
         constants = tables.material.constants
         material = Isotropic(constants.E_MPa, constants.nu)

@@ -14,14 +14,14 @@ from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
-from finger3d.fem.material import Isotropic
+from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import ElasticConstants
-from finger3d.mechanics.gauges import Gauge
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
-from finger3d.mechanics.readings import Marker, Taxel
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.derived import legs_of, parts_of

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.locate import locate
-from finger3d.fem.recover import displacement
-from finger3d.fem.simplex import Mesh, axis_numbers
+from finger3d.fem.mesh.locate import locate
+from finger3d.fem.mesh.simplex import Mesh, axis_numbers
+from finger3d.fem.recovery.recover import displacement
 from finger3d.io import write_csv
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 
 PIXEL_MM = 1.0
 

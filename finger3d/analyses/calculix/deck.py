@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
-from finger3d.fem.simplex import Mesh
+from finger3d.fem.mesh.simplex import Mesh
 
 OBJECT = "NOBJECT"
 """Name of the object's node set; its total force, which ccx prints, is the contact force on the meshed part."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.material import Isotropic, Material
+from finger3d.fem.solids.material import Isotropic, Material
 
 MOST_TERMS = 3
 """Largest number of terms of Ogden's law in CalculiX."""

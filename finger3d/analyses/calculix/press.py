@@ -12,11 +12,11 @@ from finger3d.analyses.calculix.objects import object_elements
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.simplex import FREE_FACES, Mesh
-from finger3d.mechanics.build import mesh_part
+from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
+from finger3d.mechanics.discretise.build import mesh_part
+from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import AUTO_START
-from finger3d.mechanics.symmetry import symmetry
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import Move, ObjectPose, PlacedObject
 from finger3d.progress import QUIET, Progress

@@ -10,8 +10,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments
 from finger3d.analyses.pressed_body import PressAtMu
-from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 
 
 @dataclass(frozen=True)

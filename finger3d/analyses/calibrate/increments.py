@@ -16,10 +16,10 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.analyses.pressed_body import under
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.path import AUTO_START
+from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.path import AUTO_START
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import with_steps
 
 NOISE_SHARE = 0.1
 """Error of the increments, relative to the noise of a reading, at which no more increments are added."""

@@ -11,9 +11,9 @@ from finger3d._types import Tree
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.io import atomic, write_csv
-from finger3d.mechanics.gauges import Gauge
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.plotting.calibration import draw
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page

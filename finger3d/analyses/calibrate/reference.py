@@ -12,9 +12,9 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.accuracy.companions import built_like
 from finger3d.analyses.pressed_body import PressesByMu, presses
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 
 
 @dataclass(frozen=True)

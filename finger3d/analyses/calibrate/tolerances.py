@@ -28,11 +28,11 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import targets
-from finger3d.mechanics.problem import Problem
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.condense import stiffened
-from finger3d.fem.material import MIXED_FROM, Isotropic, Material
-from finger3d.mechanics.build import build
+from finger3d.fem.solids.material import MIXED_FROM, Isotropic, Material
+from finger3d.fem.solvers.condense import stiffened
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.problem import Problem, object_share, scatter_to_points
 
 _TILTED_POINTS = {2: 100, 3: 500}
 """Contact points, by dimension, that the mesh of a tilted body has about."""

@@ -11,13 +11,13 @@ import numpy as np
 from finger3d._types import Tree
 from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.estimate import estimate
-from finger3d.fem.simplex import CONTACT
-from finger3d.mechanics.build import build
-from finger3d.mechanics.columns import by_key, in_space, of_kind
-from finger3d.mechanics.history import ContactPoints, StepResult, contact_table, measure
+from finger3d.fem.mesh.simplex import CONTACT
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.step_halving import Run, march_automatic
 from finger3d.mechanics.model import Domain, Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import Run, march_automatic
+from finger3d.mechanics.readings.columns import by_key, in_space, of_kind
+from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, measure
 from finger3d.objects import PlacedObject
 from finger3d.results.comparison import Case
 

@@ -18,12 +18,12 @@ from finger3d.accuracy.richardson import ORDERS, Kind, gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
-from finger3d.fem.recover import displacement
+from finger3d.fem.recovery.recover import displacement
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.problem import Problem
-from finger3d.mechanics.step_halving import with_steps
+from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects

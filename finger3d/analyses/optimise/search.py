@@ -25,11 +25,11 @@ from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
-from finger3d.mechanics.columns import strain_columns
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.gauges import Gauge
-from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.readings.columns import strain_columns
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene

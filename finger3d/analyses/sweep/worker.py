@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.columns import by_key
+from finger3d.mechanics.readings.columns import by_key
 from finger3d.results.journal import Row
 from finger3d.scene import parse
 

@@ -1,0 +1,1 @@
+"""Meshes of simplices: shape functions, quality, search."""

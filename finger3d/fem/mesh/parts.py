@@ -1,0 +1,92 @@
+"""Elastic laws of bodies that consist of several parts, one law in each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from finger3d._types import Float, Int, freeze_arrays
+from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.solids.material import LinearElasticity, Material
+
+
+def elasticity_of(materials: Sequence[Material], mesh: Mesh, plane_stress: bool) -> LinearElasticity:
+    """Return the small-strain law of a body.
+
+    Parameters
+    ----------
+    materials : of the parts by their number, the main body first
+    mesh : whose cells know their parts
+
+    Notes
+    -----
+    All parts take the mixed form if one of them is nearly incompressible. Their pressures are discontinuous at
+    interfaces.
+    """
+    if mesh.part is None:
+        return materials[0].elasticity(plane_stress)
+    mixed = not plane_stress and any(material.is_nearly_incompressible for material in materials)
+    return ElasticityByPart(tuple(m.elasticity(plane_stress, mixed) for m in materials), mesh.part)
+
+
+def moduli_of(elastic: LinearElasticity) -> tuple[float, ...]:
+    """Return the shear modulus of each part by its number, MPa."""
+    laws = elastic.laws if isinstance(elastic, ElasticityByPart) else (elastic,)
+    return tuple(law.shear_modulus for law in laws)
+
+
+@dataclass(frozen=True)
+class ElasticityByPart:
+    """Linear elastic laws of a body of several parts; see `finger3d.fem.solids.material.LinearElasticity`.
+
+    Attributes
+    ----------
+    laws : of the parts by their number, all in the same form
+    part : (e,) number of the part of each cell
+    """
+
+    laws: tuple[LinearElasticity, ...]
+    part: Int
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the pressure is an unknown of its own."""
+        return self.laws[0].mixed
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus of the main body, MPa."""
+        return self.laws[0].shear_modulus
+
+    @property
+    def pressure_modulus(self) -> Float:
+        """Pressure per dilatation in each cell (e,), MPa."""
+        return np.array([law.pressure_modulus for law in self.laws])[self.part]
+
+    def of_cells(self, cells: slice | Int) -> LinearElasticity:
+        """Return the law of some cells, that of their part if they belong to one."""
+        part = self.part[cells]
+        return self.laws[part[0]] if len(part) and (part == part[0]).all() else ElasticityByPart(self.laws, part)
+
+    def contract(self, outer: Float) -> Float:
+        """Return the element matrices of all cells; see `finger3d.fem.solids.material.LinearElasticity.contract`."""
+        return _by_part(self.part, lambda number, values: self.laws[number].contract(values), outer)
+
+    def stress(self, strain: Float) -> Float:
+        """Return the stress (e k, d, d), MPa, of k strains in each cell."""
+        part = np.repeat(self.part, len(strain) // max(len(self.part), 1))
+        return _by_part(part, lambda number, values: self.laws[number].stress(values), strain)
+
+
+def _by_part(part: Int, function: Callable[[int, Float], Float], values: Float) -> Float:
+    """Return a function of part and values (k, ...), of the shape of the values, applied part by part."""
+    out = np.empty_like(values)
+    for number in np.unique(part):
+        in_part = part == number
+        out[in_part] = function(int(number), values[in_part])
+    return out

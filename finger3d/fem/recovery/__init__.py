@@ -1,0 +1,1 @@
+"""Fields recovered from the unknowns."""

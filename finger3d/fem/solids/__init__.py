@@ -1,0 +1,1 @@
+"""Material laws of solids, and what is embedded in them."""

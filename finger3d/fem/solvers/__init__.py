@@ -1,0 +1,1 @@
+"""Direct solvers and static condensation."""

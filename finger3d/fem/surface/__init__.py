@@ -1,0 +1,1 @@
+"""Boundary surfaces, their traces, and their deformation."""

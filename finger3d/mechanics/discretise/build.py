@@ -1,0 +1,266 @@
+"""Build of a problem: mesh, part, candidate points, inclusions, condensation, contact system."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from finger3d._types import Float
+from finger3d.fem.assembly import stiffness
+from finger3d.fem.mesh.parts import elasticity_of, moduli_of
+from finger3d.fem.mesh.simplex import CONTACT, Mesh
+from finger3d.fem.solvers.condense import condense, stiffened
+from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
+from finger3d.mechanics.discretise.gauge_refinement import refined_at_gauges
+from finger3d.mechanics.discretise.problem import (
+    AddedStiffness,
+    CondensedBody,
+    ContactSystem,
+    Problem,
+    free_surface,
+    object_share,
+    scatter_to_points,
+)
+from finger3d.mechanics.discretise.resolution import check
+from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
+from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.readings.reading import MeshedBody
+from finger3d.meshing.generate import mesh_solid
+from finger3d.meshing.limits import check_rows
+from finger3d.meshing.report import MeshReport
+from finger3d.meshing.structured.swept import mesh_section
+from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, vertical_frame
+from finger3d.progress import QUIET, Progress
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.discretise.elastic_object import ObjectResponse
+    from finger3d.mechanics.discretise.foils import EmbeddedBars
+
+MARGIN = 0.3
+"""Largest rigid gap of candidate points, in depths of the press; whether it suffices is checked after the solution."""
+
+_STATIONS = 4, 20
+"""Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""
+
+WHOLE_FACE = 0.95
+"""Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
+
+_MANY_READINGS = 100
+"""Gauges whose placing is announced: each takes some milliseconds."""
+
+
+def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
+    """Mesh, assemble and condense a model.
+
+    Parameters
+    ----------
+    report : receives the messages
+    margin : rigid gap that candidate points reach to, in depths of the press; infinite for all of the contact face
+
+    Raises
+    ------
+    UnresolvedError
+        If the object passes between the contact points.
+    """
+    contact, axes = model.first_contact, symmetry(model)
+    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
+    thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
+    free = free_surface(model, mesh, thickness)
+    check(model, free, contact.first_contact_mm, contact.place, axes)
+    report.say("assembling")
+    start = time.perf_counter()
+    elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
+    matrix = stiffness(mesh, elastic, thickness)
+    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
+    active = active_dofs(candidates, axes)
+    count = len(model.columns)
+    check_rows(len(active), count)
+    bars = _bars(model, mesh, axes)
+    contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
+    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, report)
+    rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
+    assembly = time.perf_counter() - start
+    report.say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
+    fixed = held_dofs(mesh, axes, model.held_ends)
+    condensed = condense(matrix, fixed, rows)
+    delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
+    mirrored, points = unfold_points(model, mesh, candidates, axes)
+    problem = Problem(
+        model=model,
+        condensed_body=CondensedBody(
+            mesh=mesh,
+            report=mesh_report,
+            elastic=elastic,
+            stiffness=matrix,
+            thickness=thickness,
+            fixed_dofs=fixed,
+            condensed=condensed,
+        ),
+        symmetry=mirrored,
+        system=ContactSystem(
+            surface=candidates,
+            points=points,
+            delassus=delassus,
+            reading_rows=reading_rows,
+            active_dofs=active,
+            first_contact_mm=contact.first_contact_mm,
+            place_mm=contact.place,
+        ),
+        seconds={**mesh_report.seconds, "assembly": assembly, "condensation": condensed.seconds},
+    )
+    whole = with_bars(problem, bars) if bars else problem
+    thing = model.object_compliance
+    if thing is None:
+        return whole
+    from finger3d.mechanics.discretise.elastic_object import (
+        object_response,  # a press imports only what its scene names
+    )
+
+    return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, report))
+
+
+def _bars(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
+    """Return the bars of the model's inclusions, if there are any."""
+    if model.inclusions is None:
+        return None
+    from finger3d.mechanics.discretise.foils import discretised_foils
+
+    return discretised_foils(model.inclusions, model, mesh, axes)
+
+
+def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
+    """Return the problem with the stiffness of its inclusions added to the condensed rows."""
+    condensed, active, count = problem.body.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
+    readings = len(condensed.compliance) - len(active) - count
+    compliance = condensed.compliance.copy()
+    subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
+    first = len(compliance) - len(subgrid)
+    compliance[first:, first:] += subgrid
+    delassus, reading_rows = contact_rows(
+        stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, readings
+    )
+    return replace(
+        problem,
+        condensed_body=replace(problem.body, condensed=replace(condensed, compliance=compliance)),
+        system=replace(problem.system, delassus=delassus, reading_rows=reading_rows),
+        inclusions=AddedStiffness(
+            bars=bars.at_finite_strain(subgrid[-count:, -count:]),
+            gauge_weights=bars.gauge_weights,
+            bar_stiffness=bars.bar_stiffness,
+            subgrid_compliance=subgrid,
+        ),
+        without_inclusions=problem,
+    )
+
+
+def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
+    """Return the problem with the compliance of an elastic object added to that of the contact points."""
+    body = problem.without_inclusions
+    return replace(
+        problem,
+        system=replace(
+            problem.system,
+            delassus=problem.system.delassus + response.compliance,
+            object_factorizations=response.factorizations,
+            object_compliance=response.compliance,
+            object_share=object_share(problem.surface, problem.system.delassus, response.compliance),
+        ),
+        seconds=problem.seconds | response.seconds,
+        without_inclusions=with_object_compliance(body, response) if body else None,
+    )
+
+
+def mesh_part(
+    model: Model, zone: tuple[float, float, float, float], axes: tuple[str, ...], report: Progress = QUIET
+) -> tuple[Mesh, MeshReport]:
+    """Mesh the part of the finger on one side of its symmetry planes.
+
+    Parameters
+    ----------
+    zone : (x_min, x_max, z_min, z_max) mm where contact is predicted
+    axes : normals of the symmetry planes, "x" and "z"
+    """
+    if model.domain == "solid":
+        mesh, mesh_report = mesh_solid(model.design, model.mesh, zone, axes, report)
+    else:
+        mesh, mesh_report = mesh_section(model.design, model.mesh, zone, axes)
+    return refined_at_gauges(model, mesh, mesh_report, axes)
+
+
+def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, report: Progress) -> list[sp.csr_matrix]:
+    """Rows of the readings, and of the bars if there are any."""
+    if len(model.readings) >= _MANY_READINGS:
+        report.say(f"placing {len(model.readings)} gauges, markers and taxels")
+    if not bars:
+        return [reading.rows(body) for reading in model.readings]
+    others = model.readings[: len(model.readings) - len(model.gauges)]
+    return [*(reading.rows(body) for reading in others), bars.gauge_weights @ bars.rows, bars.rows]
+
+
+def _widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
+    """Return rows (k, n d) on displacements as rows (k, N) on all unknowns."""
+    rows = sp.csr_matrix(rows)
+    return sp.csr_matrix((rows.data, rows.indices, rows.indptr), (rows.shape[0], size))
+
+
+def contact_rows(rows: Float, active: NDArray[np.int64], face: BoundarySurface, readings: int) -> tuple[Float, Float]:
+    """Return compliance of contact points, and readings per contact force, from the compliance of rows."""
+    count, dim = face.points.shape
+    reading_rows = np.zeros((readings, count * dim))
+    reading_rows[:, active] = rows[len(active) : len(active) + readings, : len(active)]
+    return scatter_to_points(rows, active, count, dim), reading_rows
+
+
+def candidate_points(model: Model, free: BoundarySurface, first_contact_mm: float, margin: float) -> BoundarySurface:
+    """Return the points of the free faces that come near the object on its path, the nearest first.
+
+    At finite strain points that do not face the object at rest may turn towards it: those near others are included.
+
+    Parameters
+    ----------
+    first_contact_mm : height of the object's lowest point at first touch, mm
+    margin : rigid gap that the points reach to, in depths of the press
+    """
+    path = poses(model)
+    reach = folding = margin * max(pose.depth_mm for pose in path)
+    tracker, near = DistanceTracker(), reach + model.mesh.size_mm if math.isfinite(reach) else 0.0
+
+    def gaps(pose: ObjectPose) -> tuple[Float, Float]:
+        """Gaps of points that face the object at rest, and of those that may do so later; infinite for others."""
+        placed = PlacedObject.of(model.object, first_contact_mm, pose)
+        geometry = contact_geometry(lambda points: tracker.distance(placed, points, near), free)
+        normal = geometry.bases[:, 0]
+        allowed = may_touch(free, normal), may_touch(free, normal, model.finite_strain)
+        first, second = (np.where(mask, geometry.gap, np.inf) for mask in allowed)
+        return first, second
+
+    nearest, later = np.min([gaps(pose) for pose in path], axis=0)
+    reach += max(float(nearest.min()), 0.0)
+    chosen, on_contact = nearest < reach, free.face == CONTACT
+    turning = np.flatnonzero((later < reach) & ~chosen)
+    if len(turning) and chosen.any():
+        apart = cKDTree(free.points[chosen]).query(free.points[turning])[0]
+        chosen[turning[apart <= folding + model.mesh.size_mm]] = True
+        nearest = np.minimum(nearest, later)
+    if np.count_nonzero(chosen & on_contact) >= WHOLE_FACE * np.count_nonzero(on_contact):
+        chosen |= on_contact
+    order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not
+    return restrict(free, order[chosen[order]])
+
+
+def poses(model: Model) -> list[ObjectPose]:
+    """Return the poses at which rigid gaps are taken to find the candidate points."""
+    return [ObjectPose(0.0), *targets(tuple(replace(leg, steps=_stations(leg)) for leg in model.legs))]
+
+
+def _stations(leg: Leg) -> int:
+    return int(np.clip(leg.steps, *_STATIONS)) if isinstance(leg.steps, int) else _STATIONS[1]

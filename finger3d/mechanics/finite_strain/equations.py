@@ -1,0 +1,306 @@
+"""Equations of one increment of contact at finite strain, linearised at one configuration and checked at another.
+
+At displacements u with internal forces R(u), tangent K, contact rows B(u) and contact forces f, the next forces f' and
+displacements u' solve ::
+
+    u' = u + K^-1 (B^T f' - R),    contact conditions of f' and of the gaps and slips at u, moved by B (u' - u)
+
+The forces are total, not increments, so that f = 0 in an open point.  K and B may be those of another configuration:
+the residual is that of the present one, so that the solution does not depend on them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
+from finger3d.contact.rules import RULES
+from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.errors import Outcome
+from finger3d.fem.assembly import on_places
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.solvers.condense import condense
+from finger3d.fem.surface.finite_contact import DeformedContact
+from finger3d.fem.tensors import InvertedError, rotated_delassus
+from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
+from finger3d.mechanics.finite_strain.body import FiniteBody
+from finger3d.mechanics.finite_strain.state import (
+    DeformedBody,
+    FiniteStrainWorkspace,
+    Linearisation,
+    contact_of,
+    curvature_of,
+)
+from finger3d.mechanics.formulation import length_scale
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.linear_contact import carried_by_object, transported
+from finger3d.objects import Move, vertical_frame
+
+_TARGET_RESIDUAL = 5e-9
+"""Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
+
+_NEGLIGIBLE = 1e-6
+"""Force, over the shear modulus times the square of the depth, below which contact is negligible."""
+
+_LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
+"""Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
+
+_STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
+"""Fractions of a step tried in the line search, until no cell is inverted."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Unknowns x (N,), internal forces (N,) and contact of the deformed surface there."""
+
+    x: Float
+    internal: Float
+    contact: DeformedContact
+
+
+def converged(error: float, last_error: float) -> bool:
+    """Whether an iteration ends at a residual, after another one."""
+    return error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE
+
+
+@dataclass(frozen=True)
+class IncrementEquations:
+    """Equations of an increment from a state, as the object moves.
+
+    Attributes
+    ----------
+    body : over the time of the increment, if it relaxes
+    start : state at the beginning
+    workspace : holds the last linearisation
+    """
+
+    problem: Problem
+    body: FiniteBody
+    start: State[DeformedBody]
+    move: Move
+    workspace: FiniteStrainWorkspace
+
+    def finished(
+        self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int
+    ) -> ContactSolution[State[DeformedBody]]:
+        """Return the solution with the state at the end, unless the material law is unstable there."""
+        if self.body.instability(now.x):
+            return self.failed(now, Outcome.UNSTABLE, error, spent)
+        state, error = self._state(now, solution.state), max(solution.residual, error)
+        return replace(solution.with_state(state), residual=error, iterations=spent)
+
+    def failed(
+        self, now: Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
+    ) -> ContactSolution[State[DeformedBody]]:
+        """Return the initial state and the reason of the failure; later increments begin with a new tangent."""
+        last = self.workspace.linearisations.get(self._has_inclusions)
+        if last is not None:
+            self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
+        unstable = self.body.instability(now.x)
+        outcome = Outcome.UNSTABLE if unstable else outcome
+        return ContactSolution(self.start, outcome, error, spent, "none", unstable or detail)
+
+    def last_linearisation(self) -> Linearisation | None:
+        """Return the linearisation that an earlier increment left; None if it must not be reused."""
+        last = self.workspace.linearisations.get(self._has_inclusions)
+        return last if last is not None and last.reusable else None
+
+    @property
+    def _has_inclusions(self) -> bool:
+        return self.body.bars is not None
+
+    @cached_property
+    def _length_scale(self) -> float:
+        return length_scale(self.problem, self.move)
+
+    @cached_property
+    def _largest_step(self) -> float:
+        """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
+        problem = self.problem
+        u = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
+        moved = float(np.abs(carried_by_object(problem, self.move, u)).max(initial=0.0))
+        return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
+
+    @cached_property
+    def _least_force(self) -> float:
+        """Smallest force (N) by which the residual is divided; without contact all forces are round-off."""
+        before = float(np.linalg.norm(self.start.contact.force, axis=1).max())
+        shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
+        area = self._length_scale * (width if self.problem.dim == 2 else self._length_scale)
+        return max(before, _NEGLIGIBLE * shear * area)
+
+    @cached_property
+    def _augmentation(self) -> Float:
+        delassus = self.problem.delassus
+        c, d = delassus.shape[:2]
+        return augmentation_parameters(delassus.reshape(c * d, c * d), d)
+
+    def initial(self, guess: Float | None) -> tuple[Configuration, Float]:
+        """Return the configuration and the contact forces (c, d) where the iteration begins."""
+        for x, force in self._extrapolated(guess):
+            try:
+                return self.at(x), force
+            except InvertedError:
+                continue
+        return self.at(self.start.body.unknowns), self.start.contact.force if guess is None else guess
+
+    def _extrapolated(self, guess: Float | None) -> Iterator[tuple[Float, Float]]:
+        """Yield expected unknowns (N,) and contact forces (c, d)."""
+        start = self.start
+        unknowns = start.body.unknowns
+        if start.body.previous is not None:
+            before, x = start.body.previous
+            ratio = self.move.length_ratio(before)
+            if ratio is not None:
+                yield unknowns + ratio * (unknowns - x), start.contact.force if guess is None else guess
+
+    def at(self, x: Float) -> Configuration:
+        """Return the configuration at unknowns (N,); raises InvertedError."""
+        problem = self.problem
+        contact = contact_of(problem, problem.surface, displacement(problem.mesh, x), self.move.end)
+        return Configuration(x, self.body.internal_forces(x), contact)
+
+    def moved(self, now: Configuration, step: Float) -> Configuration:
+        """Return the configuration after the longest fraction of a step that inverts no cell.
+
+        Raises
+        ------
+        InvertedError
+            If even the shortest fraction inverts a cell.
+        """
+        largest = float(np.abs(step[: self.problem.mesh.points.size]).max())
+        whole = min(1.0, self._largest_step / largest) if largest else 1.0
+        for length in _STEP_LENGTHS:
+            try:
+                return self.at(now.x + whole * length * step)
+            except InvertedError:
+                continue
+        raise InvertedError
+
+    def linearise(self, now: Configuration, force: Float, damping: float = 0.0) -> Linearisation:
+        """Factor the tangent under contact forces (c, d), and keep the factor for later increments.
+
+        `damping` times the linear stiffness of the displacements is added.
+        """
+        problem, pattern = self.problem, self.body.contact_rows
+        active = problem.system.active_dofs
+        entries = on_places(now.contact.rows[active], pattern)
+        rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
+        curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.move.end)
+        moving = now.contact.geometric_stiffness(force[:, 0], curvature)
+        tangent = self.body.tangent(now.x).less(moving)
+        if damping:
+            n = problem.mesh.points.size
+            tangent = tangent.less(-damping * problem.body.stiffness.upper[:n, :n])
+        last = self.workspace.linearisations.pop(self._has_inclusions, None)
+        replaced = last.condensation if last else None
+        condensed = condense(tangent, problem.body.fixed_dofs, rows, replaced=replaced)
+        self.workspace.factorizations += condensed.factorizations
+        delassus = scatter_to_points(condensed.compliance, active, *force.shape)
+        linearisation = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
+        self.workspace.linearisations[self._has_inclusions] = linearisation
+        return linearisation
+
+    def contact(
+        self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
+    ) -> tuple[ContactSolution[ContactState], Float]:
+        """Solve contact of the linearised body; returns the solution and the changes (r,) of the forces on its rows.
+
+        `displacement` (r,) mm is that of the rows under the forces out of balance alone.
+        """
+        problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
+        active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
+        delassus = rotated_delassus(linearisation.delassus, rotation)
+        compliance = problem.system.object_compliance
+        if compliance is not None:
+            delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
+        moved = np.zeros(force.size)
+        moved[active] = displacement
+        free = self._relative_displacement(now, force)
+        free += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
+        free -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
+        free[:, 1:] += start.tangential_displacement
+        contact = ContactProblem.of(
+            start,
+            free,
+            delassus,
+            problem.model.contact_law,
+            self._length_scale,
+            self._augmentation,
+            problem.surface.area,
+        )
+        solution = RULES[problem.model.rule](contact, force)
+        change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
+        return solution, change.ravel()[active]
+
+    def out_of_balance(self, now: Configuration, force: Float) -> Float:
+        """Return internal less contact forces (N,)."""
+        out = now.internal.copy()
+        out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self._active(force.ravel())).ravel()
+        return out
+
+    def _active(self, vector: Float) -> Float:
+        """Return a vector (c d,) as (c, d), zero across symmetry planes.
+
+        The weighted mean over half of a point's hat need not be zero there.
+        """
+        out = np.zeros(len(vector))
+        out[self.problem.system.active_dofs] = vector[self.problem.system.active_dofs]
+        return out.reshape(-1, self.problem.dim)
+
+    def _relative_displacement(self, now: Configuration, force: Float) -> Float:
+        """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
+        problem, bases = self.problem, now.contact.bases
+        u, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
+        increment = u - before - carried_by_object(problem, self.move, u)
+        out = np.empty_like(force)
+        out[:, 0] = now.contact.gap
+        compliance = problem.system.object_compliance
+        if compliance is not None:
+            frame = vertical_frame(problem.dim)
+            upright, earlier = (
+                np.einsum("ca,cak->ck", f, b) @ frame.T
+                for f, b in ((force, bases), (self.start.contact.force, self.start.contact.own_bases))
+            )
+            matrix = compliance.reshape(force.size, force.size)
+            whole, last = ((matrix @ f.ravel()).reshape(force.shape) @ frame for f in (upright, earlier))
+            out[:, 0] += np.einsum("ck,ck->c", bases[:, 0], whole)
+            increment = increment + whole - last
+        out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], increment)
+        return self._active(out.ravel())
+
+    def residual(self, now: Configuration, solution: ContactState, out_of_balance: Float) -> float:
+        """Return the largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
+
+        Lengths are divided by the depth, forces by the largest at a contact point, p by the shear modulus.  The
+        friction coefficients are those that the contact solution has used.
+        """
+        problem, force = self.problem, solution.force
+        mesh, n = problem.mesh, problem.mesh.points.size
+        normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
+        mu = tangential / np.where(normal > 0.0, normal, 1.0)
+        unbalanced = out_of_balance.copy()
+        unbalanced[problem.body.fixed_dofs] = 0.0
+        equilibrium = float(np.abs(unbalanced[:n]).max()) / max(
+            float(np.linalg.norm(force, axis=1).max()), self._least_force
+        )
+        volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
+        volume *= problem.body.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
+        dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume
+        moved = self._relative_displacement(now, force)
+        return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
+
+    def _state(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
+        """Return the state at the end of the increment."""
+        moved = self._relative_displacement(now, solution.force)
+        start = transported(self.start.contact, now.contact.bases)
+        after = next_state(start, solution.force, moved, solution.status)
+        body = DeformedBody(now.x, previous=(self.move, self.start.body.unknowns))
+        return State(replace(after, bases=now.contact.bases), body)

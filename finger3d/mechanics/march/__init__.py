@@ -1,0 +1,1 @@
+"""The press along the path of the object."""

@@ -1,0 +1,291 @@
+"""Force control: the depth at which the object presses with a prescribed force, and a forecast of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import barycentric_interpolate
+from scipy.optimize import brentq
+
+from finger3d.contact.state import ContactSolution
+from finger3d.errors import Outcome
+from finger3d.fem.solids.material import Isotropic
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.results.state import State
+from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_contact_height
+
+_DEEPEST = 0.99
+"""Largest depth at which a force is searched for, over that at which the object would reach the finger's base."""
+
+FORCE_TOLERANCE = 1e-6
+"""Largest relative error of a prescribed force that counts as reached."""
+
+TARGET, TARGET_IF_FACTORED = 1e-12, 1e-8
+"""Relative error of the force at which the search ends, in small strain and where increments factor the stiffness;
+where round-off prevents it, one up to a hundred times as large."""
+
+_RESOLUTION, _NEAREST = 1e-12, 1e-6
+"""Width of a bracket, over the largest depth, in which the force jumps; distance to a failed trial that ends it."""
+
+_TRIALS, _FAILURES = 80, 8
+"""Largest number of trials, and of those that fail."""
+
+_NEARER = (0.5, 0.25, 0.125)
+"""Shares of the first stride at which contact is looked for if there is none at its end."""
+
+_LEAST_POWER = 2.0 / 3.0
+"""Power of the force with which the depth grows under a ball (Hertz 1881); a longer first trial is not taken."""
+
+_GRID = (81, 21)
+
+_BEYOND = 1.1
+"""Depth reached, over its forecast, from which the contact may lie beyond the fine part of the mesh."""
+
+
+def deepest(obj: RigidObject, first_contact_mm: float, height: float) -> float:
+    """Return the largest depth (mm) at which a force is looked for: neither finger nor object reaches the base there.
+
+    Parameters
+    ----------
+    first_contact_mm : height of the object's lowest point at first touch
+    height : of the finger, mm
+    """
+    return _DEEPEST * (height if obj.is_flat else min(height, first_contact_mm))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An increment to a trial depth.
+
+    Attributes
+    ----------
+    depth : mm
+    solution : of the increment
+    force : normal force at its end, N; NaN if the increment failed
+    """
+
+    depth: float
+    solution: ContactSolution[State[Any]]
+    force: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the increment converged."""
+        return self.solution.outcome.ok
+
+
+def first_trial(start: float, stride: float, wanted: float, begin: Trial | None) -> float:
+    """Return the depth (mm) of the first trial: one stride on, but no deeper than Hertz's law for a ball has it.
+
+    Parameters
+    ----------
+    start, stride : mm, depth before the increment, and how much deeper it may go
+    wanted : force, N
+    begin : state before the increment as a trial, where only the depth changes
+    """
+    guess = start + stride
+    if begin and wanted > begin.force > 0.0 and start > 0.0:
+        guess = min(guess, start * (wanted / begin.force) ** _LEAST_POWER)
+    return guess
+
+
+@dataclass
+class DepthSearch:
+    """Search for the depth at which the normal force is the one wanted: interpolation inside a bracket.
+
+    An increment that fails bounds the search, which goes on nearer to a depth that has converged.  So does one that
+    ends with less force than a smaller depth and none to show for it: the object has passed through the finger.
+
+    Attributes
+    ----------
+    increment : function of a depth (mm) and of the trials that have converged, the last one last
+    wanted : force, N
+    start : depth before the increment, mm
+    begin : state before the increment as a trial, where only the depth changes, from which forces are interpolated too
+    most : largest depth, mm; a turn or a slide may lift the object above first touch by as much, to negative depths
+    target : relative error of the force
+    """
+
+    increment: Callable[[float, Sequence[Trial]], Trial]
+    wanted: float
+    start: float
+    most: float
+    begin: Trial | None = None
+    target: float = TARGET
+    good: list[Trial] = field(default_factory=list, init=False)
+    failed: list[Trial] = field(default_factory=list, init=False)
+
+    def run(self, guess: float) -> Trial:
+        """Return the trial that has the force, or one whose outcome and detail say why there is none."""
+        depth = min(max(guess, -self.most), self.most)
+        stride = max(abs(depth - self.start), 1e-3 * self.most)
+        errors = [math.inf, math.inf]
+        for _ in range(_TRIALS):
+            trial = self._tried(depth)
+            if trial.ok:
+                error = abs(trial.force - self.wanted) / self.wanted
+                if error <= self.target or 0.3 * errors[-1] < error <= 100.0 * self.target:
+                    return trial
+                errors.append(error)
+            low, high = self._bracket()
+            if low and high:
+                if high.depth - low.depth <= _RESOLUTION * self.most:
+                    nearer = min(low, high, key=lambda trial: abs(trial.force - self.wanted))
+                    if abs(nearer.force - self.wanted) <= FORCE_TOLERANCE * self.wanted:
+                        return nearer
+                    text = f"{low.force:.6g} N and {high.force:.6g} N on either side of {low.depth:.6g} mm"
+                    return self._ended(Outcome.FORCE_JUMPS, text)
+            elif (low and low.depth >= self.most) or (high and high.depth <= -self.most):
+                return self._ended(Outcome.FORCE_NOT_REACHED, self._extreme())
+            bounds = self._bounds(low, high)
+            if bounds[1] - bounds[0] <= _NEAREST * self.most and not (low and high):
+                break
+            if len(self.failed) > _FAILURES:
+                break
+            depth = self._next(low, high, bounds, stride, len(errors) > 4 and errors[-1] > 0.5 * errors[-3])
+            stride *= 2.0
+        cause = self.failed[-1].solution.outcome if self.failed else Outcome.FORCE_NOT_REACHED
+        untouched = self.good and all(t.force <= 0.0 for t in self.good)
+        if cause.is_cycle or untouched:  # no later increment starts from another force, as it does from a cycle
+            cause = Outcome.FORCE_NOT_REACHED
+        return self._ended(cause, self._extreme())
+
+    def _tried(self, depth: float) -> Trial:
+        """Try a depth; one without force is tried again nearer, since the object may have passed through the finger."""
+        trial = self._sorted_in(depth)
+        if not trial.ok or trial.force > 0.0 or depth <= self.start or self.good[:-1]:
+            return trial
+        for fraction in _NEARER:
+            nearer = self._sorted_in(self.start + fraction * (depth - self.start))
+            if nearer.ok and nearer.force > 0.0:
+                self.good.remove(trial)
+                self.failed.append(_passed_through(trial))
+                return nearer
+        return trial
+
+    def _sorted_in(self, depth: float) -> Trial:
+        trial = self.increment(depth, self.good)
+        pushed = any(t.force > 0.0 and t.depth < depth for t in self.good)
+        if trial.ok and (trial.force < -FORCE_TOLERANCE * self.wanted or (pushed and trial.force <= 0.0)):
+            trial = _passed_through(trial)
+        (self.good if trial.ok else self.failed).append(trial)
+        return trial
+
+    def _bracket(self) -> tuple[Trial | None, Trial | None]:
+        """Return the deepest trial with too little force, and the shallowest deeper one with too much."""
+        high = min((t for t in self.good if t.force > self.wanted), key=lambda t: t.depth, default=None)
+        below = [t for t in self.good if t.force <= self.wanted and (high is None or t.depth < high.depth)]
+        return max(below, key=lambda t: t.depth, default=None), high
+
+    def _bounds(self, low: Trial | None, high: Trial | None) -> tuple[float, float]:
+        """Return the depths between which the next trial lies; those that failed are approached by halves."""
+        if not self.good:
+            nearest = min((t.depth for t in self.failed), key=lambda depth: abs(depth - self.start))
+            return min(self.start, nearest), max(self.start, nearest)
+        lowest, highest = low.depth if low else -self.most, high.depth if high else self.most
+        anchor = self.good[-1].depth
+        above = [t.depth for t in self.failed if anchor < t.depth < highest]
+        below = [t.depth for t in self.failed if lowest < t.depth < anchor]
+        return max([lowest, *below]), min([highest, *above])
+
+    def _next(
+        self, low: Trial | None, high: Trial | None, bounds: tuple[float, float], stride: float, slow: bool
+    ) -> float:
+        """Return the next depth: interpolated from the last trials unless that is out of bounds or too slow."""
+        middle = 0.5 * (bounds[0] + bounds[1])
+        if not self.good:
+            return middle
+        one, depth = self.good[-1], self._interpolated()
+        if low and high:
+            return depth if bounds[0] < depth < bounds[1] and not slow else middle
+        side = 1.0 if low else -1.0
+        if not side * (depth - one.depth) > 0.0:
+            depth = one.depth + side * stride
+        depth = one.depth + side * min(abs(depth - one.depth), stride)
+        barred = any(t.depth in bounds for t in self.failed)
+        lowest, highest = (0.5 * (bounds[0] + one.depth), 0.5 * (bounds[1] + one.depth)) if barred else bounds
+        return min(max(depth, lowest), highest)
+
+    def _interpolated(self) -> float:
+        """Return the depth of the force by inverse quadratic interpolation of the last trials; NaN if they do not rise.
+
+        A single trial counts as one of a force proportional to the depth.
+        """
+        rest = Trial(0.0, self.good[-1].solution, 0.0)
+        begin = [self.begin] if self.begin and all(t.depth != self.begin.depth for t in self.good) else []
+        last = [*begin, *self.good][-3:]
+        last = sorted(last if len(last) > 1 else [rest, *last], key=lambda trial: trial.depth)
+        depths, forces = [t.depth for t in last], [t.force for t in last]
+        if not (np.diff(forces) > 0.0).all() or not (np.diff(depths) > 0.0).all():
+            return math.nan
+        return float(barycentric_interpolate(forces, depths, self.wanted))
+
+    def _extreme(self) -> str:
+        """Return the force found that is nearest to the one wanted, with its depth, and at how many there was none."""
+        cycles = sum(trial.solution.outcome.is_cycle for trial in self.failed)
+        if cycles:
+            rule = f"the paper's rule has no answer at {cycles} of the depths tried; use [contact] rule = 'projection'"
+            return f"{self._nearest()}; {rule}"
+        return self._nearest()
+
+    def _nearest(self) -> str:
+        if not self.good:
+            return f"{self.wanted:.6g} N asked; no depth that was tried gave a solution"
+        forces = [trial.force for trial in self.good]
+        kind = "largest" if max(forces) < self.wanted else "least" if min(forces) > self.wanted else "nearest"
+        best = min(self.good, key=lambda trial: (abs(trial.force - self.wanted), -trial.depth))
+        if best.force <= 0.0:
+            return f"{self.wanted:.6g} N asked; the object does not touch the finger down to {best.depth:.4g} mm"
+        return f"{self.wanted:.6g} N asked; the {kind} force is {best.force:.6g} N, at a depth of {best.depth:.4g} mm"
+
+    def _ended(self, outcome: Outcome, detail: str) -> Trial:
+        last = (self.failed or self.good)[-1]
+        kept = last.solution.detail if last.solution.outcome is outcome else ""
+        detail = "; ".join(text for text in (kept, detail) if text)
+        return replace(last, solution=replace(last.solution, outcome=outcome, detail=detail), force=math.nan)
+
+
+def _passed_through(trial: Trial) -> Trial:
+    return replace(trial, solution=replace(trial.solution, outcome=Outcome.NO_CONVERGENCE), force=math.nan)
+
+
+def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: float, width: float) -> float:
+    """Return a rough depth (mm) for a force (N): an elastic foundation under the overlap of object and finger.
+
+    Its modulus is E / (1 - nu^2), its thickness the finger's height or half the length of the overlap, if that is less.
+    It serves to mesh the contact and to choose candidate points; the press finds the depth.
+    """
+    half_width = way.half_width_mm or 0.5 * width
+    x, z = np.meshgrid(
+        np.linspace(-way.half_length_mm, way.half_length_mm, _GRID[0]),
+        np.linspace(-half_width, half_width, _GRID[1]),
+        indexing="ij",
+    )
+    plan = 4.0 * way.half_length_mm * half_width / x.size
+    first_contact_mm = first_contact_height(way.top, way.object, way.half_length_mm, way.half_width_mm, way.landmarks)
+    level = np.zeros_like(z) if way.half_width_mm == 0.0 else z
+    gap = PlacedObject.of(way.object, first_contact_mm, ObjectPose(0.0)).height(x, level) - way.top(x, level)
+    gap = np.where(np.isfinite(gap), gap, np.inf)
+    modulus = material.E_MPa / (1.0 - material.nu**2)
+
+    def pressed(depth: float) -> float:
+        overlap = np.maximum(depth - gap, 0.0)
+        inside = x[overlap > 0.0]
+        half = 0.5 * float(np.ptp(inside)) if len(inside) else 0.0
+        return modulus * float(overlap.sum()) * plan / max(min(height, half), 1e-3 * height)
+
+    most = deepest(way.object, first_contact_mm, height)
+    depth = brentq(lambda depth: pressed(depth) - force, 0.0, most) if pressed(most) > force else most
+    return float(f"{depth:.4g}")
+
+
+def at_depth_reached(legs: tuple[Leg, ...], reached_mm: float) -> tuple[Leg, ...] | None:
+    """Return the legs with the depth reached in place of a forecast that was too small; None if none was."""
+    forced = [leg.depth_mm for leg in legs if leg.force_N is not None]
+    if not forced or reached_mm <= _BEYOND * max(forced):
+        return None
+    return tuple(leg if leg.force_N is None else replace(leg, depth_mm=reached_mm) for leg in legs)

@@ -1,0 +1,271 @@
+"""The press: contact solved increment by increment along the path of the object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, replace
+from threading import Event
+from typing import Any
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.state import ContactSolution
+from finger3d.errors import Outcome
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.energy import external_work, frictional_dissipation
+from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
+from finger3d.mechanics.march.path import Load, Station, stations
+from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.state import State
+from finger3d.objects import Move, ObjectPose
+from finger3d.progress import QUIET, Progress
+
+_CUTS = 6
+"""Times that an increment which does not converge is halved, at most."""
+
+
+@dataclass(frozen=True)
+class _Substep:
+    """A converged part of an increment: states before and after, and the motion of the object."""
+
+    before: State[Any]
+    after: State[Any]
+    move: Move
+
+
+@dataclass(frozen=True)
+class _Advanced:
+    """End of an increment: its solution, the converged parts, and the pose that was reached."""
+
+    solution: ContactSolution[State[Any]]
+    parts: list[_Substep]
+    pose: ObjectPose
+
+
+def march(
+    problem: Problem,
+    near: Sequence[Float] = (),
+    workspace: Workspace | None = None,
+    cancel: Event | None = None,
+    report: Progress = QUIET,
+) -> Iterator[StepResult]:
+    """Yield the result of every increment of all legs; ends after the first that does not converge.
+
+    Under a stick rule that depends on the increments, an increment that cycles is yielded as it is and never halved.
+
+    Parameters
+    ----------
+    problem : Problem
+    near : sequence of (c, d) arrays, N
+        Contact forces at the ends of the increments of a similar press, as initial guesses.
+    workspace, cancel, report : see `Press`
+
+    Raises
+    ------
+    CancelledError
+        If `cancel` is set.
+    """
+    press = Press(problem, workspace, cancel, report)
+    for number, station in enumerate(stations(problem.model.legs)):
+        yield press.advance(station, near[number] if number < len(near) else None)
+        if press.has_failed:
+            return
+
+
+class Press:
+    """A press in progress, which advances by one increment at a time.
+
+    Parameters
+    ----------
+    problem : Problem
+    workspace : Workspace, optional
+        What an earlier press of the same body left; empty unless given.
+    cancel : Event, optional
+        Once it is set, the press ends before its next increment.
+    report : Progress, optional
+        Receives remarks on the depth and the force of every trial while a prescribed force is searched for.
+
+    Attributes
+    ----------
+    state, pose : after the last increment, at first before any contact
+    has_failed : whether the last increment did not converge
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        workspace: Workspace | None = None,
+        cancel: Event | None = None,
+        report: Progress = QUIET,
+    ) -> None:
+        self.problem, self.formulation = problem, formulation_of(problem.model)
+        self.workspace = workspace or self.formulation.workspace()
+        self.state, self.pose = self.formulation.start(problem), problem.origin
+        self.has_failed = False
+        self._cancel, self._report = cancel, report
+        self._previous: tuple[Move, Float] | None = None
+        self._work = self._dissipation = self._leg_start_N = 0.0
+        body = problem.without_inclusions
+        self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
+
+    def advance(
+        self, station: Station, guess: Float | None = None, solution: ContactSolution[State[Any]] | None = None
+    ) -> StepResult:
+        """Advance to a station, and return the result of the increment.
+
+        Parameters
+        ----------
+        guess : (c, d) array, N, optional
+            Contact forces where the iteration starts; unless given, they are extrapolated from the last increment.
+        solution : ContactSolution, optional
+            Solution of the increment, if it is known already.
+
+        Raises
+        ------
+        CancelledError
+            If `cancel` is set.
+        """
+        self._end_if_cancelled()
+        move = Move(self.pose, station.pose)
+        if solution is not None:
+            end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
+        elif station.load is None:
+            start = self.expected_force(station.pose) if guess is None else guess
+            most = 0 if self.problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
+            end = _Advanced(*self._increment(self.state, move, most, start), station.pose)
+        else:
+            end = self._to_force(move, station.load)
+        for part in end.parts:
+            self._work += external_work(self.problem, part.before, part.after, part.move)
+            self._dissipation += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+        self._previous = Move(self.pose, end.pose), self.state.contact.force
+        self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
+        self.has_failed = not (outcome.ok or outcome.is_cycle)
+        return self._result(end.solution, self._free_strain(station))
+
+    def expected_force(self, pose: ObjectPose) -> Float | None:
+        """Return the forces (c, d) N extrapolated to a pose, if the path continues in its last direction."""
+        if self._previous is None:
+            return None
+        before, force = self._previous
+        ratio = Move(self.pose, pose).length_ratio(before)
+        now = self.state.contact.force
+        return None if ratio is None else now + ratio * (now - force)
+
+    def _end_if_cancelled(self) -> None:
+        if self._cancel is not None and self._cancel.is_set():
+            raise CancelledError
+
+    def _increment(
+        self, state: State[Any], move: Move, cuts: int, guess: Float | None = None
+    ) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
+        """Solve an increment; one that does not converge is halved and repeated from the same state."""
+        whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
+        if whole.outcome.ok or cuts == 0:
+            return whole, [_Substep(state, whole.state, move)]
+        middle = move.at(0.5)
+        first, done = self._increment(state, Move(move.start, middle), cuts - 1)
+        if not first.outcome.ok:
+            return replace(first, state=state, iterations=first.iterations + whole.iterations), done
+        second, more = self._increment(first.state, Move(middle, move.end), cuts - 1)
+        return replace(
+            second,
+            residual=max(first.residual, second.residual),
+            iterations=whole.iterations + first.iterations + second.iterations,
+            method="cut back",
+        ), done + more
+
+    def _to_force(self, move: Move, load: Load) -> _Advanced:
+        """Advance to the depth where the normal force is the prescribed one.
+
+        Every trial begins at the end expected from those before it.  If the force is not reached, the solution says
+        why, and state and pose are those at the beginning.
+        """
+        problem, state, parts = self.problem, self.state, dict[float, list[_Substep]]()
+        force = self._normal_force(state)
+        if load.begins:
+            self._leg_start_N = force
+        wanted = self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
+        cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
+        start_mm, start_s = move.start.depth_mm, move.start.time_s
+        only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
+        rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
+        begin = Trial(start_mm, rest, force) if only_deeper else None
+
+        def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
+            self._end_if_cancelled()
+            there = Move(move.start, replace(move.end, depth_mm=depth))
+            start, guess = state, self.expected_force(there.end)
+            if good:
+                one, other = good[-1], good[-2] if len(good) > 1 else begin
+                share = (depth - one.depth) / (one.depth - other.depth) if other and one.depth != other.depth else 0.0
+                share = share if abs(share) < 1.0 else 0.0
+                ends = one.solution.state, other.solution.state if other else one.solution.state
+                guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
+                start = _expecting(state, there, ends, share) if problem.model.finite_strain else state
+            found, parts[depth] = self._increment(start, there, cuts, guess)
+            reached = self._normal_force(found.state) if found.outcome.ok else np.nan
+            text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
+            self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
+            return Trial(depth, found, reached)
+
+        most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
+        target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
+        search = DepthSearch(trial_at, wanted, start_mm, most, begin, target)
+        stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
+        last = search.run(first_trial(start_mm, stride, wanted, begin))
+        spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
+        if not last.ok:
+            return _Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
+        solution = replace(last.solution, iterations=spent)
+        return _Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
+
+    def _normal_force(self, state: State[Any]) -> float:
+        return -float(self.problem.world_force(state.contact)[:, 1].sum())
+
+    def _free_strain(self, station: Station) -> dict[Column, float]:
+        """Strain of every gauge in the body without inclusions; NaN once it has failed."""
+        press = self._without_inclusions
+        if press is None:
+            return {}
+        step = None if press.has_failed else press.advance(station)
+        known = step is not None and not press.has_failed
+        columns = [strain_columns(gauge.name) for gauge in self.problem.model.gauges]
+        return {free: step.readings[own] if step and known else np.nan for own, free in columns}
+
+    def _result(self, solution: ContactSolution[State[Any]], free_strain: dict[Column, float]) -> StepResult:
+        problem, state, pose = self.problem, self.state, self.pose
+        moment = self.formulation.loads(problem, state, pose).moment
+        return StepResult(
+            target=pose,
+            state=problem.symmetry.unfold(state.contact),
+            meshed_state=state,
+            lowest=problem.placed(pose).lowest,
+            moment=problem.symmetry.total_moment(moment),
+            readings=in_order(self.formulation.readings(problem, state) | free_strain),
+            external_work_mJ=self._work,
+            dissipation_mJ=self._dissipation,
+            outcome=solution.outcome,
+            residual=solution.residual,
+            iterations=solution.iterations,
+            method=solution.method,
+            penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
+            detail=solution.detail,
+        )
+
+
+def _expecting(state: State[Any], move: Move, ends: tuple[State[Any], State[Any]], share: float) -> State[Any]:
+    """Return a state at finite strain from which the increment begins its iteration at an expected end.
+
+    The end has the unknowns ``ends[0] + share (ends[0] - ends[1])``.
+    """
+    one, other = (end.body.unknowns for end in ends)
+    end = one + share * (one - other)
+    before = Move(move.at(-1.0), move.start), 2.0 * state.body.unknowns - end
+    return replace(state, body=replace(state.body, previous=before))

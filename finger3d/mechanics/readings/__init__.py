@@ -1,0 +1,1 @@
+"""Readings of a press: gauges, markers and taxels."""

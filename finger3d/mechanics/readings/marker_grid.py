@@ -1,0 +1,111 @@
+"""Displacements of markers: those of the scene, and of a grid on the contact face."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float, Tree
+from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.surface.transfer import values_over
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.readings.columns import Column, displacement_columns
+from finger3d.mechanics.results.history import StepResult
+from finger3d.objects import ObjectPose
+
+_POSE: dict[str, Callable[[ObjectPose], float]] = {
+    "depth_mm": lambda pose: pose.depth_mm,
+    "slide_x_mm": lambda pose: pose.slide_x_mm,
+    "slide_z_mm": lambda pose: pose.slide_z_mm,
+    "turn_x_deg": lambda pose: math.degrees(pose.turn_x),
+    "turn_y_deg": lambda pose: math.degrees(pose.turn_y),
+    "turn_z_deg": lambda pose: math.degrees(pose.turn_z),
+}
+"""Columns of the pose of the object, as in history.csv."""
+
+
+@dataclass(frozen=True)
+class MarkerGrid:
+    """Markers on the contact face of the whole finger.
+
+    Attributes
+    ----------
+    places : (k, d) mm, at rest
+    rows : (k, n) sparse
+        Interpolation from the nodes of the meshed part.
+    sign : (k, d) factor of the components of a displacement, -1 in a mirror image
+    """
+
+    places: Float
+    rows: sp.csr_matrix
+    sign: Float
+
+    @classmethod
+    def of(cls, problem: Problem, spacing_mm: float) -> MarkerGrid:
+        """Return markers every `spacing_mm` along x and z, with one in the middle, as far as the contact face goes."""
+        mesh, design, d = problem.mesh, problem.model.design, problem.dim
+        x, z = (np.arange(-(half // spacing_mm), half // spacing_mm + 1.0) * spacing_mm
+                for half in (design.half_length_mm, design.width_mm / 2.0))  # fmt: skip
+        z = z if d == 3 else np.zeros(1)
+        below = np.zeros((len(x) * len(z), d))
+        below[:, 0] = x.repeat(len(z))
+        below[:, 2:] = np.tile(z, len(x))[:, None]
+        below[:, 1] = mesh.points[:, 1].min() - 1.0
+        sign = np.ones_like(below)
+        for k in axis_numbers(problem.axes):
+            sign[below[:, k] < 0.0, k] = -1.0
+        rows, there = values_over(mesh, "contact", below * sign, lowest=False)
+        places = below[there]
+        places[:, 1] = (rows @ mesh.points[:, 1])[there]
+        return cls(places, rows[there], sign[there])
+
+    def displacements(self, u: Float) -> Float:
+        """Return the displacements (k, d) of the markers from those (n, d) of the part's nodes."""
+        return np.asarray(self.sign * (self.rows @ u))
+
+
+def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: float | None) -> Tree:
+    """Return the columns of markers.csv: every marker of the scene and of its grid, after every increment.
+
+    Parameters
+    ----------
+    steps : converged increments
+    spacing_mm : of the grid; None without one
+    """
+    named = problem.model.markers
+    grid = MarkerGrid.of(problem, spacing_mm) if spacing_mm else None
+    positions = [m.place[: problem.dim] for m in named] + ([] if grid is None else list(grid.places))
+    count = len(positions) - len(named)
+    moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
+    if grid is not None:
+        unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps])
+        fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
+        moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
+    columns: Tree = {
+        "step": np.repeat(np.arange(1, len(steps) + 1), len(positions)),
+        **{key: np.repeat([value(step.target) for step in steps], len(positions)) for key, value in _POSE.items()},
+        "marker": [*(m.name for m in named), *(f"grid_{k + 1}" for k in range(count))] * len(steps),
+    }
+    places, displacements = np.tile(_in_space(np.array(positions)), (len(steps), 1)), _in_space(np.vstack(moved))
+    columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
+    return columns | {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
+
+
+def grid_readings(problem: Problem, step: StepResult, spacing_mm: float) -> dict[Column, float]:
+    """Return the displacements of the markers of a grid after an increment, as those of other markers."""
+    grid = MarkerGrid.of(problem, spacing_mm)
+    (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
+    moved = _in_space(grid.displacements(displacement(problem.mesh, unknowns)))
+    columns = (column for k in range(len(moved)) for column in displacement_columns(f"grid_{k + 1}"))
+    return dict(zip(columns, map(float, moved.ravel()), strict=True))
+
+
+def _in_space(vectors: Float) -> Float:
+    """Return vectors (k, d) with three components."""
+    return np.hstack([vectors, np.zeros((len(vectors), 3 - vectors.shape[1]))])

@@ -1,0 +1,1 @@
+"""What a press leaves: increments, zones, and checks of the surface."""

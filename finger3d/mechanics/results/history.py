@@ -1,0 +1,274 @@
+"""Results of the increments of a press, and the quantities measured on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._types import Float, Tree, freeze_arrays
+from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
+from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
+from finger3d.mechanics.readings.columns import QUANTITIES, Column, by_key, in_space, of_kind
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.results.zones import half_extents
+from finger3d.objects import ObjectPose
+
+_READINGS = ("gauges", "markers", "taxels", "other_readings")
+"""Keys of an entry of `steps` in summary.json under which its readings are."""
+
+_ON_LINE = 1e-9
+"""Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """The contact points of the whole finger, mirrored halves included.
+
+    Attributes
+    ----------
+    nodes : (m,) numbers in the whole mesh
+    face : (m,) number in `finger3d.fem.mesh.simplex.FREE_FACES` of the face that each point belongs to
+    points : (m, 3) mm at rest, z = 0 in a section
+    area : (m,) mm2
+    basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
+    half_width_mm, band_mm : float
+        Where no point lies on the line z = 0, figures show the points within `band_mm` of it.
+    edges : (e, 2)
+        Pairs of points that an edge of the surface mesh joins.
+    """
+
+    nodes: NDArray[np.int64]
+    face: NDArray[np.int8]
+    points: Float
+    area: Float
+    basis: Float
+    half_width_mm: float
+    band_mm: float
+    edges: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    @property
+    def dim(self) -> int:
+        """2 for a section, 3 for a solid."""
+        return int(self.basis.shape[-1])
+
+    def with_basis_of(self, state: ContactState) -> ContactPoints:
+        """Return the points with the bases of a state, if these change during the motion."""
+        return self if state.bases is None else replace(self, basis=state.bases)
+
+    def middle_line(self) -> tuple[Float, NDArray[np.int64]]:
+        """Return where the contact face meets the line z = 0: x (k,), mm, and the number (k,) of the nearest point.
+
+        These are the vertices on the line and the intersections of edges with it, or all points of a section.
+        """
+        x, z = self.points[:, 0], self.points[:, 2]
+        z = np.where(np.abs(z) <= _ON_LINE * self.half_width_mm, 0.0, z)
+        upper = self.face == CONTACT
+        on = np.flatnonzero((z == 0.0) & upper)
+        across = (z[self.edges[:, 0]] * z[self.edges[:, 1]] < 0.0) & upper[self.edges[:, 0]]
+        i, j = self.edges[across].T
+        share = z[i] / (z[i] - z[j])
+        crossing = x[i] + share * (x[j] - x[i])
+        return np.concatenate([x[on], crossing]), np.concatenate([on, np.where(share <= 0.5, i, j)])
+
+    def end_line(self) -> tuple[Float, NDArray[np.int64]]:
+        """Return x (k,), mm, and the numbers (k,) of the points where the contact face ends, at half the width."""
+        end = np.abs(self.points[:, 2] - self.half_width_mm) <= 1e-6 * self.half_width_mm
+        nearest = np.flatnonzero(end & (self.face == CONTACT))
+        return self.points[nearest, 0], nearest
+
+    def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which points (m,) of a zone an edge joins with a point outside it."""
+        i, j = self.edges.T
+        out = np.zeros(len(inside), dtype=bool)
+        out[i[inside[i] & ~inside[j]]] = True
+        out[j[inside[j] & ~inside[i]]] = True
+        return out
+
+    def resolved(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which points (m,) of a zone lie where it is three points wide: inner ones and their neighbours."""
+        inner = inside & ~self.rim(inside)
+        i, j = self.edges.T
+        out = inner.copy()
+        out[i[inner[j] & inside[i]]] = True
+        out[j[inner[i] & inside[j]]] = True
+        return out
+
+    def to_global(self, local: Float) -> Float:
+        """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
+        out = np.zeros((len(local), 3))
+        own = self.basis if self.basis.ndim == 3 else self.basis[None]
+        out[:, : self.dim] = np.einsum("ma,mak->mk", local, np.broadcast_to(own, (len(local), self.dim, self.dim)))
+        return out
+
+    def friction(self, force: Float) -> Float:
+        """Tangential part (m, 3) of forces (m, d), in x, y, z."""
+        tangential = force.copy()
+        tangential[:, 0] = 0.0
+        return self.to_global(tangential)
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """Result of an increment: contact state of the whole finger (m points), readings, work and convergence.
+
+    `meshed_state` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm,
+    is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
+    contact point is inside the object, or the deepest place of the free surface
+    (`finger3d.mechanics.results.penetration`); `detail` describes a failure.
+    """
+
+    target: ObjectPose
+    state: ContactState
+    meshed_state: State[Any]
+    lowest: tuple[float, float]
+    moment: Float
+    readings: dict[Column, float]
+    external_work_mJ: float
+    dissipation_mJ: float
+    outcome: Outcome
+    residual: float
+    iterations: int
+    method: str
+    penetration_mm: float
+    detail: str = ""
+
+    @property
+    def named_readings(self) -> dict[str, float]:
+        """Every number that is read, by its name; ``m1.x`` is the displacement of marker m1 along x."""
+        return {column.name: value for column, value in self.readings.items()}
+
+    @property
+    def gauges(self) -> dict[str, float]:
+        """Strain by the name of the gauge."""
+        return {column.sensor: self.readings[column] for column in of_kind(self.readings, "gauge")}
+
+    @property
+    def markers(self) -> dict[str, tuple[float, ...]]:
+        """Displacement (d,), mm, by the name of the marker."""
+        moved: dict[str, tuple[float, ...]] = {}
+        for column in of_kind(self.readings, "marker"):
+            moved[column.sensor] = (*moved.get(column.sensor, ()), self.readings[column])
+        return moved
+
+    @property
+    def taxels(self) -> dict[str, float]:
+        """Pressure, MPa, by the name of the taxel."""
+        return {column.sensor: self.readings[column] for column in of_kind(self.readings, "taxel")}
+
+
+@dataclass(frozen=True, repr=False)
+class History:
+    """Results of the increments of a press, and the contact points of the whole finger."""
+
+    points: ContactPoints
+    steps: tuple[StepResult, ...]
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<History of {len(self.steps)} steps, {len(self.points.nodes)} contact points: {self.outcome}>"
+
+    @property
+    def outcome(self) -> Outcome:
+        """CONVERGED if every increment has converged, else the first other outcome."""
+        return next((f.outcome for f in self.steps if not f.outcome.ok), Outcome.CONVERGED)
+
+
+def measure(points: ContactPoints, step: StepResult) -> Tree:
+    """Entry of `steps` in summary.json for one increment.
+
+    ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the extents of contact and stick on the line z = 0
+    (`finger3d.mechanics.results.zones`).  The line has the vertices of the surface mesh on it and the intersections of
+    edges with it, each with the state of the nearer end of its edge.  Lengths and areas are those of the surface at rest.
+    Readings are sorted by the kind of their sensors, and displacements have three components.
+    """
+    state, target = step.state, step.target
+    points = points.with_basis_of(state)
+    world = points.to_global(state.force)
+    friction = points.friction(state.force)
+    touching, sticking = state.status != OPEN, state.status == STICK
+    x, z = points.points[:, 0], points.points[:, 2]
+    contact, stick = half_extents(*points.middle_line(), state, points.area)
+    outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
+    outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
+    numbers: Tree = {
+        "depth_mm": target.depth_mm,
+        "slide_x_mm": target.slide_x_mm,
+        "slide_z_mm": target.slide_z_mm,
+        **{f"turn_{axis}_deg": round(math.degrees(turn), 12) for axis, turn in zip("xyz", target.turns, strict=True)},
+        "time_s": target.time_s,
+        "normal_force_N": 0.0 - float(world[:, 1].sum()),  # 0, not -0, without contact
+        "tangential_force_x_N": float(friction[:, 0].sum()),
+        "tangential_force_z_N": float(friction[:, 2].sum()),
+        "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),
+        **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", world.sum(axis=0), strict=True)},
+        **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
+        "outward_friction_x_N": float(outward_x.sum()),
+        "outward_friction_z_N": float(outward_z.sum()),
+        "contact_area_mm2": float(points.area[touching].sum()),
+        "stick_area_mm2": float(points.area[sticking].sum()),
+        "contact_half_length_mm": contact,
+        "stick_half_length_mm": stick,
+    }
+    if points.dim == 3:
+        numbers["contact_half_length_end_mm"] = half_extents(*points.end_line(), state, points.area)[0]
+    others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
+    return numbers | {
+        "largest_penetration_mm": step.penetration_mm,
+        "external_work_mJ": step.external_work_mJ,
+        "dissipation_mJ": step.dissipation_mJ,
+        "gauges": step.gauges,
+        "markers": {name: [*moved, *[0.0] * (3 - len(moved))] for name, moved in step.markers.items()},
+        "taxels": step.taxels,
+        **({"other_readings": others} if others else {}),
+        "iterations": step.iterations,
+        "residual": step.residual,
+        "method": step.method,
+        "outcome": str(step.outcome),
+    }
+
+
+def table_row(points: ContactPoints, step: StepResult) -> Tree:
+    """Return the row of history.csv for one increment: its numbers, and its readings by the names of their columns."""
+    numbers = {key: value for key, value in measure(points, step).items() if key not in _READINGS}
+    return numbers | by_key(in_space(step.readings))
+
+
+def contact_table(points: ContactPoints, state: ContactState) -> Tree:
+    """Columns of contact.csv; pressure and shear are the traction on the finger, normals point into it.
+
+    A vertex on a crease has a row for each of its faces.
+    """
+    points = points.with_basis_of(state)
+    friction = points.friction(state.force)
+    padded = np.zeros((len(state.accumulated_slip), points.dim))
+    padded[:, 1:] = state.accumulated_slip
+    slip = points.to_global(padded)
+    along = np.zeros_like(padded)
+    along[:, 0] = 1.0
+    normal = points.to_global(along)
+    return {
+        "face": [FREE_FACES[k] for k in points.face],
+        "x_mm": points.points[:, 0],
+        "y_mm": points.points[:, 1],
+        "z_mm": points.points[:, 2],
+        "area_mm2": points.area,
+        **{f"normal_{axis}": normal[:, k] for k, axis in enumerate("xyz")},
+        "pressure_MPa": state.force[:, 0] / points.area,
+        "shear_x_MPa": friction[:, 0] / points.area,
+        "shear_y_MPa": friction[:, 1] / points.area,
+        "shear_z_MPa": friction[:, 2] / points.area,
+        "gap_mm": state.gap,
+        "slip_x_mm": slip[:, 0],
+        "slip_y_mm": slip[:, 1],
+        "slip_z_mm": slip[:, 2],
+        "status": [STATUS_NAMES[s] for s in state.status],
+    }

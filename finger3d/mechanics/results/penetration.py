@@ -1,0 +1,163 @@
+"""Penetration of the finger's free surface into the object, between the candidate points and outside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finger3d._types import Float
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.surface.traces import BoundarySurface, restrict
+from finger3d.mechanics.discretise.contact_geometry import may_touch
+from finger3d.mechanics.discretise.problem import Problem, free_surface
+from finger3d.mechanics.formulation import length_scale
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.results.history import StepResult
+from finger3d.objects import DistanceTracker, Move, ObjectPose
+
+_TOUCHES = {True: 1e-9, False: 1e-3}
+"""Penetration of points outside the candidates, over the depth, from which they count as in contact: on the contact
+face (True), and on other faces (False), where points at a crease penetrate by as much as the mesh does not resolve."""
+
+
+_ADVISE_ABOVE, _WARN_ABOVE = 0.01, 0.1
+"""Penetration, over the depth of the press, above which a finer mesh is advised, and above which a warning is given."""
+
+_ORDER, _ORDER_AT_CREASE = 1.5, 0.7
+"""Power of the edge length with which penetration falls: at the edge of contact, beyond which the gap opens with the
+distance to the power 1.5 (Johnson 1985, sec. 4.2), and at a sharp edge of the finger, where .5 to 1 were measured
+(tests/test_mechanics_penetration.py)."""
+
+_MARGIN = 0.9
+"""Edge length that is advised, over the one that follows: penetration depends on where contact ends between points."""
+
+
+@dataclass(frozen=True)
+class SurfaceCheck:
+    """The finger's free surface after an increment.
+
+    Attributes
+    ----------
+    within_candidates : whether no point outside the candidates went through the object
+    penetration_mm : largest penetration of the surface; under an elastic object that of the contact points only, where
+        its deformed surface is known
+    place : (d,) mm, that place
+    face : number in `FREE_FACES` of its face
+    at_crease : whether a sharp edge of the finger bounds its facet
+    depth_mm : largest depth of the press, to which the penetration is compared
+    """
+
+    within_candidates: bool
+    penetration_mm: float
+    place: Float
+    face: int
+    at_crease: bool
+    depth_mm: float
+
+
+def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
+    """Check the free surface after each step; in small strain by one back-substitution for all of them."""
+    tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
+    free, others = _surfaces(problem, steps)
+    hats, creased = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
+    out, largest = [], reached_depth(problem.model, steps)
+    for u, step in zip(_displacements(problem, steps), steps, strict=True):
+        within = _stays_out(problem, u, step.target, others)
+        samples = free.samples + free.interpolate @ u
+        value, _ = tracker.distance(problem.placed(step.target), samples, 0.0)
+        worst = int(value.argmin())
+        depth = max(-float(value[worst]), 0.0) if rigid else step.penetration_mm
+        corners = hats[:, [worst]].indices
+        face, at_crease = int(free.face[corners[0]]), bool(creased[corners].any())
+        out.append(SurfaceCheck(within, depth, samples[worst], face, at_crease, largest))
+    return out
+
+
+def penetration_warnings(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
+    """Return warnings about penetration between the contact points during a press."""
+    return _penetration(problem, checks, _WARN_ABOVE, np.inf)
+
+
+def penetration_advice(problem: Problem, checks: Sequence[SurfaceCheck]) -> list[str]:
+    """Return advice about penetration of more than a hundredth of the depth that gives no warning."""
+    return _penetration(problem, checks, _ADVISE_ABOVE, _WARN_ABOVE)
+
+
+def reached_depth(model: Model, steps: Sequence[StepResult]) -> float:
+    """Return the largest depth (mm) of a press: that of its steps where a force is given, whose depth is a forecast."""
+    if all(leg.force_N is None for leg in model.legs):
+        return model.largest_depth_mm
+    return max((step.target.depth_mm for step in steps), default=model.largest_depth_mm)
+
+
+def resolving_edge(check: SurfaceCheck) -> float:
+    """Return the edge length, over the present one, at which penetration is a hundredth of the depth."""
+    ratio = check.penetration_mm / check.depth_mm
+    order = _ORDER_AT_CREASE if check.at_crease else _ORDER
+    return float(min(1.0, _MARGIN * (_ADVISE_ABOVE / ratio) ** (1.0 / order))) if ratio > _ADVISE_ABOVE else 1.0
+
+
+def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float, most: float) -> list[str]:
+    """Return a line about the deepest place if its penetration over the depth is between two bounds."""
+    deepest = max(checks, key=lambda check: check.penetration_mm, default=None)
+    if deepest is None or not above * deepest.depth_mm < deepest.penetration_mm <= most * deepest.depth_mm:
+        return []
+    mesh, depth = problem.model.mesh, deepest.depth_mm
+    where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", deepest.place, strict=False))
+    on_wall = deepest.face != CONTACT and not deepest.at_crease
+    key, length = ("base_size_mm", mesh.base_size_mm) if on_wall else ("size_mm", mesh.size_mm)
+    cure = f"mesh.{key} = {resolving_edge(deepest) * length:.2g} leaves about {_ADVISE_ABOVE:.0%}"
+    if mesh.grading is not None:
+        cure = "a smaller mesh.tolerance leaves less"
+    if deepest.at_crease:
+        cure += "; a fillet at that sharp edge of the finger leaves less"
+    return [
+        f"the finger's surface is up to {deepest.penetration_mm:.2g} mm, {deepest.penetration_mm / depth:.2g} of the "
+        f"depth, inside the object between the contact points ({where} mm); {cure}"
+    ]
+
+
+def _displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
+    """Yield the nodal displacement (n, d) mm after each step."""
+    for unknowns in formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps]):
+        yield displacement(problem.mesh, unknowns)
+
+
+def beyond_candidates(problem: Problem, free: BoundarySurface | None = None) -> BoundarySurface:
+    """Return the points of the free surface that are no candidates."""
+    free = free or free_surface(problem.model, problem.body.mesh, problem.body.thickness)
+    return restrict(free, np.flatnonzero(~np.isin(_key(free), _key(problem.system.surface))))
+
+
+def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySurface, BoundarySurface]:
+    """Return the free surface, and those of its points that are no candidates and could touch after some step."""
+    free = free_surface(problem.model, problem.body.mesh, problem.body.thickness)
+    others = beyond_candidates(problem, free)
+    if problem.model.object.is_flat and steps:  # its normal is known everywhere
+        normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]
+        finite = problem.model.finite_strain
+        others = restrict(others, np.any([may_touch(others, normal, finite) for normal in normals], axis=0))
+    return free, others
+
+
+def _key(points: BoundarySurface) -> NDArray[np.int64]:
+    """Return a number for every point, different for the faces that a vertex belongs to."""
+    return np.asarray(points.nodes * len(FREE_FACES) + points.face)
+
+
+def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundarySurface) -> bool:
+    """Return whether no point of `others` went through the object."""
+    if not len(others.nodes):
+        return True
+    gap, normal = formulation_of(problem.model).gap(problem, u, target, others)
+    facing = may_touch(others, normal, problem.model.finite_strain)
+    for on_contact, tolerance in _TOUCHES.items():
+        points = facing & ((others.face == CONTACT) == on_contact)
+        if gap[points].min(initial=np.inf) <= -tolerance * length_scale(problem, Move(target, target)):
+            return False
+    return True

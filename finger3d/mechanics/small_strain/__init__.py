@@ -1,0 +1,1 @@
+"""Bodies in small strain, elastic and viscoelastic."""

@@ -1,0 +1,274 @@
+"""One increment of contact between a linear body and an object, along the true normals of the object.
+
+The displacement U of the contact points is linear in their forces, U = W f + U_past, and the gap and the normal of each
+point follow from its present place.  Contact is solved with gaps linearised at a displacement, and the
+displacement is updated from the forces, until both agree.  Without curvature and rotation one solution is exact.
+
+At an edge of the object the normal of a point may jump.  Where directions do not converge, they are held fixed: every
+normal between those of the adjacent faces is one of the edge (its generalised gradient, Clarke 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.contact.conditions import TOLERANCE, ContactProblem
+from finger3d.contact.friction import OPEN
+from finger3d.contact.rules import RULES
+from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.errors import Outcome
+from finger3d.fem.tensors import rotated_delassus
+from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace, length_scale
+from finger3d.mechanics.march.passing import moves_too_far, passes_through, pulls
+from finger3d.mechanics.results.state import State
+from finger3d.objects import DistanceTracker, Move, vertical_frame
+
+_TARGET = 1e-9
+"""Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
+
+_MOST_SOLUTIONS = 30
+"""Largest number of solutions of an increment."""
+
+_HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
+"""Iteration from which mean gradients of the distance are held fixed if they still change by more than this."""
+
+_NEAR = 0.05
+"""Distance, over the depth, within which points are evaluated again while an increment is solved."""
+
+_MEMORY = 3
+"""Earlier displacements from which the next is extrapolated (Anderson 1965)."""
+
+
+@dataclass(frozen=True)
+class LinearBody:
+    """A linear body at its contact points, over one increment.
+
+    Attributes
+    ----------
+    delassus : (c, d, c, d) mm/N
+        In the directions of an upright object.
+    past : (c, d) mm
+        Displacement without contact forces, in the same directions.
+    """
+
+    delassus: Float
+    past: Float
+
+    def displacement(self, force: Float, bases: Float) -> Float:
+        """Return the displacement (c, d) in x, y, z under forces (c, d) along each point's own directions (c, d, d)."""
+        frame = vertical_frame(force.shape[1])
+        upright = np.einsum("ca,cak->ck", force, bases) @ frame.T
+        touched = int(np.flatnonzero(force.any(axis=1))[-1:].sum()) + 1  # the deepest points come first
+        rows = self.delassus.reshape(force.size, force.size)[:, : touched * force.shape[1]]
+        moved = self.past + (rows @ upright[:touched].ravel()).reshape(force.shape)
+        return np.asarray(moved @ frame)
+
+
+def solve_increment(
+    problem: Problem,
+    state: State[Float],
+    move: Move,
+    body: LinearBody,
+    guess: Float | None,
+    workspace: Workspace,
+) -> ContactSolution[State[Float]]:
+    """Advance a state as the object moves.
+
+    Returns
+    -------
+    ContactSolution
+        Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
+        directions at the displacement found agree with those that the forces were solved with.
+    """
+    increment = _Increment(problem, state, move, body, workspace.tracker)
+    gap_before = state.contact.gap
+    if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
+        return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
+    flat = problem.model.object.is_flat
+    expansion_point = (
+        np.zeros_like(body.past)
+        if flat
+        else body.displacement(state.contact.force if guess is None else guess, state.contact.own_bases)
+    )
+    geometry = increment.geometry(expansion_point)
+    held = np.zeros(len(expansion_point), dtype=bool)
+    spent, error, start = 0, np.inf, guess
+    tried: list[Float] = []
+    displacements: list[Float] = []
+    for iteration in range(1, _MOST_SOLUTIONS + 1):
+        solution = increment.solve(geometry, expansion_point, start)
+        spent += solution.iterations
+        if not (solution.outcome.ok or solution.outcome.is_cycle):
+            return replace(solution.with_state(state), iterations=spent)
+        start = solution.state.force
+        displacement = body.displacement(start, geometry.bases)
+        if flat or solution.outcome.is_cycle:
+            error = 0.0
+            break
+        after = increment.geometry(displacement).holding(held, geometry)
+        error = increment.error(after, after.angles(geometry), displacement, solution.state)
+        if error <= _TARGET:
+            break
+        if iteration >= _HOLD_FROM:
+            change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
+            held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
+        tried, displacements = [*tried, expansion_point][-_MEMORY:], [*displacements, displacement][-_MEMORY:]
+        expansion_point = _extrapolated(tried, displacements)
+        following = after if expansion_point is displacement else increment.geometry(expansion_point)
+        geometry = following.holding(held, geometry)
+    if error > TOLERANCE:
+        return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
+    gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
+    after_state = increment.reached(geometry, expansion_point, displacement, solution.state, gap)
+    through = passes_through(problem, move, state.body, displacement, gap_before)
+    if through or pulls(problem, state.contact, after_state.contact, move):
+        return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
+    return replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
+
+
+def solve_linearised(
+    problem: Problem, state: State[Float], move: Move, body: LinearBody, guess: Float | None
+) -> ContactSolution[State[Float]]:
+    """Advance a state by one solution with the contact geometry that the problem knows of the pose at the end.
+
+    An increment to a pose that is not known does not converge.
+    """
+    if problem.contact_geometry is None or move.end not in problem.contact_geometry:
+        return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
+    geometry, expansion_point = problem.contact_geometry[move.end]
+    increment = _Increment(problem, state, move, body, DistanceTracker())
+    solution = increment.solve(geometry, expansion_point, guess)
+    if not solution.outcome.ok:
+        return solution.with_state(state)
+    displacement = body.displacement(solution.state.force, geometry.bases)
+    return solution.with_state(increment.reached(geometry, expansion_point, displacement, solution.state, None))
+
+
+def _extrapolated(tried: list[Float], results: list[Float]) -> Float:
+    """Return the next displacement from those tried and those found from them, by Anderson's method."""
+    if len(tried) == 1:
+        return results[-1]
+    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, results, strict=True)])
+    change = residuals[1:] - residuals[:-1]
+    moved = np.stack([(b - a).ravel() for a, b in zip(results, results[1:], strict=False)])
+    weights = np.linalg.lstsq(change.T, residuals[-1], rcond=1e-10)[0]
+    return np.asarray(results[-1] - (weights @ moved).reshape(results[-1].shape))
+
+
+@dataclass(frozen=True)
+class _Increment:
+    """An increment from a state, as the object moves."""
+
+    problem: Problem
+    state: State[Float]
+    move: Move
+    body: LinearBody
+    tracker: DistanceTracker
+
+    def geometry(self, displacement: Float, within: float = _NEAR) -> ContactGeometry:
+        """Return the contact geometry at the end of the increment, at a displacement (c, d).
+
+        It is exact for points nearer to the object than `within`, over the depth.
+        """
+        problem, reach = self.problem, within * length_scale(self.problem, self.move)
+        placed, object_share = problem.placed(self.move.end), problem.system.object_share
+
+        def distance(points: Float) -> tuple[Float, Float]:
+            return self.tracker.distance(placed, points, reach)
+
+        return contact_geometry(distance, problem.surface, displacement, problem.axes, object_share)
+
+    def solve(
+        self, geometry: ContactGeometry, expansion_point: Float, guess: Float | None
+    ) -> ContactSolution[ContactState]:
+        """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
+        problem, bases = self.problem, geometry.bases
+        d = bases.shape[-1]
+        start = transported(self.state.contact, bases)
+        free = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
+        free[:, 1:] += start.tangential_displacement
+        scale, area = length_scale(problem, self.move), problem.surface.area
+        rule, law = RULES[problem.model.rule], problem.model.contact_law
+        rotations = geometry.from_reference
+        if (rotations == np.eye(d)).all():
+            return rule(ContactProblem.of(start, free, self.body.delassus, law, scale, area=area), guess)
+        expected = start.force if guess is None else guess
+        near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
+        delassus = rotated_delassus(self.body.delassus, rotations[near], near)
+        contact = ContactProblem.of(start.of_points(near), free[near], delassus, law, scale, area=area[near])
+        part = rule(contact, expected[near])
+        force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
+        force[near], status[near] = part.state.force, part.state.status
+        return replace(part, state=replace(start, force=force, status=status))
+
+    def _relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
+        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one."""
+        bases = geometry.bases
+        out: Float = np.einsum("cak,ck->ca", bases, displacement - expansion_point)
+        out[:, 0] += geometry.gap
+        slid = displacement - self.state.body - carried_by_object(self.problem, self.move, expansion_point)
+        out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
+        return out
+
+    def error(self, after: ContactGeometry, turned: Float, displacement: Float, contact: ContactState) -> float:
+        """Return the largest violation by gaps at the displacement found, and by directions that have turned.
+
+        Gaps are divided by the depth; turns (c,) rad count by the force of their point over the largest.
+        """
+        scale = length_scale(self.problem, self.move)
+        closed = contact.status != OPEN
+        gap = np.where(closed, np.abs(after.gap), np.maximum(-after.gap, 0.0)) / scale
+        size = np.linalg.norm(contact.force, axis=1)
+        return float(max(gap.max(initial=0.0), (turned * size).max(initial=0.0) / (size.max(initial=0.0) or 1.0)))
+
+    def reached(
+        self,
+        geometry: ContactGeometry,
+        expansion_point: Float,
+        displacement: Float,
+        contact: ContactState,
+        gap: Float | None,
+    ) -> State[Float]:
+        """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement."""
+        start, relative = (
+            transported(self.state.contact, geometry.bases),
+            self._relative(geometry, expansion_point, displacement),
+        )
+        if gap is not None:
+            relative[:, 0] = gap
+        after = next_state(start, contact.force, relative, contact.status)
+        return State(replace(after, bases=geometry.bases), displacement)
+
+
+def transported(state: ContactState, bases: Float) -> ContactState:
+    """Return a state whose tangential vectors (c, d - 1) are expressed in other bases (c, d, d)."""
+    if state.bases is None or state.bases is bases or (state.bases == bases).all():
+        return state
+    turn = np.einsum("ctk,csk->cts", bases[:, 1:], state.bases[:, 1:])
+    force = state.force.copy()
+    force[:, 1:] = np.einsum("cts,cs->ct", turn, state.force[:, 1:])
+    return replace(
+        state,
+        force=force,
+        tangential_displacement=np.einsum("cts,cs->ct", turn, state.tangential_displacement),
+        accumulated_slip=np.einsum("cts,cs->ct", turn, state.accumulated_slip),
+        bases=bases,
+    )
+
+
+def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Float:
+    """Return how far (c, d) mm the object moves where the points are, displaced by `displacement` (c, d).
+
+    The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
+    """
+    d, start, end = displacement.shape[1], move.start, move.end
+    if start.turns == end.turns:
+        return np.broadcast_to((end.displacement - start.displacement)[:d], displacement.shape)
+    points = np.zeros((len(displacement), 3))
+    points[:, :d] = problem.surface.centroids + displacement
+    return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]

@@ -1,0 +1,266 @@
+"""Bodies whose moduli relax: the response of their condensed rows over one increment of time, see `viscoelastic`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float
+from finger3d.fem.assembly import Stiffness, stiffness, times
+from finger3d.fem.mesh.parts import ElasticityByPart
+from finger3d.fem.mesh.simplex import MeshPart
+from finger3d.fem.recovery.recover import averaged, displacement, nodal_pressure, nodal_strain
+from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.solvers.condense import Condensation
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.small_strain.relaxation import InternalVariables, Prony, Step, relaxed
+
+_FACTORS_KEPT = 5
+"""Number of condensations kept; each holds a factor, and a path rarely has more than four lengths of step."""
+
+
+@dataclass
+class RelaxationWorkspace(Workspace):
+    """Condensed bodies for the last time steps, by alpha, and the shear part of the stiffness."""
+
+    shear_part: sp.csr_matrix | None = None
+    _condensations: dict[float, Condensation] = field(default_factory=dict)
+
+    def condensation(self, alpha: float, make: Callable[[], Condensation]) -> Condensation:
+        """Return the condensation for alpha, made unless it is one of the last few."""
+        condensation = self._condensations.pop(alpha, None)
+        if condensation is None:
+            condensation = make()
+            self.factorizations += condensation.factorizations
+        self._condensations[alpha] = condensation
+        if len(self._condensations) > _FACTORS_KEPT:
+            self._condensations.pop(next(iter(self._condensations)))
+        return condensation
+
+
+@dataclass(frozen=True)
+class Response:
+    """Response of the condensed rows of a body over one step.
+
+    Attributes
+    ----------
+    compliance : (r, r) mm/N
+    moved : (r,) mm
+        Displacement of the rows due to the past, without forces.
+    shape : row forces (r,) -> the memory's vector `now`
+    """
+
+    compliance: Float
+    moved: Float
+    shape: Callable[[Float], Float]
+
+
+class ViscoelasticBody(Protocol):
+    """A viscoelastic body with internal variables."""
+
+    @property
+    def size(self) -> int:
+        """Number of internal variables of a branch."""
+        ...
+
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
+        """Return the response of the rows over a step."""
+        ...
+
+    def unknowns(self, now: Float) -> Float:
+        """Return all unknowns (N,) of a shape, with the pressures of the instantaneous modulus."""
+        ...
+
+    def read(self, now: Float) -> Float:
+        """Return the row displacements (r,) of a shape."""
+        ...
+
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Nodal stress (n, 3, 3), MPa."""
+        ...
+
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Nodal forces (n, d) of the relaxed stress."""
+        ...
+
+
+@dataclass(frozen=True)
+class ConstantPoissonRatio:
+    """Constant Poisson's ratio; internal variables are the row forces that hold a shape of the elastic body."""
+
+    problem: Problem
+
+    @property
+    def size(self) -> int:
+        """Number of condensed rows."""
+        return len(self.problem.body.condensed.compliance)
+
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
+        """The instantaneous compliance over alpha."""
+        past, alpha = step.history_load(memory), step.alpha
+        compliance = self.problem.body.condensed.compliance / alpha
+        return Response(compliance, compliance @ past, lambda rows: (rows + past) / alpha)
+
+    def unknowns(self, now: Float) -> Float:
+        """Return the unknowns by a back-substitution."""
+        return self.problem.body.condensed.unknowns(now)
+
+    def read(self, now: Float) -> Float:
+        """Return the row displacements by the compliance."""
+        return self.problem.body.condensed.compliance @ now
+
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the stress of the elastic body under the relaxed forces."""
+        return self.problem.strain_and_stress(self.unknowns(relaxed(prony, memory)))[1]
+
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the nodal forces of the elastic body under the relaxed row forces."""
+        mesh = self.problem.mesh
+        forces = times(self.problem.body.stiffness.upper, self.unknowns(relaxed(prony, memory)))
+        return forces[: mesh.points.size].reshape(-1, mesh.dim)
+
+
+@dataclass(frozen=True)
+class ConstantBulkModulus:
+    """Constant bulk modulus; internal variables are displacements and, in the mixed form, vertex dilatations.
+
+    The subgrid compliance of inclusions acts on their row forces, and relaxes as if nu were constant.
+    """
+
+    problem: Problem
+
+    @property
+    def _own(self) -> int:
+        return int(self.problem.body.stiffness.upper.shape[0])
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns, plus that of the rows with a subgrid compliance."""
+        return self._own + len(self.problem.inclusions.subgrid_compliance)
+
+    @cached_property
+    def _laws(self) -> list[Elasticity]:
+        """Laws of the parts by their number."""
+        problem = self.problem
+        materials = problem.model.materials(problem.mesh.part_labels)
+        user, mixed = "effects.viscosity.bulk = false", problem.body.elastic.mixed
+        return [material.isotropic(user).elasticity(mixed=mixed) for material in materials]
+
+    @cached_property
+    def _of_pressures(self) -> tuple[Float, Float]:
+        """Shear modulus and Lame's first constant (p,), MPa, of the part that each pressure belongs to."""
+        mesh = self.problem.mesh
+        number = np.zeros(len(mesh.part_corners[0]), dtype=np.int64)
+        for part in mesh.by_part:
+            number[part.corners] = part.number
+        constants = np.array([[law.shear, law.lame] for law in self._laws])[number]
+        return constants[:, 0], constants[:, 1]
+
+    def _lame(self, alpha: float) -> Float:
+        """Return Lame's first constant (p,) with the shear modulus multiplied by alpha."""
+        shear, lame = self._of_pressures
+        return np.asarray(lame + 2.0 / 3.0 * (1.0 - alpha) * shear)
+
+    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
+        """Return the response of the body with its shear modulus multiplied by alpha, loaded by the past."""
+        # steps of one length differ by round-off of their ends
+        alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
+        problem = self.problem
+        body = workspace.condensation(alpha, lambda: problem.body.condensed.again(self._stiffness(alpha, workspace)))
+        past, first = step.history_load(memory), len(body.compliance) - len(problem.inclusions.subgrid_compliance)
+        settled = body.solve(self._shear_force(past[: self._own], workspace))
+        compliance, moved = body.compliance.copy(), body.read(settled)
+        compliance[first:, first:] += problem.inclusions.subgrid_compliance / alpha
+        moved[first:] += problem.inclusions.subgrid_compliance @ past[self._own :] / alpha
+
+        def shape(rows: Float) -> Float:
+            unknowns = settled + body.unknowns(rows)
+            if problem.body.elastic.mixed:
+                unknowns[problem.mesh.points.size :] *= problem.body.stiffness.pressure_scale / self._lame(alpha)
+            return np.concatenate([unknowns, (rows[first:] + past[self._own :]) / alpha])
+
+        return Response(compliance, moved, shape)
+
+    def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
+        """Return the deviatoric stiffness K_s of the displacement form; in a section, that in its plane."""
+        if workspace.shear_part is None:
+            problem, mesh = self.problem, self.problem.mesh
+            laws = tuple(Elasticity(law.shear, -2.0 / 3.0 * law.shear, False) for law in self._laws)
+            deviatoric = laws[0] if mesh.part is None else ElasticityByPart(laws, mesh.part)
+            workspace.shear_part = stiffness(mesh, deviatoric, problem.body.thickness).upper
+        return workspace.shear_part
+
+    def _stiffness(self, alpha: float, workspace: RelaxationWorkspace) -> Stiffness:
+        """Return K_b + alpha K_s; in the mixed form every block has a factor of its own."""
+        problem = self.problem
+        whole: Stiffness = problem.body.stiffness
+        if not problem.body.elastic.mixed:
+            return Stiffness(whole.upper - (1.0 - alpha) * self._shear_part(workspace), whole.pressure_vertices, 1.0)
+        upper, n = whole.upper.copy(), problem.mesh.points.size
+        row = np.repeat(np.arange(upper.shape[0]), np.diff(upper.indptr))
+        upper.data[upper.indices < n] *= alpha
+        of_pressure = row >= n
+        upper.data[of_pressure] *= (self._of_pressures[1] / self._lame(alpha))[row[of_pressure] - n]
+        return Stiffness(upper, whole.pressure_vertices, whole.pressure_scale)
+
+    def _shear_force(self, shape: Float, workspace: RelaxationWorkspace) -> Float:
+        """Return the loads (N,), K_s times a shape (N,)."""
+        problem, n = self.problem, self.problem.mesh.points.size
+        if not problem.body.elastic.mixed:
+            return times(self._shear_part(workspace), shape)
+        deviator = shape.copy()
+        deviator[n:] *= -2.0 / 3.0 * self._of_pressures[0] / problem.body.stiffness.pressure_scale
+        load = times(problem.body.stiffness.upper, deviator)
+        load[n:] = 0.0
+        return load
+
+    def unknowns(self, now: Float) -> Float:
+        """Return the displacements, which are the shape."""
+        n = self.problem.mesh.points.size
+        out = now[: self._own].copy()
+        if self.problem.body.elastic.mixed:
+            out[n:] *= self._of_pressures[1] / self.problem.body.stiffness.pressure_scale
+        return out
+
+    def read(self, now: Float) -> Float:
+        """Return the row displacements, with the compliance that the mesh lacks."""
+        rows, beyond = self.problem.body.condensed.read(now[: self._own]), self.problem.inclusions.subgrid_compliance
+        rows[len(rows) - len(beyond) :] += beyond @ now[self._own :]
+        return rows
+
+    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the stress (n, 3, 3): 2 G dev(eps) relaxed, and the bulk modulus times the dilatation."""
+        mesh, d = self.problem.mesh, self.problem.dim
+        left, now = relaxed(prony, memory)[: self._own], memory.elastic[: self._own]
+
+        def of_part(part: MeshPart) -> tuple[Float]:
+            law = self._laws[part.number]
+            strain, swelling = self._strain(part, left)
+            bulk = law.lame + 2.0 / 3.0 * law.shear
+            spherical = bulk * self._strain(part, now)[1] - 2.0 / 3.0 * law.shear * swelling
+            whole = np.zeros((len(strain), 3, 3))
+            whole[:, :d, :d] = 2.0 * law.shear * strain
+            return (whole + spherical[:, None, None] * np.eye(3),)
+
+        return averaged(mesh, of_part)[0]
+
+    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
+        """Return the instantaneous nodal forces, less the part of the shear stress that has relaxed."""
+        mesh, lost = self.problem.mesh, memory.elastic - relaxed(prony, memory)
+        forces = times(self.problem.body.stiffness.upper, self.unknowns(memory.elastic))
+        forces -= self._shear_force(lost[: self._own], RelaxationWorkspace())
+        return forces[: mesh.points.size].reshape(-1, mesh.dim)
+
+    def _strain(self, part: MeshPart, shape: Float) -> tuple[Float, Float]:
+        """Return strain (n', d, d) and dilatation (n',) of a shape at the nodes of a part."""
+        mesh = self.problem.mesh
+        strain = nodal_strain(part.mesh, displacement(mesh, shape)[part.nodes])
+        if not self.problem.body.elastic.mixed:
+            return strain, np.trace(strain, axis1=1, axis2=2)
+        return strain, nodal_pressure(part.mesh, shape[mesh.points.size :][part.corners])

@@ -1,0 +1,1 @@
+"""Refinement of a mesh by bisection, and prescribed edge lengths."""

@@ -1,0 +1,1 @@
+"""Structured meshes of sections and swept solids."""

@@ -1,0 +1,370 @@
+"""Structured triangulation of a half section: rows of points from the contact curve down, joined by triangles.
+
+Rows run along the bands of the section. Their number and the points on them follow the size field, so triangles stay
+well shaped while they grow. Parts of a section are bands, or ranges of a band, and no triangle crosses their border.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from finger3d._types import Float, Int
+from finger3d.geometry.section import Arc, Core, Flat, Section
+from finger3d.meshing.refinement.grading import Grading
+from finger3d.meshing.structured.bands import Band, Bands, bands, ranges, thin_places
+
+STRUCTURED_GROWTH = 0.25
+"""Growth of the edge length per length away from the contact zone."""
+
+_ASPECT = 3.0  # quadratic elements tolerate 5:1; joining rows with different numbers of points uses up the rest
+_PLACES, _STATIONS = 80, 400  # along the outline and in depth, where prescribed edge lengths are looked up
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Edge lengths (mm) in the contact zone `low` <= x <= `high`, and far from it.
+
+    `grading` prescribes lengths inside the section, if there are any.
+    """
+
+    size_mm: float
+    base_mm: float
+    low: float
+    high: float
+    grading: Grading | None = None
+
+    def steps(self, length: float, longest: Callable[[Float], Float] | None = None, start: float = 0.0) -> Float:
+        """Depths (n + 1,), mm, of rows from 0 to `length` below a place that lies `start` below the zone.
+
+        `longest` returns the largest distance of rows at depths; without it, it follows from the edge lengths alone.
+        """
+        grow = max(0.0, (self.base_mm - self.size_mm) / STRUCTURED_GROWTH)  # depth at which the base size is reached
+
+        def count(depth: Float) -> Float:
+            near = np.log1p(STRUCTURED_GROWTH * np.minimum(depth, grow) / self.size_mm) / STRUCTURED_GROWTH
+            return near + np.maximum(depth - grow, 0.0) / self.base_mm
+
+        sample = np.concatenate([np.linspace(0.0, length, 4001), np.geomspace(1e-6 * length, length, 2000)])
+        sample = np.unique(sample)
+        total = count(start + sample) - count(np.array(start))
+        if longest is not None:
+            density = np.maximum(np.gradient(total, sample), 1.0 / longest(sample))
+            total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(sample))])
+        n = max(2, int(round(total[-1])))
+        depth: Float = np.interp(np.linspace(0.0, total[-1], n + 1), total, sample)
+        depth[-1] = length
+        return depth
+
+    def at(self, points: Float, section: Section) -> Float:
+        """Edge length (n,) at points (n, 2): the contact size, growing with the distance from the zone."""
+        x = np.clip(points[:, 0], self.low, self.high)
+        reach = np.hypot(points[:, 0] - x, points[:, 1] - section.contact.height(x))
+        size: Float = np.minimum(self.base_mm, self.size_mm + STRUCTURED_GROWTH * reach)
+        return size if self.grading is None else np.minimum(size, self.grading.at(points, STRUCTURED_GROWTH))
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Two neighbouring rows of nodes, numbers and parameters of each, between which the cells belong to one part."""
+
+    upper: Int
+    lower: Int
+    at_upper: Float
+    at_lower: Float
+    part: int
+
+
+@dataclass(frozen=True)
+class GridLayout:
+    """Points on rows.
+
+    Attributes
+    ----------
+    points : (n, 2) mm
+    strips : pairs of rows
+    facets : label -> (k, 2) edges of the boundary, outward
+    curves : a curve, and its parameter (n,) at every point, nan away from it; for the contact curve and curved borders
+    """
+
+    points: Float
+    strips: tuple[Strip, ...]
+    facets: Mapping[str, Int]
+    curves: tuple[tuple[Arc | Flat, Float], ...]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Linear triangles of a half section.
+
+    Attributes
+    ----------
+    points : (n, 2) mm
+    cells : (m, 3) counter-clockwise
+    facets : label -> (k, 2) edges, outward
+    curves : see :class:`GridLayout`
+    part : (m,) number of the part of each triangle
+    """
+
+    points: Float
+    cells: Int
+    facets: Mapping[str, Int]
+    curves: tuple[tuple[Arc | Flat, Float], ...]
+    part: Int
+
+
+def folded_zone(zone: tuple[float, float, float, float], half_length: float) -> tuple[float, float]:
+    """Range of abs(x) that a zone covers, clipped to the section."""
+    lo, hi = zone[0], zone[1]
+    near = 0.0 if lo <= 0.0 <= hi else min(abs(lo), abs(hi))
+    far = max(abs(lo), abs(hi))
+    return min(near, half_length), min(far, half_length)
+
+
+def _spread(u: Float, points: Float, size: Float, least: int) -> Float:
+    """Return the parameters of points on a row sampled at `u`, one edge length of the size field apart."""
+    step = np.hypot(*np.diff(points, axis=0).T)
+    total = np.concatenate([[0.0], np.cumsum(step * 0.5 * (1.0 / size[1:] + 1.0 / size[:-1]))])
+    n = max(least, int(round(total[-1])))
+    params = np.interp(np.linspace(0.0, total[-1], n + 1), total, u)
+    params[[0, -1]] = u[[0, -1]]
+    return params
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A row in a band: its level, and the largest edge length (n,), mm, that its distance from other rows allows."""
+
+    band: Band
+    level: float
+    longest: Float
+
+
+@dataclass(frozen=True)
+class GridRow:
+    """Numbers and parameters of the nodes on a row, each (n,), and the points (n, 2), mm."""
+
+    nodes: Int
+    u: Float
+    points: Float
+
+    def part(self, low: float, high: float) -> tuple[Int, Float]:
+        """Nodes and parameters from `low` to `high`."""
+        inside = (low <= self.u) & (self.u <= high)
+        return self.nodes[inside], self.u[inside]
+
+
+def rows(section: Section, sizes: Sizes) -> GridLayout:
+    """Lay out the rows and the points on them."""
+    division = bands(section)
+    sizes = _with_thin_places(section, sizes)
+    u = _samples(section, sizes, division)
+    places: list[list[_Place]] = []
+    start = 0.0
+    for band in division.bands:
+        u_band = u[u <= band.end]
+        length = _middle(section, sizes, division, band)
+        longest = _longest(sizes, band, u_band, length) if sizes.grading else None
+        depth = sizes.steps(length, longest, start)
+        scales = 1.0 - depth / length
+        scales[-1] = 0.0
+        gaps = np.diff(depth)
+        gap = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
+        travel = band.travel(u_band)
+        new = [[_Place(band, float(s), _ASPECT * g * travel / length)] for s, g in zip(scales, gap, strict=True)]
+        if places:
+            places[-1] += new.pop(0)
+        places += new
+        start += length
+    laid = []
+    count = 0
+    for k, row_places in enumerate(places):
+        params = _on_row(section, sizes, u, row_places, first=k == 0)
+        points = row_places[-1].band.points(params, row_places[-1].level)
+        laid.append(GridRow(count + np.arange(len(params)), params, points))
+        count += len(params)
+    return _joined(section, sizes, division, places, laid)
+
+
+def _with_thin_places(section: Section, sizes: Sizes) -> Sizes:
+    """Return the sizes with edge lengths that follow from the thickness of the parts."""
+    points, wanted = thin_places(section)
+    few = wanted < sizes.at(points[:, :2], section)
+    if not few.any():
+        return sizes
+    present = sizes.grading or Grading(np.zeros((0, 3)), np.zeros(0))
+    return replace(
+        sizes,
+        grading=Grading(np.vstack([present.points, points[few]]), np.concatenate([present.sizes, wanted[few]])),
+    )
+
+
+def _samples(section: Section, sizes: Sizes, division: Bands) -> Float:
+    """Return parameters at which curves are sampled, with those of corners and borders."""
+    samples = int(np.clip(4.0 * section.contact.length_mm / sizes.size_mm, 400, 20_000))
+    u = np.linspace(0.0, 1.0, samples + 1)
+    if division.bands[-1].end > 1.0:
+        u = np.concatenate([u, np.linspace(1.0, 2.0, samples // 4 + 2)[1:]])
+    breaks = [b for band in division.bands for b in (*band.borders, band.corner) if b is not None]
+    return np.union1d(u, breaks) if breaks else u
+
+
+def _middle(section: Section, sizes: Sizes, division: Bands, band: Band) -> float:
+    """Return the distance of a band's curves below the middle of the contact zone, mm."""
+    x = 0.5 * (sizes.low + sizes.high) if sizes.low > 0.0 else 0.0
+    if len(division.bands) == 1 and division.core is None:
+        middle = section.contact.at(np.zeros(1))[0]
+        if x > 0.0:
+            middle = np.array([x, float(section.contact.height(np.array(x)))])
+        return float(middle[1]) if division.walled else float(np.hypot(*middle))
+    return float(band.travel(section.contact.fraction(np.array([x])))[0])
+
+
+def _on_row(section: Section, sizes: Sizes, u: Float, row_places: list[_Place], first: bool) -> Float:
+    """Return the parameters of the points on a row."""
+    last = row_places[-1]
+    band = last.band
+    if last.level == 0.0 and band.shrinks:
+        return np.zeros(1)
+    u = u[u <= band.end]
+    points = band.points(u, last.level)
+    size = sizes.at(points, section)
+    for place in row_places:
+        reach = len(place.longest)
+        size[:reach] = np.minimum(size[:reach], place.longest)
+    breaks = sorted({b for place in row_places for b in place.band.borders})
+    breaks += [place.band.corner for place in row_places if place.level == 0.0 and place.band.corner is not None]
+    breaks = sorted(set(breaks))
+    if not breaks and u[-1] > 1.0:
+        corner = int(np.searchsorted(u, 1.0))
+        below = _spread(u[corner:], points[corner:], size[corner:], 1 if first or len(row_places) > 1 else 0)
+        if len(below) > 1:
+            above = _spread(u[: corner + 1], points[: corner + 1], size[: corner + 1], 1)
+            return np.concatenate([above, below[1:]])
+    if not breaks:
+        return _spread(u, points, size, 2 if first else 1)
+    pieces = []
+    for low, high in ranges(breaks, float(u[-1])):
+        inside = (low <= u) & (u <= high)
+        pieces.append(_spread(u[inside], points[inside], size[inside], 1))
+    return np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
+
+
+def _longest(sizes: Sizes, band: Band, u: Float, length: float) -> Callable[[Float], Float]:
+    """Return a function of depths (n,) mm: the largest distance of rows (n,) mm that prescribed edge lengths allow."""
+    grading = sizes.grading
+    assert grading is not None
+    places = u[np.linspace(0, len(u) - 1, _PLACES).astype(int)]
+    travel = band.travel(places)
+    stations = np.linspace(0.0, length, _STATIONS)
+    points = np.vstack([band.points(places, level) for level in 1.0 - stations / length])
+    size = grading.at(points, STRUCTURED_GROWTH).reshape(_STATIONS, _PLACES)
+    least = (size * length / np.maximum(travel, 1e-3 * length)).min(axis=1)
+    return lambda depth: np.interp(depth, stations, least)
+
+
+def _joined(
+    section: Section, sizes: Sizes, division: Bands, places: list[list[_Place]], laid: list[GridRow]
+) -> GridLayout:
+    """Return the strips between the rows, the boundary, and the curves."""
+    strips: list[Strip] = []
+    ends: dict[str, list[int]] = {}
+    for row_places, upper, lower in zip(places, laid[:-1], laid[1:], strict=False):
+        band = row_places[-1].band
+        for low, high, part in band.parts:
+            (a, ua), (b, ub) = upper.part(low, high), lower.part(low, high)
+            strips.append(Strip(a, b, ua, ub, part))
+        ends.setdefault(band.right, [int(strips[-1].upper[-1])]).append(int(strips[-1].lower[-1]))
+    right = {label: np.array(nodes) for label, nodes in ends.items()}
+    side = laid[-1]
+    if division.core:
+        core, part = division.core
+        filling = _core_rows(section, sizes, core, side)
+        strips += [Strip(a.nodes, b.nodes, a.u, b.u, part) for a, b in pairwise(filling)]
+        laid = [*laid, *filling[1:]]
+    points = np.full((int(max(row.nodes.max() for row in laid)) + 1, 2), np.nan)
+    for row in laid:
+        points[row.nodes] = row.points
+    first = np.array([row.nodes[0] for row in laid])
+    points[first, 0] = 0.0
+    for label, nodes in right.items():
+        axis, value = (0, section.half_length_mm) if label == "walls" else (1, 0.0)
+        points[nodes, axis] = value
+    bottom = laid[-1].nodes
+    if division.walled or division.core:
+        points[bottom, 1] = 0.0
+    facets = {
+        "contact": _edges(laid[0].part(0.0, 1.0)[0])[:, ::-1],
+        "symmetry_x": _edges(first),
+        "base": np.vstack(
+            [_edges(bottom), *(_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "base")]
+        ),
+        "walls": np.vstack(
+            [_edges(nodes)[:, ::-1] for label, nodes in right.items() if label == "walls"] or [_NO_EDGES]
+        ),
+    }
+    borders = [(section, laid[0])]
+    if section.layer:
+        borders.append((section.inner, laid[next(k for k, row_places in enumerate(places) if len(row_places) > 1)]))
+    curves = []
+    for owner, row in borders:
+        beyond = row.part(1.0, 2.0)[0]
+        facets["walls"] = np.vstack([facets["walls"], _edges(beyond)[:, ::-1]])
+        nodes, u = row.part(0.0, 1.0)
+        param = np.full(len(points), np.nan)
+        param[nodes] = u
+        curves.append((owner.contact, param))
+    return GridLayout(points, tuple(strips), facets, tuple(curves))
+
+
+_NO_EDGES = np.zeros((0, 2), dtype=np.int64)
+
+
+def _edges(nodes: Int) -> Int:
+    """Edges (n - 1, 2) of a chain of nodes (n,)."""
+    return np.stack([nodes[:-1], nodes[1:]], axis=1)
+
+
+def _core_rows(section: Section, sizes: Sizes, core: Core, around: GridRow) -> list[GridRow]:
+    """Return the rows of a core, from the one on its upper side to the base, with the nodes on its vertical side."""
+    x, y = around.points.T
+    on_top, beside = y == core.height_mm, x == core.half_length_mm
+    side, heights = around.nodes[beside], y[beside]
+    core_rows = [GridRow(around.nodes[on_top], x[on_top] / core.half_length_mm, around.points[on_top])]
+    count = int(around.nodes[-1]) + 1
+    u = np.linspace(0.0, 1.0, _STATIONS + 1)
+    for k in range(1, len(side)):
+        gap = np.abs(np.diff(heights[max(0, k - 1) : k + 2])).min()
+        points = np.stack([core.half_length_mm * u, np.full_like(u, heights[k])], axis=1)
+        params = _spread(u, points, np.minimum(sizes.at(points, section), _ASPECT * gap), 1)
+        nodes = np.append(count + np.arange(len(params) - 1), side[k])
+        count += len(params) - 1
+        points = np.stack([core.half_length_mm * params, np.full_like(params, heights[k])], axis=1)
+        core_rows.append(GridRow(nodes, params, points))
+    return core_rows
+
+
+def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
+    """Return the triangles between two rows of nodes, in the order of the middles of their edges."""
+    mid_upper = 0.5 * (at_upper[1:] + at_upper[:-1])
+    mid_lower = 0.5 * (at_lower[1:] + at_lower[:-1])
+    below = np.searchsorted(mid_lower, mid_upper, side="left")
+    above = np.searchsorted(mid_upper, mid_lower, side="right")
+    down = np.stack([upper[:-1], lower[below], upper[1:]], axis=1)
+    up = np.stack([lower[:-1], lower[1:], upper[above]], axis=1)
+    return np.vstack([down, up])
+
+
+def triangulate(layout: GridLayout) -> Grid:
+    """Turn rows into triangles with labelled edges."""
+    cells = [_zip(s.upper, s.lower, s.at_upper, s.at_lower) for s in layout.strips]
+    part = np.repeat([s.part for s in layout.strips], [len(c) for c in cells])
+    return Grid(layout.points, np.vstack(cells), layout.facets, layout.curves, part)

@@ -1,0 +1,1 @@
+"""Unstructured meshes of solids by fTetWild and netgen."""

@@ -1,0 +1,100 @@
+"""Contact of a deformed surface: rows and second derivatives against finite differences, in 2D and 3D."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
+from finger3d.fem.surface.traces import BoundarySurface, surface
+from tests.meshes import grid
+
+
+def made(d: int) -> tuple[Mesh, BoundarySurface, np.ndarray]:
+    mesh = quadratic(grid((2,) * d))
+    return mesh, surface(mesh, "y+"), np.random.default_rng(d).normal(0.0, 0.05, mesh.points.shape)
+
+
+def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray) -> DeformedContact:
+    """With a tilted plane, whose normal does not turn."""
+    normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
+    normal = normal / np.linalg.norm(normal)
+    at = face.samples + face.interpolate @ u
+    return deformed_contact(
+        face,
+        points=mesh.points,
+        displacement=u,
+        gap=at @ normal + 1.2,
+        normal=np.broadcast_to(normal, at.shape),
+        axes=(),
+    )
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_rows_are_the_derivative_of_the_gap(d: int) -> None:
+    mesh, face, u = made(d)
+    way = np.random.default_rng(7).normal(size=u.shape)
+    h = 1e-6
+    slope = (contact(mesh, face, u + h * way).gap - contact(mesh, face, u - h * way).gap) / (2 * h)
+    rows = contact(mesh, face, u).rows[::d]
+    assert rows @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_softening_is_the_derivative_of_the_rows(d: int) -> None:
+    mesh, face, u = made(d)
+    random = np.random.default_rng(8)
+    way, force = random.normal(size=u.shape), random.uniform(0.0, 2.0, len(face.nodes))
+    h = 1e-6
+    ends = [contact(mesh, face, u + s * h * way).rows[::d].T @ force for s in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / (2 * h)
+    second = contact(mesh, face, u).geometric_stiffness(force)
+    assert abs(second - second.T).max() <= 1e-12 * abs(second).max()
+    assert second @ way.ravel() == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_displacements_and_nodal_forces_are_the_rows_and_their_transpose(d: int) -> None:
+    mesh, face, u = made(d)
+    random, at = np.random.default_rng(9), contact(mesh, face, u)
+    way, force = random.normal(size=u.shape), random.normal(size=(len(face.nodes), d))
+    assert at.displacements(way).ravel() == pytest.approx(at.rows @ way.ravel(), rel=1e-12, abs=1e-13)
+    assert at.nodal_forces(force).ravel() == pytest.approx(at.rows.T @ force.ravel(), rel=1e-12, abs=1e-13)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_curvature_of_the_object_is_part_of_the_derivative(d: int) -> None:
+    mesh, face, u = made(d)
+    centre, radius = np.array([0.4, 3.0, 0.6])[:d], 2.0
+    random = np.random.default_rng(8)
+    way, force = random.normal(size=u.shape), random.uniform(0.0, 2.0, len(face.nodes))
+
+    def ball(u: np.ndarray) -> DeformedContact:
+        away = face.samples + face.interpolate @ u - centre
+        distance = np.linalg.norm(away, axis=1)
+        return deformed_contact(
+            face,
+            points=mesh.points,
+            displacement=u,
+            gap=distance - radius,
+            normal=away / distance[:, None],
+            axes=(),
+        )
+
+    here, h = ball(u), 1e-6
+    distance = here.samples_gap + radius
+    normal = here.samples_normal
+    curvature = (np.eye(d) - normal[:, :, None] * normal[:, None, :]) / distance[:, None, None]
+    ends = [ball(u + s * h * way).rows[::d].T @ force for s in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / (2 * h)
+    second = here.geometric_stiffness(force, curvature)
+    assert second @ way.ravel() == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(slope).max())
+
+
+def test_at_rest_rows_are_the_weighted_means() -> None:
+    mesh, face, _ = made(3)
+    u = np.zeros_like(mesh.points)
+    at = contact(mesh, face, u)
+    assert at.area.ratio == pytest.approx(1.0, rel=1e-14)
+    assert np.abs(np.asarray(at.rows[:, ::3].sum(axis=1))[0::3] - at.bases[:, 0, :1]).max() < 1e-12

@@ -1,0 +1,288 @@
+"""Contact points too far apart for the object: refused, or warned of, and how fine a mesh resolves it."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d.cli import main
+from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.errors import UnresolvedError
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.resolution import (
+    UnresolvedOverlap,
+    landmarks_of,
+    unresolved_overlap,
+    warnings_before_meshing,
+)
+from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.penetration import check_surface, penetration_warnings
+from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
+from tests.bodies import ball, box, write_stl
+from tests.scenes import FIG9 as FINGER
+
+FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+SCENE = (
+    FINGER
+    + """
+[material]
+E_MPa = 1.0
+nu = 0.45
+[object]
+shape = "sphere"
+radius_mm = 0.5
+[press]
+depth_mm = 5.0
+steps = 2
+[model]
+domain = "plane-strain"
+[mesh]
+size_mm = 4.0
+base_size_mm = 8.0
+[[gauge]]
+name = "g"
+x_mm = 10.0
+y_mm = 30.0
+"""
+)
+
+
+def fig9(obj: RigidObject, depth: float, size: float, **changes: object) -> Model:
+    model = Model(
+        FIG9, Isotropic(1.0, 0.45), MeshOptions(size, 8.0, "swept"), (Leg(depth, steps=2),), object=obj,
+        friction=Coulomb(0.25), domain="plane-strain",
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def overlap_of(problem: Problem) -> UnresolvedOverlap:
+    landmarks = landmarks_of(problem.model, problem.system.first_contact_mm, problem.system.place_mm)
+    return unresolved_overlap(problem.model, problem.surface, problem.system.first_contact_mm, landmarks, problem.axes)
+
+
+@pytest.mark.parametrize(
+    ("obj", "depth", "size"),
+    [
+        (Sphere(radius_mm=0.5), 5.0, 4.0),
+        (Cylinder(40.0, radius_mm=0.5), 3.0, 4.0),
+        (Plane(), 0.01, 4.0),
+        (Cylinder(radius_mm=1.0), 2.0, 8.0),
+    ],
+    ids=["ball", "beside the apex", "shallow", "cylinder"],
+)
+@pytest.mark.parametrize("finite", [False, True])
+def test_what_touches_no_point_is_refused_with_the_size_that_resolves_it(
+    obj: RigidObject, depth: float, size: float, finite: bool
+) -> None:
+    model = fig9(obj, depth, size)
+    with pytest.raises(UnresolvedError) as refused:
+        build(Effect().apply(model) if finite else model)
+    finer = refused.value.size_mm
+    assert finer is not None
+    assert f"mesh.size_mm = {finer:g}" in str(refused.value)
+    resolved = fig9(obj, depth, finer)
+    problem = build(resolved)
+    assert overlap_of(problem).ratio <= 0.1
+    *_, end = march(problem)
+    assert end.outcome.ok
+    assert measure(problem.points, end)["normal_force_N"] > 0.0
+
+
+@pytest.mark.parametrize("obj", [Wedge(angle=math.radians(89.99)), Wave(wavelength_mm=20.0, amplitude_mm=1e6)])
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_needles_are_refused(obj: RigidObject, domain: str) -> None:
+    with pytest.raises(UnresolvedError) as refused:
+        build(fig9(obj, 5.0, 4.0, domain=domain))
+    # the overlap is 5 mm deep and as wide as 2 * 5 / tan(angle), or 2 sqrt(5 * 2 / curvature): a few edges at most
+    width = 10.0 / math.tan(math.radians(89.99)) if isinstance(obj, Wedge) else 2.0 * math.sqrt(10.0 / 1e5)
+    assert refused.value.size_mm is not None
+    assert 0.02 * width < refused.value.size_mm < width
+
+
+def test_a_point_beside_a_blunt_bump_does_not_hide_a_needle(tmp_path: Path) -> None:
+    bump, needle = box(30.0, 2.0, 40.0, (0.0, 1.0, 0.0)), box(0.2, 2.0, 0.2, (9.1, 0.5, 5.1))
+    both = replace(
+        bump, points=np.vstack([bump.points, needle.points]), faces=np.vstack([bump.faces, needle.faces + 8])
+    )
+    block = designs()["block"](half_length_mm=20.0, height_mm=10.0, width_mm=20.0)
+    model = fig9(MeshObject(surface=both), 0.7, 2.0, design=block, domain="solid")
+    with pytest.raises(UnresolvedError) as refused:  # it is 0.5 mm below the bump, so 0.5 of 0.7 mm are not seen
+        build(replace(model, mesh=MeshOptions(2.0, 5.0, "swept")))
+    assert refused.value.size_mm is not None
+    assert 0.02 < refused.value.size_mm < 0.2
+
+
+@pytest.mark.parametrize(
+    ("obj", "depth", "size"),
+    [
+        (Plane(), 10.0, 4.0),
+        (Plane(tilt=0.3), 5.0, 2.0),
+        (Sphere(radius_mm=20.0), 5.0, 2.0),
+        (Wedge(angle=0.5), 5.0, 2.0),
+        (Wave(wavelength_mm=20.0, amplitude_mm=1.0), 5.0, 2.0),
+        (MeshObject(surface=ball(20.0)), 5.0, 2.0),
+        (MeshObject(surface=box(10.0, 5.0, 40.0)), 3.0, 2.0),
+    ],
+)
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_what_points_see_well_is_neither_refused_nor_warned_of(
+    obj: RigidObject, depth: float, size: float, domain: str
+) -> None:
+    model = fig9(obj, depth, size, domain=domain, legs=(Leg(depth, steps=2), Leg(0.5 * depth, steps=1)))
+    assert overlap_of(build(model)).ratio < 0.1
+    assert not warnings_before_meshing(model, symmetry(model))
+
+
+def test_a_flank_that_touches_the_wall_is_resolved_by_points_of_the_wall() -> None:
+    """The plane is all but parallel to the wall: it comes 0.09 mm closer to it as it goes down 5 mm."""
+    problem = build(fig9(Plane(tilt=math.radians(89.0)), 5.0, 1.0))
+    *_, end = march(problem)
+    assert end.outcome.ok
+    walls = problem.points.face == 1
+    assert (end.state.status[walls] != OPEN).any()
+    force = problem.world_force(end.meshed_state.contact)
+    pushed, down = np.abs(force[:, :2].sum(axis=0))
+    assert math.atan2(down, pushed) == pytest.approx(math.radians(1.0) + math.atan(0.25), abs=0.01)  # it slides down
+
+
+def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
+    # a parabola of curvature 1/R, as the finger has one of 100 mm and a level plane none: its mean over a hat of
+    # spacing h is h^2 / 12 R higher than its lowest point at the vertex, and nothing is deeper in between
+    for size in (4.0, 2.0, 1.0):
+        problem = build(fig9(Plane(), 0.5, size))
+        spacing = np.diff(np.sort(problem.surface.points[:, 0]))[0]
+        found = overlap_of(problem)
+        assert found.depth_mm == pytest.approx(spacing**2 / (12.0 * 100.0), rel=0.02)
+        assert found.ratio == found.depth_mm / 0.5
+
+
+@pytest.mark.parametrize(
+    ("obj", "lengths"),
+    [
+        (Wave(wavelength_mm=1e-6, amplitude_mm=0.1), ("1e-06", "2.5e-07")),
+        (Wave(wavelength_mm=1.5, amplitude_mm=0.01), ("1.5", "0.37")),
+        (Cylinder(radius_mm=0.9), ("0.9", "0.45")),
+        (Wedge(angle=0.5, tip_radius_mm=0.2), ("0.2", "0.1")),
+    ],
+)
+def test_details_that_points_cannot_see_are_warned_of(obj: RigidObject, lengths: tuple[str, str]) -> None:
+    told = warnings_before_meshing(fig9(obj, 5.0, 0.5), ())
+    assert len(told) == 1
+    assert all(re.search(rf"\b{re.escape(length)}\b", told[0]) for length in lengths)
+    assert not warnings_before_meshing(replace(fig9(obj, 5.0, 0.5), mesh=MeshOptions(float(lengths[1]), 8.0)), ("x",))
+
+
+def written(tmp_path: Path, text: str = SCENE) -> str:
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["press"], ["compare"], ["calibrate", "--gauge", "g"], ["sweep", "--vary", "friction.mu=0.1,0.2"],
+        ["optimise", "--free", "gauge.g.x_mm=10:30"],
+    ],
+    ids=lambda c: c[0],
+)  # fmt: skip
+def test_no_command_gives_numbers(tmp_path: Path, command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code = main([command[0], written(tmp_path), "--out", str(tmp_path / "out"), *command[1:]])
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert code == (2 if command[0] == "optimise" else 3)
+    assert "mesh.size_mm = 4" in last
+    assert "mesh.size_mm = 0.25" in last
+
+
+def test_a_sweep_refuses_the_depth_that_its_body_does_not_resolve(tmp_path: Path) -> None:
+    command = ["sweep", written(tmp_path), "--set", 'object={shape="plane"}', "--vary", "press.depth_mm=0.01,5"]
+    assert main([*command, "--out", str(tmp_path / "out")]) == 3
+    rows = (tmp_path / "out" / "results.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert ["converged" in row for row in rows] == [False, True]
+
+
+def test_a_condensed_body_refuses_a_path_that_its_points_do_not_see(tmp_path: Path) -> None:
+    from finger3d.analyses.reduced import ReducedModel
+
+    body = ReducedModel.of(build(fig9(Plane(), 5.0, 4.0)))
+    assert body.press(legs=[Leg(2.0, steps=1)]).outcome.ok
+    with pytest.raises(UnresolvedError):
+        body.press(legs=[Leg(0.01, steps=1)])
+
+
+def test_a_tolerance_begins_with_a_mesh_that_resolves_the_object() -> None:
+    from finger3d.accuracy.refine import refine_mesh
+
+    found = refine_mesh(fig9(Sphere(radius_mm=4.0), 0.3, 4.0), 0.9)
+    assert found.rounds[0].size_mm < 4.0
+    assert found.met
+
+
+def test_a_companion_that_does_not_see_the_object_is_none() -> None:
+    from finger3d.accuracy.companions import companion
+
+    problem = build(fig9(Plane(), 0.1, 4.0))
+    assert companion(problem).model.mesh.size_mm < 4.0
+
+
+def test_increments_without_contact_are_told(tmp_path: Path) -> None:
+    command = ["press", written(tmp_path), "--set", 'object={shape="plane"}', "--out", str(tmp_path / "out")]
+    many = ["--set", "press.depth_mm=0.5", "--set", "press.steps=100", "--no-figures", "--no-error"]
+    assert main([*command, *many]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    missed = sum(s["contact_area_mm2"] == 0.0 for s in summary["steps"])
+    assert missed > 0
+    assert any(text.startswith(f"{missed} of 100 ") for text in summary["warnings"])
+
+
+@pytest.mark.parametrize("finite", [False, True])
+def test_the_end_of_a_press_tells_how_deep_the_object_is_between_the_points(finite: bool) -> None:
+    cases = [(Wave(wavelength_mm=4.0, amplitude_mm=1.0), 3.0, 2.0), (Sphere(radius_mm=5.0), 2.0, 1.0)]
+    shares = []
+    for obj, depth, size in cases:
+        model = fig9(obj, depth, size, legs=(Leg(depth, steps=4),))
+        problem = build(Effect().apply(model) if finite else model)
+        *_, end = march(problem)
+        checks = check_surface(problem, [end])
+        shares.append(checks[0].penetration_mm / depth)
+        # what is hidden at rest, measured vertically, foretells the distance
+        assert shares[-1] == pytest.approx(overlap_of(problem).ratio, abs=0.08)
+        assert len(penetration_warnings(problem, checks)) == (shares[-1] > 0.1)
+    assert shares[0] > 0.1 > shares[1]
+
+
+def test_an_edge_that_cuts_between_points_which_moved_is_told() -> None:
+    # at rest the points see the flat box; at finite strain the surface slides by some of the box's length, and its
+    # edge comes to lie between them
+    model = fig9(MeshObject(surface=box(10.0, 5.0, 40.0)), 4.0, 2.5, legs=(Leg(4.0, steps=5),))
+    problem = build(Effect().apply(model))
+    *_, end = march(problem)
+    assert overlap_of(problem).ratio < 0.01
+    assert len(penetration_warnings(problem, check_surface(problem, [end]))) == 1
+
+
+def test_an_object_that_slides_off_is_no_mistake() -> None:
+    legs = (Leg(1.0, steps=1), Leg(1.0, slide_x_mm=60.0, steps=12))
+    problem = build(fig9(Sphere(radius_mm=20.0), 1.0, 2.0, legs=legs))
+    *_, end = march(problem)
+    assert end.outcome.ok
+    assert (end.state.status == OPEN).all()
+
+
+def test_triangles_of_a_body_from_a_file_are_seen(tmp_path: Path) -> None:
+    write_stl(tmp_path / "ball.stl", ball(0.5))
+    text = SCENE.replace('shape = "sphere"\nradius_mm = 0.5', 'shape = "mesh"\npath = "ball.stl"')
+    assert main(["press", written(tmp_path, text), "--out", str(tmp_path / "out")]) == 3

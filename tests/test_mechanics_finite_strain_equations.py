@@ -1,0 +1,66 @@
+"""Equations of an increment at finite strain: balanced where the increment has been solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.tensors import InvertedError
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.finite_strain.formulation import FiniteStrain
+from finger3d.mechanics.finite_strain.increment import FiniteIncrement
+from finger3d.mechanics.finite_strain.state import DeformedBody
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.results.state import State
+from finger3d.objects import Move
+from tests.models import half_cylinder
+
+
+@pytest.fixture(scope="module")
+def solved() -> tuple[FiniteIncrement, State[DeformedBody]]:
+    problem = build(LargeDeformation().apply(half_cylinder(1.0)))
+    formulation = formulation_of(problem.model)
+    assert isinstance(formulation, FiniteStrain)
+    rest, pose = formulation.start(problem), targets(problem.model.legs)[0]
+    increment = formulation._increment(problem, rest, Move(problem.origin, pose), formulation.workspace())
+    state = increment.solve(None).state
+    return increment, state
+
+
+def test_a_solution_is_in_balance_and_a_displaced_one_is_not(
+    solved: tuple[FiniteIncrement, State[DeformedBody]],
+) -> None:
+    increment, state = solved
+    force = np.abs(state.contact.force).max()
+    free = np.setdiff1d(np.arange(len(state.body.unknowns)), increment.problem.body.fixed_dofs)
+    at_rest, displaced = (
+        np.abs(increment.out_of_balance(increment.at(share * state.body.unknowns), state.contact.force)[free]).max()
+        for share in (1.0, 1.001)
+    )
+    assert at_rest < 1e-7 * force
+    assert displaced > 1e-4 * force
+
+
+def test_the_tangent_is_the_derivative_of_the_forces_out_of_balance(
+    solved: tuple[FiniteIncrement, State[DeformedBody]],
+) -> None:
+    """One chord step from nearby leads back to the solution, up to the square of the distance."""
+    increment, state = solved
+    now = increment.at(1.001 * state.body.unknowns)
+    linearisation = increment.linearise(now, state.contact.force)
+    out = increment.out_of_balance(now, state.contact.force)
+    eliminated = linearisation.condensation.eliminated(-out)
+    found, change = increment.contact(now, state.contact.force, linearisation, eliminated.displacement)
+    assert found.outcome.ok
+    assert change is not None
+    after = increment.moved(now, eliminated.unknowns(change))
+    size = np.abs(state.body.unknowns).max()
+    assert np.abs(after.x - state.body.unknowns).max() < 0.02 * 0.001 * size
+
+
+def test_an_inverted_cell_is_an_error(solved: tuple[FiniteIncrement, State[DeformedBody]]) -> None:
+    increment, state = solved
+    with pytest.raises(InvertedError):
+        increment.at(np.random.default_rng(0).normal(size=len(state.body.unknowns)))

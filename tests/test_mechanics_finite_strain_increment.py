@@ -1,0 +1,86 @@
+"""One increment at finite strain: convergence, and states that are refused."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.fem.laws import NeoHooke
+from finger3d.fem.mesh.quality import most_distorted
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings
+from finger3d.mechanics.finite_strain.formulation import FiniteStrain
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.results.history import measure
+from tests.models import large_fig9
+
+
+@pytest.mark.parametrize("nu", [0.45, 0.5])
+def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
+    nu: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from finger3d.mechanics.finite_strain.formulation import increment as finite_increment
+
+    errors: list[float] = []
+    residual = finite_increment.FiniteIncrement.residual
+    monkeypatch.setattr(finite_increment, "_SLOW", 0.0)
+    monkeypatch.setattr(
+        finite_increment.FiniteIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1]
+    )
+    problem = build(large_fig9(nu, legs=(Leg(10.0, steps=5),)))
+    workspace = formulation_of(problem.model).workspace()
+    frames = list(march(problem, workspace=workspace))
+    assert all(f.outcome.ok for f in frames)
+    assert workspace.factorizations <= 5 * len(frames)
+    # once all sets are found an error is followed by its square, times a constant of the mesh, down to round-off
+    pairs = [(a, b) for a, b in zip(errors[:-1], errors[1:], strict=True) if 1e-6 < a < 1e-3 and b < a]
+    assert pairs
+    assert all(b < max(1e3 * a**2, 1e-12) for a, b in pairs)
+
+
+def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
+    """The strain at the bonded corner of the base grows without limit as the free surface folds over it.
+
+    The same press on edges twice as long, whose cells fold later, and the stress at every node bound what it does to
+    the results.
+    """
+    design = designs()["half_cylinder"](radius_mm=10.0, width_mm=10.0)
+    forces = []
+    for edge in (0.65, 1.3):
+        mesh, leg = MeshOptions(edge, 2.0 * edge, "swept"), Leg(3.5, steps=5)
+        model = Model(design, Isotropic(1.0, 0.49), mesh, (leg,), friction=Coulomb(2.0), domain="plane-strain")
+        problem = build(Effect().apply(model))
+        frames = list(march(problem))
+        assert all(frame.outcome.ok for frame in frames)
+        forces.append(measure(problem.points, frames[-1])["normal_force_N"])
+        if edge == 1.3:
+            assert fold_warnings(problem, frames) == []
+            continue
+        (line,) = fold_warnings(problem, frames)
+        assert line.endswith("avoid it")
+        assert "most in step 5" in line
+        x, y = (float(part) for part in re.findall(r"[xy] = ([-\d.]+)", line)[:2])
+        assert abs(x) > 9.0
+        assert y < 1.0
+        assert fold_warnings(problem, frames[:3]) == []
+        state = frames[-1].meshed_state
+        unknowns = next(formulation_of(problem.model).unknowns(problem, [state]))
+        cell, ratio = most_distorted(problem.mesh, displacement(problem.mesh, unknowns))
+        assert ratio < 0.0
+        assert "folded over" in cause_of_failure(problem, displacement(problem.mesh, unknowns))
+        _, strain, stress = formulation_of(problem.model).fields(problem, state)
+        quadrature_points = FiniteStrain(NeoHooke(1.0))._body(problem).solid.slopes(unknowns)
+        assert np.linalg.det(quadrature_points + np.eye(2)).min() > 0.0
+        corners = problem.mesh.cells[cell]
+        assert np.isfinite(stress[corners]).all()
+        assert np.linalg.eigvalsh(2.0 * strain + np.eye(3)).min() > 0.0
+    assert forces[0] == pytest.approx(forces[1], rel=0.02)

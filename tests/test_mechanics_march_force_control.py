@@ -1,0 +1,220 @@
+"""Force control: the depth follows from the force, whatever the effects; forces out of reach are refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d.cli import main
+from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.effects.viscosity import Effect as Viscosity
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, at_depth_reached, forecast_depth
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.results.history import measure
+from finger3d.objects import Plane
+from finger3d.scene import load
+from tests.logs import Log
+from tests.models import block, fig9
+
+
+def ends(model: Model) -> list[dict[str, float]]:
+    problem = build(model)
+    steps = list(march(problem))
+    assert all(step.outcome.ok for step in steps)
+    return [measure(problem.points, step) for step in steps]
+
+
+def test_the_same_forces_are_reached_at_the_same_depths() -> None:
+    by_depth = ends(block(legs=(Leg(0.3, steps=3),)))
+    legs = tuple(Leg(0.3, steps=1, force_N=step["normal_force_N"]) for step in by_depth)
+    by_force = ends(block(legs=legs))
+    for a, b in zip(by_depth, by_force, strict=True):
+        assert b["depth_mm"] == pytest.approx(a["depth_mm"], rel=1e-8)
+        assert b["friction_sum_N"] == pytest.approx(a["friction_sum_N"], rel=1e-6)
+
+
+def test_increments_are_equal_in_force_on_the_way_up_and_down_and_constant_in_a_slide() -> None:
+    legs = (
+        Leg(0.2, steps=4, force_N=0.2),
+        Leg(0.2, slide_x_mm=0.3, steps=3, force_N=0.2),
+        Leg(0.1, slide_x_mm=0.3, steps=2, force_N=0.1),
+    )
+    forces = [step["normal_force_N"] for step in ends(block(legs=legs))]
+    assert forces == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.2, 0.2, 0.2, 0.15, 0.1], rel=1e-8)
+
+
+@pytest.mark.parametrize("effect", [LargeDeformation(), Viscosity(((0.4, 1.0),))], ids=["large", "viscous"])
+def test_a_force_is_reached_with_an_effect(effect: LargeDeformation | Viscosity) -> None:
+    legs = (Leg(0.2, steps=2, force_N=0.2, duration_s=1.0), Leg(0.2, steps=2, force_N=0.2, duration_s=3.0))
+    found = ends(effect.apply(block(legs=legs, domain="plane-strain")))
+    assert [step["normal_force_N"] for step in found] == pytest.approx([0.1, 0.2, 0.2, 0.2], rel=1e-6)
+    creeps = found[3]["depth_mm"] - found[1]["depth_mm"]
+    assert creeps > 0.01 if isinstance(effect, Viscosity) else abs(creeps) < 1e-6
+
+
+def test_a_force_beyond_the_height_ends_the_press_with_the_largest_that_was_found() -> None:
+    said = Log()
+    last = list(march(build(block(legs=(Leg(1.0, steps=1, force_N=1e6),))), report=said))[-1]
+    assert said.lines
+    assert all(line.startswith("1e+06 N wanted, ") for line in said.lines)
+    assert last.outcome is Outcome.FORCE_NOT_REACHED
+    assert "1e+06 N asked; the largest force is" in last.detail
+
+
+def search_of(
+    force: Callable[[float], float], wanted: float, start: float, failure: Outcome = Outcome.NEWTON
+) -> DepthSearch:
+    """A search in a function of the depth, mm; NaN stands for an increment that fails."""
+
+    def trial(depth: float, good: Sequence[Trial]) -> Trial:
+        value = force(depth)
+        outcome = failure if np.isnan(value) else Outcome.CONVERGED
+        return Trial(depth, ContactSolution(REST, outcome, 0.0, 1, "none"), value)
+
+    return DepthSearch(trial, wanted, start, 10.0)
+
+
+REST = ContactState.at_rest(np.zeros(1), 2)
+
+
+def test_the_depth_of_a_force_is_a_root() -> None:
+    for start, guess in ((0.0, 0.1), (2.0, 3.0), (0.0, 5.0)):
+        search = search_of(lambda depth: max(depth, 0.0) ** 1.5, 1.0, start)
+        assert search.run(guess).depth == pytest.approx(1.0, rel=1e-8)
+        assert len(search.good) <= 10
+
+
+def test_a_trial_that_fails_is_followed_by_one_nearer() -> None:
+    search = search_of(lambda depth: depth if depth < 2.0 else np.nan, 1.9, 0.0)
+    assert search.run(8.0).depth == pytest.approx(1.9, rel=1e-8)
+    assert search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0).run(8.0).solution.outcome is (
+        Outcome.NEWTON
+    )
+
+
+def test_where_the_papers_rule_has_no_answer_the_other_rule_is_named() -> None:
+    found = search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0, Outcome.CYCLED).run(8.0).solution
+    assert found.outcome is Outcome.FORCE_NOT_REACHED
+    assert found.detail.endswith("at 3 of the depths tried; use [contact] rule = 'projection'")
+
+
+def test_an_object_that_has_passed_through_does_not_hide_the_force() -> None:
+    for far in (0.0, -3.0):
+        search = search_of(lambda depth, far=far: depth if depth < 2.0 else far, 1.5, 0.0)  # type: ignore[misc]
+        assert search.run(6.0).depth == pytest.approx(1.5, rel=1e-8)
+
+
+def test_a_force_that_jumps_is_not_reached() -> None:
+    found = search_of(lambda depth: depth + (depth > 1.0), 1.5, 0.0).run(0.4)
+    assert found.solution.outcome is Outcome.FORCE_JUMPS
+    assert "1 N and 2 N on either side of 1 mm" in found.solution.detail
+
+
+def test_a_slide_that_loses_the_contact_says_so() -> None:
+    found = search_of(lambda depth: 0.0, 1.5, 0.0).run(0.4)
+    assert found.solution.outcome is Outcome.FORCE_NOT_REACHED
+    assert "does not touch" in found.solution.detail
+
+
+def test_a_turn_under_a_constant_force_lifts_the_object_above_first_touch() -> None:
+    legs = (Leg(0.2, steps=1, force_N=0.5), Leg(0.2, steps=2, force_N=0.5, turn_z=math.radians(10.0)))
+    found = ends(block(legs=legs, domain="plane-strain", object=Plane()))
+    assert [step["normal_force_N"] for step in found] == pytest.approx([0.5] * 3, rel=1e-6)
+    assert found[-1]["depth_mm"] < 0.0
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool) -> None:
+    model = replace(block(legs=(Leg(0.2, steps=1, force_N=5.0),), domain="plane-strain"), rule="paper")
+    model = LargeDeformation().apply(model) if large else model
+    last = list(march(build(model)))[-1]
+    assert not last.outcome.is_cycle
+    if last.outcome.ok:
+        assert measure(build(model).points, last)["normal_force_N"] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_a_force_at_large_deformation_takes_at_most_twice_the_factorisations_of_a_depth() -> None:
+    def factors(legs: tuple[Leg, ...]) -> tuple[int, float]:
+        problem = build(LargeDeformation().apply(block(legs=legs, domain="plane-strain")))
+        workspace = formulation_of(problem.model).workspace()
+        last = list(march(problem, workspace=workspace))[-1]
+        assert last.outcome.ok
+        return workspace.factorizations, measure(problem.points, last)["normal_force_N"]
+
+    by_depth, force = factors((Leg(1.0, steps=5),))
+    by_force, _ = factors((Leg(1.0, steps=5, force_N=force),))
+    assert by_force <= 2 * by_depth
+
+
+def test_a_forecast_is_good_to_a_factor_of_two() -> None:
+    model = fig9(domain="plane-strain")
+    found = ends(replace(model, legs=(Leg(5.0, steps=1),)))[0]
+    design, material = model.design, model.material.isotropic("a test")
+    forecast = forecast_depth(model.contact_path, material, found["normal_force_N"], design.height_mm, design.width_mm)
+    assert 2.5 < forecast < 10.0
+
+
+def test_a_forecast_that_was_too_small_is_replaced() -> None:
+    legs = (Leg(1.0, force_N=2.0), Leg(0.0))
+    assert at_depth_reached(legs, 1.05) is None
+    deeper = at_depth_reached(legs, 2.0)
+    assert deeper is not None
+    assert [leg.depth_mm for leg in deeper] == [2.0, 0.0]
+    assert at_depth_reached((Leg(1.0),), 2.0) is None
+
+
+SCENE = """
+[finger]
+geometry = "half_cylinder"
+radius_mm = 5.0
+width_mm = 2.0
+[material]
+E_MPa = 1.0
+nu = 0.3
+[press]
+force_N = 0.5
+steps = 2
+[model]
+domain = "plane-strain"
+"""
+
+
+def test_a_scene_gives_either_a_depth_or_a_force(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    scene = load(path)
+    assert scene.legs[0].force_N == 0.5
+    assert load_again(scene.to_toml(), tmp_path) == scene
+    with pytest.raises(Finger3dError, match="force_N"):
+        load(path, ["press.depth_mm=0.1"])
+    path.write_text(SCENE.replace("force_N = 0.5\n", ""))
+    with pytest.raises(Finger3dError, match="press.depth_mm .*force_N"):
+        load(path)
+
+
+def load_again(text: str, folder: Path) -> object:
+    (folder / "again.toml").write_text(text)
+    return load(folder / "again.toml")
+
+
+def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    assert main(["press", str(path), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]) == 0
+    assert "0.5 N" in capsys.readouterr().out
+    assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
+    error = capsys.readouterr().err
+    assert "5000 N asked; the largest force is" in error
+    summary = json.loads((tmp_path / "far" / "summary.json").read_text())
+    assert "prescribed force is not reached" in summary["outcome"]

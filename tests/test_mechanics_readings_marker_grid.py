@@ -1,0 +1,42 @@
+"""Markers on a grid of the contact face."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import MeshOptions
+from finger3d.mechanics.readings.marker_grid import MarkerGrid, marker_table
+from finger3d.mechanics.readings.reading import Marker
+from tests.models import block
+
+COARSE = MeshOptions(1.5, 1.5, "swept")
+
+
+@pytest.mark.parametrize("symmetry", [None, ()])
+def test_markers_cover_the_face_of_the_whole_finger_and_follow_a_field(symmetry: tuple[str, ...] | None) -> None:
+    problem = build(block(mesh=COARSE, symmetry=symmetry))
+    markers = MarkerGrid.of(problem, 1.0)
+    # the block is 8 mm by 4 mm and 3 mm high
+    assert {tuple(np.round(p, 9)) for p in markers.places} == {
+        (float(x), 3.0, float(z)) for x in range(-4, 5) for z in range(-2, 3)
+    }
+    slope = (
+        np.array([[0.2, 0.1, 0.0], [0.0, -0.1, 0.0], [0.0, 0.3, 0.05]]) if symmetry == () else np.diag([0.2, -0.1, 0.3])
+    )
+    assert markers.displacements(problem.mesh.points @ slope.T) == pytest.approx(markers.places @ slope.T, abs=1e-12)
+
+
+def test_the_table_has_every_marker_after_every_increment() -> None:
+    problem = build(block(mesh=COARSE, markers=(Marker("m", 1.0, 3.0, -1.0),)))
+    steps = list(march(problem))
+    table = marker_table(problem, steps, 2.0)
+    count = 1 + 5 * 3
+    assert [len(column) for column in table.values()] == [count * len(steps)] * len(table)
+    assert list(table["marker"][:2]) == ["m", "grid_1"]
+    assert table["depth_mm"][-1] == steps[-1].target.depth_mm
+    # the marker of the scene is read by its own rows
+    assert table["displacement_y_mm"][-count] == pytest.approx(steps[-1].markers["m"][1])
+    assert marker_table(problem, steps, None)["marker"] == ["m"] * len(steps)

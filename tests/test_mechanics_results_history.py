@@ -1,0 +1,104 @@
+"""Lengths and areas of zones, read from the contact points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.accuracy.point_resolution import least_bars
+from finger3d.contact.friction import OPEN, STICK, Coulomb
+from finger3d.contact.state import ContactState
+from finger3d.errors import Outcome
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
+from finger3d.objects import ObjectPose, Sphere
+
+
+def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
+    """A plane of points 1 mm apart, joined along x, along z and along one diagonal; z runs from `shift`."""
+    x, z = np.meshgrid(np.arange(nx, dtype=float), np.arange(nz, dtype=float) + shift)
+    number = np.arange(nx * nz).reshape(nz, nx)
+    pairs = [
+        (number[:, 1:], number[:, :-1]), (number[1:], number[:-1]), (number[1:, 1:], number[:-1, :-1])
+    ]  # fmt: skip
+    edges = np.vstack([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in pairs])
+    at = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+    return ContactPoints(
+        np.arange(x.size), np.zeros(x.size, dtype=np.int8), at, np.ones(x.size), np.eye(3)[[1, 0, 2]], 10.0, 0.75, edges
+    )
+
+
+def test_where_no_vertex_lies_on_the_line_its_edges_are_cut() -> None:
+    # rows at z = -0.25 and 0.75: edges along z meet z = 0 at x = 0..3, the diagonals a quarter of the way further
+    x, nearest = grid(4, 2, shift=-0.25).middle_line()
+    np.testing.assert_allclose(np.sort(x), [0.0, 0.25, 1.0, 1.25, 2.0, 2.25, 3.0], atol=1e-12)
+    assert set(nearest) <= {0, 1, 2, 3}  # the row at z = -0.25 is the nearer one
+
+
+def test_points_beside_the_line_do_not_count_to_it() -> None:
+    points = grid(4, 3, shift=-1.0)
+    x, nearest = points.middle_line()
+    np.testing.assert_array_equal(np.sort(x), np.arange(4.0))
+    assert (points.points[nearest, 2] == 0.0).all()
+
+
+@pytest.mark.parametrize(("rows", "resolved"), [(1, 0), (2, 0), (3, 27), (5, 45)])
+def test_a_zone_is_resolved_where_it_is_three_points_wide(rows: int, resolved: int) -> None:
+    points = grid(9, 9, shift=-4.0)
+    middle = 0.5 if rows == 2 else 0.0
+    zone = np.abs(points.points[:, 2] - middle) <= 0.5 * (rows - 1)
+    assert points.resolved(zone).sum() == resolved
+    # along x the zone ends where the points end, which is no rim
+    assert points.rim(zone).sum() == 9 * min(rows, 2)
+
+
+def test_a_length_does_not_depend_on_the_half_that_is_meshed() -> None:
+    block = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=8.0)
+    model = Model(
+        block, Isotropic(1.0, 0.4), MeshOptions(0.8, 2.0, "swept"), (Leg(0.3, steps=2),),
+        object=Sphere(radius_mm=6.0), friction=Coulomb(0.25),
+    )  # fmt: skip
+    lengths = []
+    for symmetry in (None, ()):
+        problem = build(replace(model, symmetry=symmetry))
+        frame = list(march(problem))[-1]
+        numbers, at = measure(problem.points, frame), problem.points.points
+        line = np.unique(at[at[:, 2] == 0.0, 0])
+        last = at[(frame.state.status != OPEN) & (at[:, 2] == 0.0), 0].max()
+        assert last < numbers["contact_half_length_mm"] < line[line > last].min()
+        lengths.append([numbers["contact_half_length_mm"], numbers["stick_half_length_mm"]])
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-9)
+
+
+def test_an_area_is_uncertain_by_three_eighths_of_a_spacing_all_round() -> None:
+    # a circle of radius 8 known to 3/8 of the spacing of 1 mm: its area is known to 6 pi
+    points = grid(31, 31, shift=-15.0)
+    touching = np.hypot(points.points[:, 0] - 15.0, points.points[:, 2]) <= 8.0
+    state = ContactState(
+        np.where(touching, STICK, OPEN), np.zeros((len(touching), 3)), np.zeros(len(touching)),
+        np.zeros((len(touching), 2)), np.zeros((len(touching), 2)),
+    )  # fmt: skip
+    frame = StepResult(
+        ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
+    )
+    bars = least_bars(points, frame, 1.0)
+    assert bars["contact_area_mm2"] == bars["stick_area_mm2"] == pytest.approx(6.0 * np.pi, rel=0.15)
+    # both ends lie one spacing before the next point of the line
+    assert bars["contact_half_length_mm"] == pytest.approx(0.2, rel=1e-12)
+    assert bars["stick_half_length_mm"] == pytest.approx(0.3, rel=1e-12)
+
+
+def test_without_contact_the_force_is_0_and_not_minus_0() -> None:
+    points = grid(3, 3)
+    n = len(points.points)
+    state = ContactState(np.full(n, OPEN), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 2)), np.zeros((n, 2)))
+    step = StepResult(
+        ObjectPose(0.1), state, state, (0.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
+    )
+    assert str(measure(points, step)["normal_force_N"]) == "0.0"

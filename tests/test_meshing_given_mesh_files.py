@@ -1,0 +1,178 @@
+"""Mesh files: what Gmsh and VTK write is read, node orders and names included; other files are refused in one line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finger3d.errors import Finger3dError
+from finger3d.meshing.given.mesh_files import read_contents
+from tests.given_meshes import GMSH, cube, refused, vtu_of
+
+# Gmsh 4.15 writes the middles of a tetrahedron's last two edges in the other order than VTK: (2, 3), then (1, 3)
+TET10 = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+2 1 "base"
+2 2 "Contact "
+3 7 "skin"
+$EndPhysicalNames
+$Entities
+0 0 2 1
+1 0 0 0 1 1 1 1 1 0
+2 0 0 0 1 1 1 1 2 0
+1 0 0 0 1 1 1 1 7 0
+$EndEntities
+$Nodes
+1 10 1 10
+3 1 0 10
+1
+2
+3
+4
+5
+6
+7
+8
+9
+10
+0 0 0
+0 0 1
+1 0 0
+0 1 0
+0 0 0.5
+0.5 0 0.5
+0.5 0 0
+0 0.5 0
+0.5 0.5 0
+0 0.5 0.5
+$EndNodes
+$Elements
+3 3 1 3
+2 1 9 1
+1 1 3 2 7 6 5
+2 2 9 1
+2 2 3 4 6 9 10
+3 1 11 1
+3 1 2 3 4 5 6 7 8 9 10
+$EndElements
+"""
+
+
+def test_quadratic_cells_of_gmsh_come_into_the_order_of_vtk(tmp_path: Path) -> None:
+    path = tmp_path / "one.msh"
+    path.write_text(TET10, encoding="ascii")
+    found = read_contents(path)
+    corners = found.points[found.cells[0]]
+    for node, ends in zip(range(4, 10), [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], strict=True):
+        np.testing.assert_array_equal(corners[node], corners[list(ends)].mean(axis=0))
+    assert found.label.tolist() == ["base", "contact"]
+    assert found.part.tolist() == ["skin"]
+
+
+@pytest.mark.parametrize("name", ["text.msh", "binary.msh"])
+def test_both_kinds_of_files_of_gmsh_are_read(name: str) -> None:
+    found = read_contents(GMSH / name)
+    assert found.cells.shape[1] == 10
+    assert set(found.label) == {"base", "contact"}
+    assert set(found.part) == {"core", "body"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (TET10.replace("4.1 0 8", "2.2 0 8"), r" 2\.2 .*4\.1: gmsh -format msh41"),
+        (TET10.replace("4.1 0 8", "5 0 8"), r" 5 .*4\.1: gmsh -format msh41"),
+        ("solid x\n", r"\$MeshFormat"),
+        ("", r"\$MeshFormat"),
+        (TET10[:-60], "damaged or incomplete"),
+        (TET10.replace("3 1 0 10\n", "3 1 1 10\n"), "Mesh.SaveParametric = 0"),
+        (TET10.replace("$Nodes", "$PartitionedEntities\n1\n0\n0 0 0 0\n$EndPartitionedEntities\n$Nodes"), "undivided"),
+        (TET10.replace("3 1 11 1\n3 1 2 3 4 5 6 7 8 9 10", "3 1 5 1\n3 1 2 3 4 5 6 7 8"), "1 of type hexahedron"),
+        (
+            TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n",
+            "no tetrahedra; .*physical group",
+        ),
+        (TET10.replace("0.5 0.5 0\n", "nan 0.5 0\n"), "coordinate .*finite"),
+    ],
+)
+def test_other_files_of_gmsh_are_refused(text: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "body.msh"
+    path.write_text(text, encoding="ascii")
+    assert re.search(told, refused(lambda: read_contents(path)))
+
+
+def test_every_name_that_gmsh_writes_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "one.msh"
+    changes = {
+        "a reversed surface": ("1 1 1 1 0\n2", "1 1 1 -1 0\n2", ["base", "contact"], "skin"),
+        "a volume named as a surface": ('3 7 "skin"', '3 7 "base"', ["base", "contact"], "base"),
+        "a quotation mark": ('"skin"', '"the "soft" skin"', ["base", "contact"], 'the "soft" skin'),
+        "two groups": ("1 1 1 1 7 0", "1 1 1 2 9 7 0", ["base", "contact"], "skin"),
+    }
+    for what, (old, new, labels, part) in changes.items():
+        assert old in TET10
+        path.write_text(TET10.replace(old, new), encoding="ascii")
+        found = read_contents(path)
+        assert found.label.tolist() == labels, what
+        assert found.part.tolist() == [part], what
+
+
+def test_a_file_of_gmsh_with_cells_of_no_group_is_read(tmp_path: Path) -> None:  # Mesh.SaveAll = 1
+    text = TET10.replace("0 0 2 1\n", "0 0 3 1\n").replace("1 2 0\n", "1 2 0\n3 0 0 0 1 1 1 0 0\n")
+    text = text.replace("3 3 1 3\n", "4 4 1 4\n").replace("3 1 11 1\n", "2 3 9 1\n4 1 2 4 5 10 8\n3 1 11 1\n")
+    path = tmp_path / "one.msh"
+    path.write_text(text, encoding="ascii")
+    assert read_contents(path).label.tolist() == ["base", "contact"]
+
+
+def test_every_negative_number_is_no_name(tmp_path: Path) -> None:
+    import pyvista
+
+    path = vtu_of(tmp_path / "a.vtu", cube(1), parts=["", "bone"], numbers=True)
+    expected, grid = read_contents(path), pyvista.read(path)
+    label = np.asarray(grid.cell_data["label"])
+    grid.cell_data["label"] = np.where(label < 0, -5, label)
+    grid.save(path)
+    found = read_contents(path)
+    assert found.label.tolist() == expected.label.tolist()
+    np.testing.assert_array_equal(found.triangles, expected.triangles)
+
+
+def test_names_are_texts_or_numbers_of_field_data(tmp_path: Path) -> None:
+    mesh = cube(1)
+    texts = read_contents(vtu_of(tmp_path / "a.vtu", mesh, parts=["", "bone"]))
+    numbers = read_contents(vtu_of(tmp_path / "b.vtu", mesh, parts=["", "bone"], numbers=True))
+    for found in (texts, numbers):
+        assert set(found.label) == {"contact", "base"}
+        assert set(found.part) == {"", "bone"}
+    np.testing.assert_array_equal(texts.cells, numbers.cells)
+    np.testing.assert_array_equal(texts.part, numbers.part)
+
+
+def test_other_files_of_vtk_are_refused(tmp_path: Path) -> None:
+    mesh = cube(1)
+    assert "unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "a.vtu", b"<VTKFile>")))
+    whole = vtu_of(tmp_path / "b.vtu", mesh).read_bytes()
+    assert "unstructured grid" in refused(lambda: read_contents(_file(tmp_path / "c.vtu", whole[: len(whole) // 2])))
+    assert "'label_names'" in refused(
+        lambda: read_contents(vtu_of(tmp_path / "d.vtu", mesh, numbers=True, names=False))
+    )
+    assert "1 of type 12 of VTK" in refused(lambda: read_contents(vtu_of(tmp_path / "e.vtu", mesh, hexahedron=True)))
+    assert "there is no such file" in refused(lambda: read_contents(tmp_path / "f.vtu"))
+
+
+def test_vtk_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(Finger3dError):
+        read_contents(_file(tmp_path / "a.vtu", b'<VTKFile type="UnstructuredGrid"><Piece>'))
+    assert capfd.readouterr() == ("", "")
+
+
+def _file(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
