@@ -107,7 +107,8 @@ def test_two_effects_in_one_slot_are_named(name: str) -> None:
 def test_an_absent_effect_is_not_imported() -> None:
     code = (
         "import sys; from finger3d.scene import load; load(sys.argv[1]).model(); "
-        "import finger3d.mechanics.discretise.build; import finger3d.mechanics.march.solve; mine = 'viscoelastic', 'elastic_object', 'foils', 'finite_strain'; "
+        "import finger3d.mechanics.discretise.build; import finger3d.mechanics.march.solve; "
+        "mine = 'viscoelastic', 'elastic_object', 'foils', 'finite_strain'; "
         "print([m for m in sys.modules if m.startswith('finger3d.effects.') "
         "or m.startswith('finger3d.mechanics.') and m.endswith(mine)])"
     )

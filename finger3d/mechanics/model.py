@@ -38,9 +38,9 @@ class Leg:
 
     With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
 
-    With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).  This
-    is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a scene
-    gives them in degrees.
+    With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).
+    This is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a
+    scene gives them in degrees.
     """
 
     depth_mm: float

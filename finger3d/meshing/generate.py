@@ -61,7 +61,8 @@ def _mesh_unstructured(
         report.say(f"mesh from the cache, {path}")
         seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
         return mesh, mesh_report(mesh, multiple, volume, seconds, from_cache=True, cache_path=str(path))
-    mesher = importlib.import_module(f"finger3d.meshing.{'netgen' if options.mesher == 'netgen' else 'tetwild'}")
+    name = "netgen" if options.mesher == "netgen" else "tetwild"
+    mesher = importlib.import_module(f"finger3d.meshing.unstructured.{name}")
     mesh, volume, cad_seconds = mesher.new_mesh(design, options, zone, symmetry, report)
     stored = cache.save(path, mesh, volume)
     if not stored:

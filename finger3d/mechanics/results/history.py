@@ -187,8 +187,8 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
 
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the extents of contact and stick on the line z = 0
     (`finger3d.mechanics.results.zones`).  The line has the vertices of the surface mesh on it and the intersections of
-    edges with it, each with the state of the nearer end of its edge.  Lengths and areas are those of the surface at rest.
-    Readings are sorted by the kind of their sensors, and displacements have three components.
+    edges with it, each with the state of the nearer end of its edge.  Lengths and areas are those of the surface at
+    rest.  Readings are sorted by the kind of their sensors, and displacements have three components.
     """
     state, target = step.state, step.target
     points = points.with_basis_of(state)
