@@ -28,7 +28,7 @@ from tests.models import large_fig9
 def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
     nu: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from finger3d.mechanics.finite_strain.formulation import increment as finite_increment
+    from finger3d.mechanics.finite_strain import increment as finite_increment
 
     errors: list[float] = []
     residual = finite_increment.FiniteIncrement.residual
