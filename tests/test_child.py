@@ -25,7 +25,7 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.geometry.registry import designs
 from finger3d.meshing.unstructured import tetwild
 from finger3d.meshing.unstructured.sizing import sizing
-from tests.test_meshing_tetwild import CUBE, SIDES
+from tests.bodies import CUBE, SIDES
 low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
 options = MeshOptions(size_mm=0.3, base_size_mm=0.3)
 field = sizing(designs()["block"](5.0, 10.0, 10.0), options, (-5, 5, -5, 5), low, high)
