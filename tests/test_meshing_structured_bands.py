@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.test_meshing_swept import check_planes, check_whole
 
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
@@ -19,6 +18,7 @@ from finger3d.meshing.structured.bands import bands, outline, thin_places
 from finger3d.meshing.structured.swept import mesh_section
 from tests.designs import make, zone_of
 from tests.meshes import interface
+from tests.test_meshing_structured_swept import check_planes, check_whole
 
 FINGERTIP = designs()["fingertip"]
 BODIES = {
