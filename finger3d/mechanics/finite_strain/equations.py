@@ -223,13 +223,13 @@ class IncrementEquations:
             delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
         moved = np.zeros(force.size)
         moved[active] = displacement
-        free = self._relative_displacement(now, force)
-        free += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
-        free -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
-        free[:, 1:] += start.tangential_displacement
+        free_displacement = self._relative_displacement(now, force)
+        free_displacement += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
+        free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
+        free_displacement[:, 1:] += start.tangential_displacement
         contact = ContactProblem.of(
             start,
-            free,
+            free_displacement,
             delassus,
             problem.model.contact_law,
             self._length_scale,

@@ -190,17 +190,19 @@ class _Increment:
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
         start = transported(self.state.contact, bases)
-        free = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
-        free[:, 1:] += start.tangential_displacement
+        free_displacement = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
+        free_displacement[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
         rule, law = RULES[problem.model.rule], problem.model.contact_law
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
-            return rule(ContactProblem.of(start, free, self.body.delassus, law, scale, area=area), guess)
+            return rule(ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area), guess)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
-        contact = ContactProblem.of(start.of_points(near), free[near], delassus, law, scale, area=area[near])
+        contact = ContactProblem.of(
+            start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
+        )
         part = rule(contact, expected[near])
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status

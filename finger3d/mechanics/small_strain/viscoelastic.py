@@ -95,9 +95,9 @@ class Viscoelastic:
         rest = problem.delassus - scatter_to_points(
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
-        compliance = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
+        delassus = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
         before = State(state.contact, state.body.displacement)
-        solution = solve_increment(problem, before, move, LinearBody(compliance, past.reshape(c, d)), guess, workspace)
+        solution = solve_increment(problem, before, move, LinearBody(delassus, past.reshape(c, d)), guess, workspace)
         if solution.state is before:
             return solution.with_state(state)
         contact = solution.state.contact
