@@ -226,3 +226,21 @@ def test_every_module_with_logic_has_its_test_file(root: Path) -> None:
         if not (root / "tests" / f"test_{'_'.join(parts)}.py").exists():
             missing.append(str(module))
     assert missing == []
+
+
+@pytest.mark.parametrize("folder", ["mechanics", "fem", "meshing"])
+def test_the_rooms_of_a_package_are_few(root: Path, folder: str) -> None:
+    entries = {p.name for p in (root / "finger3d" / folder).iterdir()} - {"__pycache__"}
+    assert len(entries) <= 10
+
+
+def test_interfaces_stay_small(root: Path) -> None:
+    """Members of the solver protocol, type assertions of mechanics, and lines of the effects, which are tables only."""
+    from finger3d.mechanics.formulation import Formulation
+
+    members = {name for name in vars(Formulation) if not name.startswith("_")}
+    mechanics = "".join(p.read_text(encoding="utf-8") for p in (root / "finger3d" / "mechanics").rglob("*.py"))
+    effects = "".join(p.read_text(encoding="utf-8") for p in (root / "finger3d" / "effects").glob("*.py"))
+    assert 0 < len(members) <= 8
+    assert mechanics.count("assert isinstance") <= 3
+    assert effects.count("\n") <= 400
