@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
+from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.mesh.elements import Element, quadrature
 from finger3d.fem.mesh.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
@@ -125,3 +126,9 @@ def interface(mesh: Mesh, first: int, second: int) -> np.ndarray:
     middle = mesh.cells[:, d + 1 :].ravel()[where]
     pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (0, 2)]
     return np.hstack([chosen, *(middle[np.searchsorted(key, chosen[:, p] @ [n, 1])][:, None] for p in pairs)])
+
+
+def edge_lengths(mesh: Mesh, facets: str) -> tuple[Float, Float]:
+    """Corners (f, 3, 3) mm of triangles on the surface, and the mean length (f,) mm of the edges of each."""
+    corners = mesh.points[mesh.facets[facets][:, :3]]
+    return corners, np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)

@@ -13,6 +13,7 @@ from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Model
 from finger3d.scene import load, tree
 from tests.sensor_cases import objective_table
 
@@ -27,19 +28,21 @@ def problem(root: Path) -> OptimisationProblem:
     return OptimisationProblem(tree.override(tree.read(path), SETS), (ANGLE,), path=path, mus=MUS, budget=12)
 
 
+def pressed_sensitivity(model: Model, noise: float) -> float:
+    """Sensitivity of the gauge in presses of a body of its own for every friction coefficient."""
+    strain = []
+    for mu in MUS:
+        own = build(replace(model, friction=replace(model.friction, mu=mu)))
+        strain.append(list(march(own))[-1].gauges["g36"])
+    return sensitivity(replace(objective_table(strain), noise=noise))
+
+
 def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path) -> None:
     found = find_best(problem, tmp_path)
     assert found.bodies == 1
     assert len(found.evaluations) == 13
     assert found.best.value == max(e.value for e in found.evaluations) >= found.start.value
-    model = found.scene.model()
-    strain = []
-    for mu in MUS:
-        own = build(replace(model, friction=replace(model.friction, mu=mu)))
-        strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(
-        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
-    )
+    assert found.best.value == pytest.approx(pressed_sensitivity(found.scene.model(), problem.noise), rel=1e-9)
     assert load(tmp_path / "best.toml").tables.gauge[0].angle_deg == found.best.values[0]
 
 
@@ -50,14 +53,7 @@ def test_gauges_of_a_body_that_relaxes_are_read_as_a_press_reads_them(problem, b
     given = tree.override(problem.given, [*SETS, visco, "press.duration_s=1.0", "press.steps=4", "material.nu=0.45"])
     found = find_best(replace(problem, given=given, budget=1), tmp_path)
     assert found.bodies == 1
-    model = found.scene.model()
-    strain = []
-    for mu in MUS:
-        own = build(replace(model, friction=replace(model.friction, mu=mu)))
-        strain.append(list(march(own))[-1].gauges["g36"])
-    assert found.best.value == pytest.approx(
-        sensitivity(replace(objective_table(strain), noise=problem.noise)), rel=1e-9
-    )
+    assert found.best.value == pytest.approx(pressed_sensitivity(found.scene.model(), problem.noise), rel=1e-9)
 
 
 def test_a_search_goes_on_with_what_is_kept_and_is_the_same_every_time(problem, tmp_path) -> None:

@@ -6,43 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from finger3d.contact.friction import Coulomb
-from finger3d.effects.embedded_gauge import Effect
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Foils, Gauge, Leg, MeshOptions, Model
-from finger3d.objects import Sphere
+from finger3d.mechanics.model import Foils
 from finger3d.scene import parse
-
-FOIL = Effect(3000.0, 0.02, 1.0)
-
-LEGS = (Leg(0.3, steps=3, duration_s=1.0), Leg(0.3, slide_x_mm=0.1, steps=2, duration_s=1.0))
-
-MIDDLE = Gauge("g", 0.0, 1.6, 0.0, 0.0, 2.0)
-
-
-def block(**changes: object) -> Model:
-    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), LEGS[:1], object=Sphere(radius_mm=4.0),
-        friction=Coulomb(0.25), gauges=(MIDDLE,),
-    )  # fmt: skip
-    return replace(model, **changes)
-
-
-def scene_of(effect: dict, *gauges: dict, **more: object) -> dict:
-    return {
-        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3}, "press": {"depth_mm": 0.5}, "gauge": gauges,
-        "effects": {"embedded_gauge": effect}, **more,
-    }  # fmt: skip
-
-
-FOIL_TABLE = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}
-
-GOOD = {"name": "g", "x_mm": 0.0, "y_mm": 3.0, "length_mm": 2.0}
+from tests.foil_cases import FOIL, FOIL_TABLE, GOOD, MIDDLE, block, scene_of
 
 
 @pytest.mark.parametrize(

@@ -12,15 +12,7 @@ from finger3d.effects.viscosity import (
 )
 from finger3d.errors import Finger3dError
 from finger3d.scene import parse
-from tests.viscous_cases import TWO, block
-
-
-def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.0, "duration_s": 1.0},)) -> dict:
-    return {
-        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3}, "model": {"domain": domain}, "press": {"leg": legs},
-        "effects": {"viscosity": effect},
-    }  # fmt: skip
+from tests.viscous_cases import TWO, block, scene_of
 
 
 @pytest.mark.parametrize(

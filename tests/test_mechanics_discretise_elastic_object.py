@@ -12,27 +12,17 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
-from tests.bodies import ball
 from tests.models import last, run
+from tests.soft_object_cases import half_ball, pad
 
-DESIGNS = designs()
 SHAPES: list[RigidObject] = [
     Plane(), Plane(tilt=0.05), Cylinder(radius_mm=4.0), Cylinder(0.3, radius_mm=4.0), Cylinder(radius_mm=4.0, axis="x"),
     Wedge(angle=0.2, tip_radius_mm=1.0), Wave(wavelength_mm=3.0, amplitude_mm=0.1),
     Wave(wavelength_mm=3.0, amplitude_mm=0.1, axis="x"),
 ]  # fmt: skip
-
-
-def pad(**changes: Any) -> Model:
-    body = DESIGNS["block"](half_length_mm=4.0, height_mm=3.0, width_mm=6.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.6, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.3)
-    )  # fmt: skip
-    return replace(model, **changes)
 
 
 @pytest.mark.parametrize("obj", SHAPES, ids=lambda o: f"{type(o).__name__} {getattr(o, 'axis', '')}")
@@ -49,7 +39,7 @@ def test_a_stiff_object_is_the_rigid_one_and_a_soft_one_gives(obj: RigidObject, 
 
 
 def test_equal_bodies_do_not_rub() -> None:
-    finger = DESIGNS["half_cylinder"](radius_mm=5.0, width_mm=2.0)
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=2.0)
     plain = pad(
         design=finger, mesh=MeshOptions(0.2, 0.8, "swept"), domain="plane-strain", object=Cylinder(radius_mm=5.0),
         legs=(Leg(1.0, steps=4),),
@@ -87,16 +77,6 @@ def test_energy_goes_into_both_bodies() -> None:
     part = problem.upright_force(frames[-1].meshed_state.contact)
     stored = 0.5 * 4.0 * np.einsum("id,idje,je->", part, problem.delassus, part)
     assert frames[-1].external_work_mJ == pytest.approx(stored, rel=1e-10)
-
-
-def half_ball(radius: float) -> Triangles:
-    """The lower half of a ball, closed by a level lid."""
-    whole = ball(radius, 28, 56)
-    keep = whole.corners[:, :, 1].max(axis=1) <= 1e-9
-    rim = np.flatnonzero(np.abs(whole.points[:, 1]) < 1e-9)
-    rim = rim[np.argsort(np.arctan2(whole.points[rim, 2], whole.points[rim, 0]))]
-    lid = np.stack([np.full(len(rim), len(whole.points)), np.roll(rim, -1), rim], axis=1)
-    return Triangles(np.vstack([whole.points, [[0.0, 0.0, 0.0]]]), np.vstack([whole.faces[keep], lid]))
 
 
 @pytest.mark.slow

@@ -220,14 +220,6 @@ def test_summary_counts_the_factorisations(tmp_path: Path) -> None:
     assert top[4] > top[5] > top[6] > 0.7 * top[4]
 
 
-def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.0, "duration_s": 1.0},)) -> dict:
-    return {
-        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3}, "model": {"domain": domain}, "press": {"leg": legs},
-        "effects": {"viscosity": effect},
-    }  # fmt: skip
-
-
 def test_a_model_turned_to_plane_stress_is_refused_too() -> None:
     model = Effect(TWO, False).apply(block())
     with pytest.raises(Finger3dError, match="plane stress"):

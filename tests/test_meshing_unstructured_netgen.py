@@ -27,7 +27,7 @@ from finger3d.progress import QUIET
 from tests.bodies import box as box_of
 from tests.bodies import write_stl
 from tests.designs import FIG9, ZONE, make
-from tests.meshes import interface
+from tests.meshes import edge_lengths, interface
 
 BOTH = ("x", "z")
 OPTIONS = MeshOptions(4.0, 10.0, "netgen")
@@ -49,12 +49,10 @@ def test_a_quarter_lies_on_the_cad_and_is_graded() -> None:
     assert (curved_jacobians(mesh) > 0.0).all()
     assert report.volume_mm3 == pytest.approx(FIG9.volume_mm3, rel=1e-4)
     assert report.min_dihedral_deg > 10.0
-    p = mesh.points[mesh.facets["contact"][:, :3]]
-    length = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).mean(axis=1)
-    top = length[p[:, :, 0].max(axis=1) < 40.0].mean()
-    base = mesh.points[mesh.facets["base"][:, :3]]
+    contact, length = edge_lengths(mesh, "contact")
+    top = length[contact[:, :, 0].max(axis=1) < 40.0].mean()
     assert 0.8 * OPTIONS.size_mm < top < 1.2 * OPTIONS.size_mm
-    assert np.linalg.norm(base - np.roll(base, 1, axis=1), axis=2).mean() > 1.5 * top
+    assert edge_lengths(mesh, "base")[1].mean() > 1.5 * top
 
 
 def test_the_same_mesh_comes_every_time() -> None:

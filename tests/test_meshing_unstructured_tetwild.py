@@ -20,6 +20,7 @@ from finger3d.meshing.unstructured import solids, tetwild
 from tests.bodies import CUBE, SIDES
 from tests.designs import FIG9, OPTIONS, ZONE
 from tests.logs import Log
+from tests.meshes import edge_lengths
 
 BALL = designs()["hemisphere"](5.0)
 BOTH = ("x", "z")
@@ -52,12 +53,10 @@ def test_a_real_quarter_unfolds_to_a_closed_body(real: tuple[Mesh, Any, list[str
 
 def test_a_real_mesh_is_finer_in_the_zone_than_at_the_base(real: tuple[Mesh, Any, list[str]]) -> None:
     mesh = real[0]
-    p = mesh.points[mesh.facets["contact"][:, :3]]
-    length = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).mean(axis=1)
-    top = length[p[:, :, 0].max(axis=1) < 40.0].mean()
-    base = mesh.points[mesh.facets["base"][:, :3]]
+    contact, length = edge_lengths(mesh, "contact")
+    top = length[contact[:, :, 0].max(axis=1) < 40.0].mean()
     assert 0.7 * OPTIONS.size_mm < top < 1.3 * OPTIONS.size_mm
-    assert np.linalg.norm(base - np.roll(base, 1, axis=1), axis=2).mean() > 1.2 * top
+    assert edge_lengths(mesh, "base")[1].mean() > 1.2 * top
 
 
 def test_a_hemisphere_is_meshed_off_the_middle() -> None:

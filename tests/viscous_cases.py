@@ -42,3 +42,11 @@ def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarr
 
 def relaxation(prony: tuple, t: np.ndarray) -> np.ndarray:
     return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in prony)
+
+
+def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.0, "duration_s": 1.0},)) -> dict:
+    return {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3}, "model": {"domain": domain}, "press": {"leg": legs},
+        "effects": {"viscosity": effect},
+    }  # fmt: skip

@@ -85,15 +85,6 @@ class MumpsFactor(WholeSolutions):
     """Factor of ``[[K, R^T], [R, 0]]`` that stops before the last rows, and their Schur complement.
 
     Parameters and attributes are those of `finger3d.fem.solvers.pardiso.PardisoFactor`.
-
-    Attributes
-    ----------
-    schur : (r, r)
-        ``-R K^-1 R^T``.
-    perturbed : int
-        Pivots that MUMPS had to perturb; 0 for a trustworthy factor.
-    factorizations : int
-        Matrices factored so far; solutions are those of the last.
     """
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:

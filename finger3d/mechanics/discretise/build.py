@@ -121,9 +121,8 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     thing = model.object_compliance
     if thing is None:
         return whole
-    from finger3d.mechanics.discretise.elastic_object import (
-        object_response,  # a press imports only what its scene names
-    )
+    # a press imports only what its scene names
+    from finger3d.mechanics.discretise.elastic_object import object_response
 
     return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, report))
 

@@ -109,6 +109,7 @@ class Press:
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed = False
         self._cancel, self._report = cancel, report
+        self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
         body = problem.without_inclusions
@@ -137,8 +138,7 @@ class Press:
             end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
-            most = 0 if self.problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
-            end = _Advanced(*self._increment(self.state, move, most, start), station.pose)
+            end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
         else:
             end = self._to_force(move, station.load)
         for part in end.parts:
@@ -192,7 +192,6 @@ class Press:
         if load.begins:
             self._leg_start_N = force
         wanted = self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
-        cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
         rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
@@ -209,7 +208,7 @@ class Press:
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
                 start = _expecting(state, there, ends, share) if problem.model.finite_strain else state
-            found, parts[depth] = self._increment(start, there, cuts, guess)
+            found, parts[depth] = self._increment(start, there, self._cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")

@@ -90,11 +90,10 @@ def solve_increment(
     if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
         return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
     flat = problem.model.object.is_flat
-    expansion_point = (
-        np.zeros_like(body.past)
-        if flat
-        else body.displacement(state.contact.force if guess is None else guess, state.contact.own_bases)
-    )
+    expansion_point = np.zeros_like(body.past)
+    if not flat:
+        expected = state.contact.force if guess is None else guess
+        expansion_point = body.displacement(expected, state.contact.own_bases)
     geometry = increment.geometry(expansion_point)
     held = np.zeros(len(expansion_point), dtype=bool)
     spent, error, start = 0, np.inf, guess
