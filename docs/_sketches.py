@@ -24,8 +24,10 @@ def contact(figure: Figure) -> None:
         left.plot([low, high], [1.55, 1.55], color=colour, lw=5, solid_capstyle="butt")
     _arrow(left, (0.0, 2.75), (0.0, 1.98))
     left.text(0.15, 2.4, "the object moves down")
-    for x, text, to in ((-2.5, "open: gap, no force", -2.0), (0.0, "stick: no slip", 0.0), (2.6, "slip", 1.05)):
-        left.annotate(text, (to, 1.5), (x, 0.75), ha="center", arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.7})
+    for x, text, to in ((-2.9, "open: gap,\nno force", -1.9), (0.0, "stick: no slip", 0.0), (2.6, "slip", 1.05)):
+        left.annotate(
+            text, (to, 1.5), (x, 1.0), ha="center", va="top", arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.7}
+        )
     right.fill([0.0, -0.8, 0.8], [0.0, 1.6, 1.6], color=BODY)
     right.plot([-0.9, 0.0, 0.9], [1.8, 0.0, 1.8], color=INK, lw=1.0)
     _arrow(right, (0.0, 0.0), (-0.2, 1.4), STICK)
