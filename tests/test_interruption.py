@@ -93,6 +93,7 @@ def test_other_exceptions_of_callbacks_are_still_reported(monkeypatch: pytest.Mo
 def test_an_interruption_after_the_work_ends_the_process_with_130(name: str) -> None:
     code = (
         "import signal, sys, time; import finger3d.__main__ as m; sys.argv = ['finger3d', 'schema']; "
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # under nohup, the child would inherit that it is ignored
         f"m.main(); signal.raise_signal(signal.{name}); time.sleep(20)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
