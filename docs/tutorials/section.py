@@ -87,7 +87,7 @@ ax.set(
     ylabel="normal force per width (N/mm)",
     ylim=(0, None),
 )
-ax.legend()
+ax.legend(loc="lower right")
 plt.show()
 
 # %% [markdown]
