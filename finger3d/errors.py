@@ -79,6 +79,9 @@ class Outcome(Enum):
         "the prescribed force is not reached: the force jumps with the depth; prescribe a depth, or use [contact] "
         "rule = 'projection' and a constant friction coefficient"
     )
+    EVENTS = (
+        "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"
+    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     PASSED_THROUGH = (
         "the object would pass through the finger's surface within an increment, or the surface through it; the "

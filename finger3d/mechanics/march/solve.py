@@ -23,6 +23,7 @@ from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.exact_path import NormalForce, has_exact_path, solve_path
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 
@@ -41,11 +42,12 @@ class _Substep:
 
 @dataclass(frozen=True)
 class _Advanced:
-    """End of an increment: its solution, the converged parts, and the pose that was reached."""
+    """End of an increment: its solution, the pose that was reached, and work and dissipation (mJ) on the way."""
 
     solution: ContactSolution[State[Any]]
-    parts: list[_Substep]
     pose: ObjectPose
+    work_mJ: float
+    dissipation_mJ: float
 
 
 def march(
@@ -109,6 +111,7 @@ class Press:
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed = False
         self._cancel, self._report = cancel, report
+        self._is_exact = has_exact_path(problem.model) and problem.contact_geometry is None
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
@@ -135,15 +138,17 @@ class Press:
         self._end_if_cancelled()
         move = Move(self.pose, station.pose)
         if solution is not None:
-            end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
+            end = self._reached(solution, station.pose, [_Substep(self.state, solution.state, move)])
+        elif self._is_exact:
+            end = self._along_path(move, station.load)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
-            end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
+            last, parts = self._increment(self.state, move, self._cuts, start)
+            end = self._reached(last, station.pose, parts)
         else:
             end = self._to_force(move, station.load)
-        for part in end.parts:
-            self._work += external_work(self.problem, part.before, part.after, part.move)
-            self._dissipation += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+        self._work += end.work_mJ
+        self._dissipation += end.dissipation_mJ
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
@@ -157,6 +162,12 @@ class Press:
         ratio = Move(self.pose, pose).length_ratio(before)
         now = self.state.contact.force
         return None if ratio is None else now + ratio * (now - force)
+
+    def _reached(self, solution: ContactSolution[State[Any]], pose: ObjectPose, parts: Sequence[_Substep]) -> _Advanced:
+        """Return the end of an increment that was solved in parts."""
+        work = [external_work(self.problem, part.before, part.after, part.move) for part in parts]
+        lost = [frictional_dissipation(self.problem, part.before.contact, part.after.contact) for part in parts]
+        return _Advanced(solution, pose, sum(work, 0.0), sum(lost, 0.0))
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
@@ -181,6 +192,26 @@ class Press:
             method="cut back",
         ), done + more
 
+    def _wanted(self, load: Load) -> tuple[float, float]:
+        """Return the normal force (N) now, and the one prescribed at the end of the increment."""
+        force = self._normal_force(self.state)
+        if load.begins:
+            self._leg_start_N = force
+        return force, self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
+
+    def _along_path(self, move: Move, load: Load | None) -> _Advanced:
+        """Advance on the exact path, to a pose or to a prescribed normal force."""
+        force = None
+        if load is not None:
+            force = NormalForce(*self._wanted(load), self._deepest)
+        end = solve_path(self.problem, self.state, move, force)
+        return _Advanced(end.solution, end.pose, end.work_mJ, end.dissipation_mJ)
+
+    @property
+    def _deepest(self) -> float:
+        model = self.problem.model
+        return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
+
     def _to_force(self, move: Move, load: Load) -> _Advanced:
         """Advance to the depth where the normal force is the prescribed one.
 
@@ -188,10 +219,7 @@ class Press:
         why, and state and pose are those at the beginning.
         """
         problem, state, parts = self.problem, self.state, dict[float, list[_Substep]]()
-        force = self._normal_force(state)
-        if load.begins:
-            self._leg_start_N = force
-        wanted = self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
+        force, wanted = self._wanted(load)
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
         rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
@@ -214,16 +242,15 @@ class Press:
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
             return Trial(depth, found, reached)
 
-        most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
         target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
-        search = DepthSearch(trial_at, wanted, start_mm, most, begin, target)
+        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
         last = search.run(first_trial(start_mm, stride, wanted, begin))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
-            return _Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
+            return _Advanced(replace(last.solution, state=state, iterations=spent), move.start, 0.0, 0.0)
         solution = replace(last.solution, iterations=spent)
-        return _Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
+        return self._reached(solution, replace(move.end, depth_mm=last.depth), parts[last.depth])
 
     def _normal_force(self, state: State[Any]) -> float:
         return -float(self.problem.world_force(state.contact)[:, 1].sum())
