@@ -33,7 +33,7 @@ _RESOLVED_POINTS = {2: 6, 3: 100}
 """Fewest contact points of a resolved contact zone, by dimension: six on a line, ten by ten on a surface."""
 
 _POINTS_ACROSS = 4
-"""Fewest points along the shorter side of a contact zone: forces jump as a narrower object slides from one to another."""
+"""Fewest points along the shorter side of a contact zone: under a narrower object that slides, forces jump."""
 
 
 @dataclass
