@@ -217,7 +217,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics.discretise import resolution
-    from finger3d.mechanics.finite_strain.failure import fold_warnings
+    from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
     from finger3d.mechanics.results.cavity import cavity_warnings
     from finger3d.mechanics.results.penetration import penetration_warnings
 
@@ -229,6 +229,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     if good:
         u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
         record.warnings += penetration_warnings(problem, record.surface_checks) + fold_warnings(problem, good)
+        record.warnings += snap_warnings(good)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
         fields = Fields.of(record, u, strain, stress)

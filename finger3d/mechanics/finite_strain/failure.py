@@ -10,6 +10,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.state import SNAPPED
 from finger3d.fem.mesh.quality import most_distorted
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.recovery.recover import displacement
@@ -71,6 +72,17 @@ def fold_warnings(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
         f"the cell at {_text(place)} mm is folded over at a node, most in step {number}: equilibrium holds, stress and "
         "strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer edges "
         "there avoid it"
+    ]
+
+
+def snap_warnings(steps: Sequence[StepResult]) -> list[str]:
+    """Return a warning about the increments in which the body snapped to another equilibrium."""
+    snapped = [str(number) for number, step in enumerate(steps, 1) if step.method == SNAPPED]
+    if not snapped:
+        return []
+    return [
+        f"the finger snaps to another equilibrium in step {', '.join(snapped)}: the one before ends there, and the one "
+        "that follows depends on mesh and increments; a fillet where a sharp edge folds, or a smaller depth, avoids it"
     ]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
-from finger3d.contact.state import ContactSolution
+from finger3d.contact.state import SNAPPED, ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
@@ -112,6 +112,7 @@ class Press:
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
+        self._began: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
@@ -139,15 +140,38 @@ class Press:
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
             end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
+            if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
+                end = _Advanced(*self._increment(self.state, move, self._cuts), station.pose)
         else:
             end = self._to_force(move, station.load)
-        for part in end.parts:
-            self._work += external_work(self.problem, part.before, part.after, part.move)
-            self._dissipation += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+        self._began = self.state, self._work, self._dissipation
+        self._add_energies(end.parts)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
         return self._result(end.solution, self._free_strain(station))
+
+    def _add_energies(self, parts: Sequence[_Substep]) -> None:
+        for part in parts:
+            self._work += external_work(self.problem, part.before, part.after, part.move)
+            self._dissipation += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+
+    def _last_in_halves(self) -> bool:
+        """Repeat the last increment in halves, and return whether they converge.
+
+        A long increment may end at an equilibrium from which the path does not go on.
+        """
+        if self._began is None or self._previous is None or not self._cuts:
+            return False
+        (state, work, dissipation), whole, parts = self._began, self._previous[0], list[_Substep]()
+        for half in (Move(whole.start, whole.at(0.5)), Move(whole.at(0.5), whole.end)):
+            found, more = self._increment(state, half, self._cuts - 1)
+            if not found.outcome.ok:
+                return False
+            state, parts = found.state, parts + more
+        self.state, self._work, self._dissipation = state, work, dissipation
+        self._add_energies(parts)
+        return True
 
     def expected_force(self, pose: ObjectPose) -> Float | None:
         """Return the forces (c, d) N extrapolated to a pose, if the path continues in its last direction."""
@@ -178,7 +202,7 @@ class Press:
             second,
             residual=max(first.residual, second.residual),
             iterations=whole.iterations + first.iterations + second.iterations,
-            method="cut back",
+            method=SNAPPED if SNAPPED in (first.method, second.method) else "cut back",
         ), done + more
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:
