@@ -72,6 +72,7 @@ INCREMENT_ERRORS, CHANGES = Budget(0.15, 0.2), Budget(0.3, 1.0)
 
 
 _LEAST_TETS = 1600.0
+"""Tets of the coarsest meshes by fTetWild; see `tets_of_ftetwild`."""
 
 
 @dataclass(frozen=True)

@@ -197,8 +197,7 @@ class DepthSearch:
         return max([lowest, *below]), min([highest, *above])
 
     def _falls_short(self, low: Trial | None, barrier: float) -> bool:
-        """Return whether the force stays too small up to a depth that failed, even if it rises at `_STIFFENING` times
-        the largest rate found."""
+        """Return whether the force stays too small up to a depth that failed, at `_STIFFENING` times the rate."""
         if low is None or len(self.good) < 2 or all(t.depth != barrier for t in self.failed):
             return False
         known = sorted([*([self.begin] if self.begin else []), *self.good], key=lambda trial: trial.depth)

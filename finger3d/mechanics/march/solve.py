@@ -112,7 +112,7 @@ class Press:
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
-        self._began: tuple[State[Any], float, float] | None = None
+        self._before: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
@@ -144,7 +144,7 @@ class Press:
                 end = _Advanced(*self._increment(self.state, move, self._cuts), station.pose)
         else:
             end = self._to_force(move, station.load)
-        self._began = self.state, self._work, self._dissipation
+        self._before = self.state, self._work, self._dissipation
         self._add_energies(end.parts)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
@@ -161,9 +161,9 @@ class Press:
 
         A long increment may end at an equilibrium from which the path does not go on.
         """
-        if self._began is None or self._previous is None or not self._cuts:
+        if self._before is None or self._previous is None or not self._cuts:
             return False
-        (state, work, dissipation), whole, parts = self._began, self._previous[0], list[_Substep]()
+        (state, work, dissipation), whole, parts = self._before, self._previous[0], list[_Substep]()
         for half in (Move(whole.start, whole.at(0.5)), Move(whole.at(0.5), whole.end)):
             found, more = self._increment(state, half, self._cuts - 1)
             if not found.outcome.ok:
