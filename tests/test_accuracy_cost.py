@@ -179,3 +179,24 @@ def test_an_unstructured_solid_has_the_size_that_was_foretold(sphere: bool) -> N
     expected, problem = forecast(model), build(model)
     assert 0.8 < problem.body.stiffness.upper.shape[0] / expected["dofs"] < 1.25
     assert 0.6 < len(problem.surface.nodes) / expected["contact_points"] < 1.25
+
+
+FINGERTIP = {"radius_mm": 20.0, "half_length_mm": 10.0, "edge_height_mm": 6.0, "width_mm": 12.0}
+
+
+@pytest.mark.parametrize(
+    ("design", "dimensions", "edges", "unknowns"),
+    [
+        ("fingertip", FINGERTIP | {"skin_mm": 0.5}, (1.0, 2.0), 25480),
+        ("fingertip", FINGERTIP | {"skin_mm": 1.0}, (1.5, 3.0), 14410),
+        ("fingertip", FINGERTIP | {"skin_mm": 1.0}, (0.7, 2.0), 23567),
+        ("clipped_cylinder", FINGERTIP, (4.0, 8.0), 9245),
+        ("block", {"half_length_mm": 10.0, "height_mm": 8.0, "width_mm": 12.0}, (1.5, 4.0), 8018),
+    ],
+)
+def test_unknowns_of_thin_layers_and_of_coarse_solids_are_those_that_ftetwild_made(
+    design: str, dimensions: dict[str, float], edges: tuple[float, float], unknowns: int
+) -> None:
+    body = designs()[design](**dimensions)
+    model = Model(body, Isotropic(1.0, 0.49), MeshOptions(*edges, "ftetwild"), (Leg(1.0, steps=5),), object=Plane())
+    assert 0.7 < unknowns / forecast(model)["dofs"] < 1.4

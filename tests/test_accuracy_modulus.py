@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.modulus import modulus_errors
+from finger3d.accuracy.modulus import modulus_errors, why_unknown
 from finger3d.cli import main
 from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.materials.shore import SPREAD_A
 from finger3d.mechanics.model import Gauge, Leg, Model
@@ -60,8 +62,41 @@ def test_there_are_none_where_the_modulus_is_given_or_is_not_the_only_one() -> N
     for rigid, material in parts.items():
         other = replace(problem, model=replace(model, parts=(("core", material),)))
         assert bool(modulus_errors(other, steps, SPREAD, press_numbers)) is rigid
-    slid = replace(problem, model=replace(model, legs=(Leg(1.0, slide_x_mm=0.1, steps=2, force_N=1.0),)))
-    assert modulus_errors(slid, steps, SPREAD, press_numbers) == {}
+        assert bool(why_unknown(other.model)) is not rigid
+    slid = replace(model, legs=(Leg(1.0, slide_x_mm=0.1, steps=2, force_N=1.0),))
+    assert not why_unknown(slid)
+    large = replace(problem, model=LargeDeformation().apply(slid))
+    assert modulus_errors(large, steps, SPREAD, press_numbers) == {}
+    assert "large deformation" in why_unknown(large.model)
+    assert modulus_errors(replace(problem, model=slid), steps[:1], SPREAD, press_numbers) == {}  # it has ended early
+
+
+@pytest.mark.parametrize("viscous", [False, True])
+def test_on_a_path_of_forces_they_are_the_changes_by_a_higher_modulus(viscous: bool) -> None:
+    legs = (
+        Leg(1.0, steps=2, force_N=1.5, duration_s=1.0),
+        Leg(1.0, slide_x_mm=0.2, steps=2, force_N=1.0, duration_s=1.0),
+        Leg(0.4, slide_x_mm=0.2, steps=1, duration_s=1.0),
+    )
+    for path in (legs, legs[:2]):
+        models = [replace(model_at(E_MPa, path[0]), legs=path) for E_MPa in (1.0, 1.0 + SPREAD)]
+        effect = Viscosity(((0.4, 1.0),))
+        (problem, steps), stiff = (run(effect.apply(model) if viscous else model) for model in models)
+        told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, SPREAD, press_numbers)
+        changes = {name: x - told[name] for name, x in press_numbers(*_last(stiff)).items()}
+        for name, change in changes.items():
+            assert found.get(name, 0.0) == pytest.approx((1.0 + SPREAD) * abs(change), rel=1e-6, abs=1e-8), name
+        assert ("depth_mm" in found) is (path is not legs)
+
+
+def test_the_method_says_where_they_are_not_known(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    text = changed(HALF_CYLINDER, domain="plane-strain", size_mm=0.4).replace("E_MPa = 1.0\n", "shore_A = 30\n")
+    scene.write_text(text + "[effects.elastic_object]\nE_MPa = 10.0\nnu = 0.4\n", encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    bars = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
+    assert not bars["modulus"]
+    assert bars["method"].endswith("the object have a modulus of their own")
 
 
 def test_table_page_and_summary_keep_them_apart_from_those_of_the_mesh(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from finger3d.cli import main
-from tests.scenes import HALF_CYLINDER, changed, written
+from tests.scenes import BLOCK, HALF_CYLINDER, changed, written
 
 SECTION = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
 
@@ -41,6 +43,26 @@ def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: st
     out = tmp_path / "out"
     assert main(["press", str(written(tmp_path, SECTION)), "--out", str(out), "--no-figures", "--set", key]) == 0
     assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_an_object_narrower_than_two_edges_is_warned_of_with_an_edge_length_that_resolves_it(
+    tmp_path: Path, domain: str
+) -> None:
+    trimesh.creation.box((1.7, 3.0, 40.0)).export(tmp_path / "bar.stl")
+    text = (
+        changed(BLOCK, domain=domain, half_length_mm=4.0, width_mm=2.0) + '[object]\nshape = "mesh"\npath = "bar.stl"\n'
+    )
+    scene = written(tmp_path, text)
+
+    def said(size: str) -> list[str]:
+        command = ["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]
+        assert main([*command, "--set", "mesh.mesher=swept", "--set", f"mesh.size_mm={size}"]) == 0
+        summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+        return [line for line in summary["warnings"] if " touch" in line]
+
+    (line,) = said("1.0")
+    assert not said(re.findall(r"mesh\.size_mm = ([\d.]+) has enough", line)[0])
 
 
 def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:

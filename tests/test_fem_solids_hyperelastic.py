@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
+from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
 from finger3d.fem.mesh.simplex import Mesh, quadratic
@@ -152,6 +154,23 @@ def test_plane_stress_has_a_thickness_at_any_stretch(nu: float, terms: tuple[tup
     kirchhoff = law.stress(f) @ np.swapaxes(f, 1, 2)
     out_of_plane = kirchhoff[:, 2, 2] + material.bulk * (j - 1.0) * j
     assert np.abs(out_of_plane / (np.abs(kirchhoff).max(axis=(1, 2)) + material.bulk * j)).max() < 1e-10
+
+
+def test_newton_finds_the_thickness_at_any_strain_and_at_rest() -> None:
+    """Quadratic convergence: round-off at the root does not start a search by halves."""
+
+    class Counted(Ogden):
+        calls: ClassVar[int] = 0
+
+        def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
+            Counted.calls += 1
+            return super().principal_stress(stretches)
+
+    material = Hyperelastic.of(Counted(0.4, ((0.5, 2.0), (0.5, -2.0))), 0.499, plane_stress=True)
+    slopes = np.random.default_rng(2).normal(scale=0.2, size=(500, 2, 2))
+    slopes[::5] = 0.0
+    material.deformation(slopes)
+    assert Counted.calls < 12
 
 
 def test_thick_sphere_under_pressure() -> None:

@@ -40,3 +40,8 @@ def test_a_cell_that_folds_at_a_sharp_edge_of_the_finger_is_named() -> None:
     said = cause_of_failure(problem, -0.6 * middle * (points - [0.0, 5.0]) * [0.0, 1.0])
     assert re.search(r" 0\.\d+ of its volume", said)
     assert "fillet" not in said
+
+
+def test_the_papers_rule_is_named_where_it_may_have_no_answer() -> None:
+    problem = build(replace(MODEL, rule="paper"))
+    assert "rule = 'projection'" in cause_of_failure(problem, np.zeros(problem.mesh.points.shape))

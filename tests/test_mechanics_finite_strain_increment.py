@@ -15,7 +15,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings
+from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings, snap_warnings
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
@@ -84,3 +84,24 @@ def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
         assert np.isfinite(stress[corners]).all()
         assert np.linalg.eigvalsh(2.0 * strain + np.eye(3)).min() > 0.0
     assert forces[0] == pytest.approx(forces[1], rel=0.02)
+
+
+def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> None:
+    """The corners of a block fold under friction; at its end the force falls, and the base carries what is left."""
+    design = designs()["block"](half_length_mm=8.76, height_mm=10.0, width_mm=10.36)
+    mesh, leg = MeshOptions(1.2, 1.79, "swept"), Leg(3.42, steps=20)
+    model = Model(design, Isotropic(1.0, 0.5), mesh, (leg,), friction=Coulomb(1.0), domain="plane-strain")
+    problem = build(Effect().apply(model))
+    frames = list(march(problem))
+    assert [frame.outcome.ok for frame in frames] == [True] * 20
+    force = [measure(problem.points, frame)["normal_force_N"] for frame in frames]
+    (line,) = snap_warnings(frames)
+    number = int(re.findall(r"in step (\d+)", line)[0])
+    assert force[number - 1] < force[number - 2]
+    assert min(np.diff(force[: number - 1])) > 0.0
+    assert snap_warnings(frames[: number - 1]) == []
+    state = frames[-1].meshed_state
+    internal = FiniteStrain(NeoHooke(1.0))._body(problem).internal_forces(state.body.unknowns)
+    base = internal[problem.body.fixed_dofs]
+    down = base[problem.body.fixed_dofs % 2 == 1].sum() * 2 ** len(problem.axes)
+    assert down == pytest.approx(force[-1], rel=1e-7)

@@ -103,6 +103,14 @@ def test_a_trial_that_fails_is_followed_by_one_nearer() -> None:
     )
 
 
+def test_a_force_far_beyond_the_depths_that_fail_ends_the_search_early() -> None:
+    search = search_of(lambda depth: depth if depth < 2.0 else np.nan, 100.0, 0.0)
+    found = search.run(1.0).solution
+    assert found.outcome is Outcome.NEWTON
+    assert "100 N asked; the largest force is" in found.detail
+    assert len(search.failed) + len(search.good) < 6
+
+
 def test_where_the_papers_rule_has_no_answer_the_other_rule_is_named() -> None:
     found = search_of(lambda depth: depth if depth < 2.0 else np.nan, 2.5, 0.0, Outcome.CYCLED).run(8.0).solution
     assert found.outcome is Outcome.FORCE_NOT_REACHED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,15 +11,17 @@ import scipy.sparse as sp
 
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.rules import RULES
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.path import targets
-from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.path import Station, stations, targets
+from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import Plane
+from finger3d.objects import Move, ObjectPose, Plane
 from tests.models import block, fig9, last, run
 
 
@@ -127,3 +130,33 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     assert cut.outcome.ok
     np.testing.assert_allclose(cut.state.force, four[-1].state.force, atol=1e-14)
     assert cut.dissipation_mJ == pytest.approx(four[-1].dissipation_mJ, rel=1e-12)
+
+
+def test_an_increment_from_whose_end_the_path_does_not_go_on_is_repeated_in_halves() -> None:
+    """The energies are those of the halves, as on the path with one more station."""
+    problem = build(block(object=Plane(), legs=(Leg(0.6, steps=2),)))
+    press, dead_ends = Press(problem), list[ContactState]()
+    true_increment = press.formulation.increment
+
+    class WithDeadEnds:
+        def __getattr__(self, name: str) -> Any:
+            return getattr(formulation_of(problem.model), name)
+
+        def increment(self, problem: Any, state: Any, move: Move, *rest: Any) -> Any:
+            if any(state.contact is end for end in dead_ends):
+                return ContactSolution(state, Outcome.NEWTON, np.inf, 1, "none")
+            found = true_increment(problem, state, move, *rest)
+            if not state.contact.force.any() and move.end.depth_mm > 0.2:
+                dead_ends.append(found.state.contact)
+            return found
+
+    press.formulation = WithDeadEnds()
+    first, second = (press.advance(station) for station in stations(problem.model.legs))
+    assert first.outcome.ok
+    assert second.outcome.ok
+    other = Press(problem)
+    for depth in (0.15, 0.3, 0.6):
+        last = other.advance(Station(ObjectPose(depth)))
+    np.testing.assert_allclose(second.state.force, last.state.force, rtol=1e-9, atol=1e-12)
+    assert second.external_work_mJ == pytest.approx(last.external_work_mJ, rel=1e-9)
+    assert second.dissipation_mJ == pytest.approx(last.dissipation_mJ, rel=1e-9)

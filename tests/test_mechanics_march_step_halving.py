@@ -27,7 +27,7 @@ from finger3d.mechanics.march.step_halving import (
     step_error,
 )
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 from tests.models import block, fig9
 
@@ -119,6 +119,16 @@ def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch:
     assert frames[-1].outcome.ok
     assert estimate is not None
     assert estimate.runs[0][0] == 10
+
+
+def test_a_failure_before_the_automatic_legs_is_not_repeated() -> None:
+    legs = (Leg(0.2, steps=2, force_N=1e6), Leg(0.1))
+    solved = list[StepResult]()
+    ((results, estimate),) = refine(
+        build(block(legs=legs, domain="plane-strain")), advanced=lambda done, total, step: solved.append(step)
+    )
+    assert [step.outcome for step in solved] == [step.outcome for step in results] == [Outcome.FORCE_NOT_REACHED]
+    assert estimate is None
 
 
 def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest() -> None:

@@ -217,7 +217,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics.discretise import resolution
-    from finger3d.mechanics.finite_strain.failure import fold_warnings
+    from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
     from finger3d.mechanics.results.cavity import cavity_warnings
     from finger3d.mechanics.results.penetration import penetration_warnings
 
@@ -229,6 +229,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     if good:
         u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
         record.warnings += penetration_warnings(problem, record.surface_checks) + fold_warnings(problem, good)
+        record.warnings += snap_warnings(good)
         record.largest_strain = largest_principal_strain(strain)
         _advise(record)
         fields = Fields.of(record, u, strain, stress)
@@ -242,14 +243,16 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
-    from finger3d.accuracy.modulus import modulus_errors
+    from finger3d.accuracy.modulus import modulus_errors, why_unknown
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
     found = estimate(record.problem, record.steps, report, press_numbers, runs)
     spread = record.scene.tables.material.constants.spread
-    by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers)
-    record.error_estimate = replace(found, modulus=by_modulus)
+    by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
+    why = why_unknown(record.problem.model) if spread else ""
+    method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
+    record.error_estimate = replace(found, modulus=by_modulus, method=method)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

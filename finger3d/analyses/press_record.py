@@ -32,6 +32,9 @@ _SMALL_STRAIN_DEPTH = 0.3
 _RESOLVED_POINTS = {2: 6, 3: 100}
 """Fewest contact points of a resolved contact zone, by dimension: six on a line, ten by ten on a surface."""
 
+_POINTS_ACROSS = 4
+"""Fewest points along the shorter side of a contact zone: under a narrower object that slides, forces jump."""
+
 
 @dataclass
 class PressRecord:
@@ -194,8 +197,19 @@ def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
 
 
 def point_count_warning(record: PressRecord) -> list[str]:
-    """Return a warning if the widest contact zone has too few points to be resolved."""
-    count = max((int(np.count_nonzero(step.state.status != OPEN)) for step in record.steps), default=0)
-    if not count or count >= _RESOLVED_POINTS[record.problem.dim]:
+    """Return a warning if the widest contact zone has too few points, in all or along its shorter side."""
+    problem, touching = record.problem, [step.state.status != OPEN for step in record.steps]
+    widest = max(touching, key=np.count_nonzero, default=np.zeros(0, dtype=bool))
+    count, size = int(np.count_nonzero(widest)), problem.model.mesh.size_mm
+    if not count:
         return []
-    return [f"Only {count} points touch: too few for the extents of contact and stick zone. Lower mesh.size_mm."]
+    extents = np.ptp(problem.points.points[widest][:, :: 2 if problem.dim == 3 else 3], axis=0) / size
+    across, power = 1 + round(float(extents.min())), 1.0 / (problem.dim - 1)
+    if count >= _RESOLVED_POINTS[problem.dim] and across >= _POINTS_ACROSS:
+        return []
+    ratio = min((count / _RESOLVED_POINTS[problem.dim]) ** power, max(across - 1, 1) / _RESOLVED_POINTS[2], 1.0)
+    what = f"Only {count} points touch" + (f", {across} across" if problem.dim == 3 else "")
+    return [
+        f"{what}: too few for the extents of contact and stick zone, and for forces if the object slides; "
+        f"mesh.size_mm = {size * ratio:.2g} has enough"
+    ]

@@ -87,6 +87,10 @@ class ContactState:
         )
 
 
+SNAPPED = "snapped"
+"""Method of an increment in which the body snaps from an equilibrium that ends to another one."""
+
+
 @dataclass(frozen=True)
 class ContactSolution(Generic[S]):
     """Solution of one increment.
@@ -100,7 +104,8 @@ class ContactSolution(Generic[S]):
     iterations : int
         Number of systems of equations that were factored, in all attempts.
     method : str
-        Attempt that succeeded: newton, damped or full steps, ramp, pivots, sweeps; or paper.
+        Attempt that succeeded: newton, damped or full steps, ramp, pivots, sweeps; or paper; `SNAPPED` if the body
+        went over to another equilibrium.
     detail : str
         Further information about a failure.
     """

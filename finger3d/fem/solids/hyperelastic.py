@@ -29,7 +29,8 @@ from finger3d.fem.solids.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isot
 from finger3d.fem.tensors import InvertedError, cofactor, determinant
 
 _THICKNESS_ITERATIONS, _THICKNESS_ERROR = 60, 1e-9
-"""Iterations for the stretch of the thickness at most, and largest relative change of it in the last."""
+"""Iterations for the stretch of the thickness at most, and relative change of it in the last: the next change would be
+its square."""
 
 
 @dataclass(frozen=True)
@@ -122,27 +123,37 @@ class Hyperelastic:
         """
         f = f.copy()
         a_iso, a_vol, past = _factors(relaxing)
-        area = f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]
+        first, second = _plane_stretches(f)
+        area = first * second
         f[..., 2, 2] = 1.0 / area
         low, high = np.zeros_like(area), np.full_like(area, np.inf)
         for _ in range(_THICKNESS_ITERATIONS):
-            stress, tangent = self.law.stress_and_tangent(f)
             stretch = f[..., 2, 2]
+            stress, tangent = self._stress_across(first, second, stretch)
             scale = 1.0 / (a_vol * self.bulk * area)
-            excess = a_iso * stress[..., 2, 2] - stretch * past[..., 2, 2]
-            slope = area + scale * (a_iso * tangent[..., 2, 2, 2, 2] - past[..., 2, 2])
+            excess = a_iso * stress - stretch * past[..., 2, 2]
+            slope = area + scale * (a_iso * tangent - past[..., 2, 2])
             short = 1.0 - area * stretch - scale * excess
             low, high = np.where(short > 0.0, stretch, low), np.where(short < 0.0, stretch, high)
             step = short / slope
+            settled = (np.abs(step) < _THICKNESS_ERROR * stretch) & (
+                slope > 0.0
+            )  # round-off may lead out of the interval
             outside = (stretch + step <= low) | (stretch + step >= high) | (slope <= 0.0)
             halved = np.where(np.isinf(high), 2.0 * stretch, 0.5 * (low + high)) - stretch
-            step = np.where(outside & (short != 0.0), halved, step)
-            f[..., 2, 2] = stretch + step
-            if np.abs(step).max(initial=0.0) < 1e-14:
-                break
-        if not (np.abs(step) < _THICKNESS_ERROR * f[..., 2, 2]).all():
-            raise InvertedError
-        return f
+            f[..., 2, 2] = stretch + np.where(outside & ~settled, halved, step)
+            if settled.all():
+                return f
+        raise InvertedError
+
+    def _stress_across(self, first: Float, second: Float, across: Float) -> tuple[Float, Float]:
+        """Return P_33 (...,) MPa of the isochoric part, and its derivative by F_33, from the principal stretches."""
+        stretches = np.stack([first, second, across], axis=-1)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite never converges
+            kirchhoff, by_logs = self.law.principal_stress(stretches / np.cbrt(first * second * across)[..., None])
+            rates = by_logs[..., 2] - by_logs.mean(axis=-1)  # at constant volume
+            stress = (kirchhoff[..., 2] - kirchhoff.mean(axis=-1)) / across
+            return stress, (rates[..., 2] - rates.mean(axis=-1)) / across**2 - stress / across
 
     def _spherical(self, f: Float, cof: Float, isochoric: Float, p: Float | None, relaxing: Relaxing | None) -> Float:
         """Return the factor (...,) of cof F in the stress, MPa.
@@ -202,6 +213,14 @@ class Hyperelastic:
             a_vol = _factors(relaxing)[1]
             first = first + (self._spherical(f, cof, isochoric, p, relaxing) / a_vol)[..., None, None] * cof
         return np.asarray(np.swapaxes(cof, -1, -2) @ first / determinant(f)[..., None, None])
+
+
+def _plane_stretches(f: Float) -> tuple[Float, Float]:
+    """Return the principal stretches (...,) in the plane, the larger first."""
+    even = np.hypot(f[..., 0, 0] + f[..., 1, 1], f[..., 0, 1] - f[..., 1, 0])
+    odd = np.hypot(f[..., 0, 0] - f[..., 1, 1], f[..., 0, 1] + f[..., 1, 0])
+    larger = 0.5 * (even + odd)
+    return larger, (f[..., 0, 0] * f[..., 1, 1] - f[..., 0, 1] * f[..., 1, 0]) / larger
 
 
 def _bulk_modulus(shear: float, nu: float) -> float:

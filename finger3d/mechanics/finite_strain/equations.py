@@ -117,23 +117,28 @@ class IncrementEquations:
         return self.body.bars is not None
 
     @cached_property
-    def _length_scale(self) -> float:
+    def length_scale(self) -> float:
+        """The length (mm) that gaps are divided by."""
         return length_scale(self.problem, self.move)
+
+    @cached_property
+    def motion(self) -> float:
+        """Largest displacement (mm) of the object's material at a contact point."""
+        problem = self.problem
+        u = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
+        return float(np.abs(carried_by_object(problem, self.move, u)).max(initial=0.0))
 
     @cached_property
     def _largest_step(self) -> float:
         """Largest displacement (mm) of an iteration: a multiple of that of the object, or a share of the depth."""
-        problem = self.problem
-        u = problem.surface.trace @ displacement(problem.mesh, self.start.body.unknowns)
-        moved = float(np.abs(carried_by_object(problem, self.move, u)).max(initial=0.0))
-        return max(_LARGEST_STEP * moved, _LEAST_STEP * self._length_scale)
+        return max(_LARGEST_STEP * self.motion, _LEAST_STEP * self.length_scale)
 
     @cached_property
     def _least_force(self) -> float:
         """Smallest force (N) by which the residual is divided; without contact all forces are round-off."""
         before = float(np.linalg.norm(self.start.contact.force, axis=1).max())
         shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
-        area = self._length_scale * (width if self.problem.dim == 2 else self._length_scale)
+        area = self.length_scale * (width if self.problem.dim == 2 else self.length_scale)
         return max(before, _NEGLIGIBLE * shear * area)
 
     @cached_property
@@ -232,7 +237,7 @@ class IncrementEquations:
             free_displacement,
             delassus,
             problem.model.contact_law,
-            self._length_scale,
+            self.length_scale,
             self._augmentation,
             problem.surface.area,
         )
@@ -295,7 +300,7 @@ class IncrementEquations:
         volume *= problem.body.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume
         moved = self._relative_displacement(now, force)
-        return max(residual(force, moved, solution.status, mu, self._length_scale), equilibrium, dilatation)
+        return max(residual(force, moved, solution.status, mu, self.length_scale), equilibrium, dilatation)
 
     def _state(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
         """Return the state at the end of the increment."""

@@ -9,6 +9,8 @@ from itertools import chain
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.state import SNAPPED
 from finger3d.fem.mesh.quality import most_distorted
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.recovery.recover import displacement
@@ -26,7 +28,8 @@ _NEAR = 2.0
 def cause_of_failure(problem: Problem, u: Float) -> str:
     """Return the probable cause and its cure in one line; empty if there is none to name.
 
-    It is a length of the object that the contact points do not resolve, else the cell that is distorted most.
+    It is a length of the object that the contact points do not resolve, else a rule of contact without a solution, else
+    the cell that is distorted most.
 
     Parameters
     ----------
@@ -34,6 +37,8 @@ def cause_of_failure(problem: Problem, u: Float) -> str:
     """
     if details := unresolved_details(problem.model):
         return details[0]
+    if problem.model.rule in STEP_DEPENDENT_RULES:
+        return "the paper's rule of contact may have no answer here; use [contact] rule = 'projection'"
     mesh = problem.mesh
     cell, ratio = most_distorted(mesh, u)
     if ratio > _DISTORTED:
@@ -67,6 +72,17 @@ def fold_warnings(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
         f"the cell at {_text(place)} mm is folded over at a node, most in step {number}: equilibrium holds, stress and "
         "strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer edges "
         "there avoid it"
+    ]
+
+
+def snap_warnings(steps: Sequence[StepResult]) -> list[str]:
+    """Return a warning about the increments in which the body snapped to another equilibrium."""
+    snapped = [str(number) for number, step in enumerate(steps, 1) if step.method == SNAPPED]
+    if not snapped:
+        return []
+    return [
+        f"the finger snaps to another equilibrium in step {', '.join(snapped)}: the one before ends there, and the one "
+        "that follows depends on mesh and increments; a fillet where a sharp edge folds, or a smaller depth, avoids it"
     ]
 
 

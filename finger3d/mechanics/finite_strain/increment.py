@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.tensors import InvertedError
@@ -31,7 +31,14 @@ _ASTRAY, _DIVERGED = 0.1, 1.0
 """Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
 
 _DAMPED_FACTORS = 40
-"""Largest number of damped iterations."""
+"""Largest number of damped iterations; twice as many where the body may snap."""
+
+_SNAPS = 0.02
+"""Motion of the object, over the depth, up to which an increment without equilibrium nearby may end at another one, to
+which the body snaps.  Longer increments are halved instead, so that the path is followed to where it ends."""
+
+_SNAP_RISES = 5
+"""Damped iterations in a row in which the residual rises as the body leaves one equilibrium for another."""
 
 _LARGEST_RISE = 3.0
 """Largest ratio of successive residuals of damped iterations; beyond it the damping grows instead."""
@@ -93,11 +100,13 @@ class FiniteIncrement(IncrementEquations):
     def _iterate_damped(self) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
 
-        The multiple decreases with the residual to zero (pseudo-transient continuation, Kelley and Keyes 1998).
+        The multiple decreases with the residual to zero (pseudo-transient continuation, Kelley and Keyes 1998).  Beyond
+        a limit point of the path a constant multiple follows the snap down in energy.
         """
         now, force = self.at(self.start.body.unknowns), self.start.contact.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
-        for _ in range(_DAMPED_FACTORS):
+        may_snap, rises, snapped = self.motion <= _SNAPS * self.length_scale, 0, False
+        for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
             spent += solution.iterations
             next_error = math.inf if after is None else self._error(after, solution.state)
@@ -106,9 +115,13 @@ class FiniteIncrement(IncrementEquations):
                 continue
             now, force, last_error, error = after, solution.state.force, error, next_error
             if converged(error, last_error):
+                solution = replace(solution, method=SNAPPED) if snapped else solution
                 return self.finished(now, solution, error, spent)
             change = error / last_error if math.isfinite(last_error) else 1.0
-            damping *= max(change, 1.0 / _MORE_DAMPING) * _FADING if change < 1.0 else min(change, 2.0)
+            rises = rises + 1 if change >= 1.0 else 0
+            snapped |= may_snap and rises >= _SNAP_RISES
+            rise = 1.0 if may_snap else min(change, 2.0)  # a damping that rises with the residual stops a snap
+            damping *= max(change, 1.0 / _MORE_DAMPING) * _FADING if change < 1.0 else rise
             damping = min(damping, _MORE_DAMPING)
             damping = damping if damping > _LEAST_DAMPING else 0.0
         return self.failed(now, Outcome.NEWTON, error, spent)

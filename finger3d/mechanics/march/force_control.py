@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ _RESOLUTION, _NEAREST = 1e-12, 1e-6
 
 _TRIALS, _FAILURES = 80, 8
 """Largest number of trials, and of those that fail."""
+
+_STIFFENING = 5.0
+"""Rate of the force beyond the deepest trial, over the largest rate up to it, at most."""
 
 _NEARER = (0.5, 0.25, 0.125)
 """Shares of the first stride at which contact is looked for if there is none at its end."""
@@ -144,7 +148,7 @@ class DepthSearch:
             bounds = self._bounds(low, high)
             if bounds[1] - bounds[0] <= _NEAREST * self.most and not (low and high):
                 break
-            if len(self.failed) > _FAILURES:
+            if len(self.failed) > _FAILURES or self._falls_short(low, bounds[1]):
                 break
             depth = self._next(low, high, bounds, stride, len(errors) > 4 and errors[-1] > 0.5 * errors[-3])
             stride *= 2.0
@@ -191,6 +195,14 @@ class DepthSearch:
         above = [t.depth for t in self.failed if anchor < t.depth < highest]
         below = [t.depth for t in self.failed if lowest < t.depth < anchor]
         return max([lowest, *below]), min([highest, *above])
+
+    def _falls_short(self, low: Trial | None, barrier: float) -> bool:
+        """Return whether the force stays too small up to a depth that failed, at `_STIFFENING` times the rate."""
+        if low is None or len(self.good) < 2 or all(t.depth != barrier for t in self.failed):
+            return False
+        known = sorted([*([self.begin] if self.begin else []), *self.good], key=lambda trial: trial.depth)
+        rates = [(b.force - a.force) / (b.depth - a.depth) for a, b in pairwise(known) if b.depth > a.depth]
+        return bool(rates) and low.force + _STIFFENING * max(rates) * (barrier - low.depth) < self.wanted
 
     def _next(
         self, low: Trial | None, high: Trial | None, bounds: tuple[float, float], stride: float, slow: bool

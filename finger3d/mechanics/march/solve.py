@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from threading import Event
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
-from finger3d.contact.state import ContactSolution
+from finger3d.contact.state import SNAPPED, ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
@@ -42,12 +43,15 @@ class _Substep:
 
 @dataclass(frozen=True)
 class _Advanced:
-    """End of an increment: its solution, the pose that was reached, and work and dissipation (mJ) on the way."""
+    """End of an increment: its solution, the converged parts, and the pose that was reached.
+
+    `energies` are the work of the object and the dissipation (mJ) if they are known, else they follow from the parts.
+    """
 
     solution: ContactSolution[State[Any]]
+    parts: list[_Substep]
     pose: ObjectPose
-    work_mJ: float
-    dissipation_mJ: float
+    energies: tuple[float, float] | None = None
 
 
 def march(
@@ -115,6 +119,7 @@ class Press:
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
+        self._before: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
@@ -138,21 +143,47 @@ class Press:
         self._end_if_cancelled()
         move = Move(self.pose, station.pose)
         if solution is not None:
-            end = self._reached(solution, station.pose, [_Substep(self.state, solution.state, move)])
+            end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
         elif self._is_exact:
             end = self._along_path(move, station.load)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
-            last, parts = self._increment(self.state, move, self._cuts, start)
-            end = self._reached(last, station.pose, parts)
+            end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
+            if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
+                end = _Advanced(*self._increment(self.state, move, self._cuts), station.pose)
         else:
             end = self._to_force(move, station.load)
-        self._work += end.work_mJ
-        self._dissipation += end.dissipation_mJ
+        self._before = self.state, self._work, self._dissipation
+        self._add_energies(end)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
         return self._result(end.solution, self._free_strain(station))
+
+    def _add_energies(self, end: _Advanced) -> None:
+        work, lost = end.energies or (0.0, 0.0)
+        for part in end.parts if end.energies is None else ():
+            work += external_work(self.problem, part.before, part.after, part.move)
+            lost += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+        self._work += work
+        self._dissipation += lost
+
+    def _last_in_halves(self) -> bool:
+        """Repeat the last increment in halves, and return whether they converge.
+
+        A long increment may end at an equilibrium from which the path does not go on.
+        """
+        if self._before is None or self._previous is None or not self._cuts:
+            return False
+        (state, work, dissipation), whole, parts = self._before, self._previous[0], list[_Substep]()
+        for half in (Move(whole.start, whole.at(0.5)), Move(whole.at(0.5), whole.end)):
+            found, more = self._increment(state, half, self._cuts - 1)
+            if not found.outcome.ok:
+                return False
+            state, parts = found.state, parts + more
+        self.state, self._work, self._dissipation = state, work, dissipation
+        self._add_energies(_Advanced(found, parts, whole.end))
+        return True
 
     def expected_force(self, pose: ObjectPose) -> Float | None:
         """Return the forces (c, d) N extrapolated to a pose, if the path continues in its last direction."""
@@ -162,12 +193,6 @@ class Press:
         ratio = Move(self.pose, pose).length_ratio(before)
         now = self.state.contact.force
         return None if ratio is None else now + ratio * (now - force)
-
-    def _reached(self, solution: ContactSolution[State[Any]], pose: ObjectPose, parts: Sequence[_Substep]) -> _Advanced:
-        """Return the end of an increment that was solved in parts."""
-        work = [external_work(self.problem, part.before, part.after, part.move) for part in parts]
-        lost = [frictional_dissipation(self.problem, part.before.contact, part.after.contact) for part in parts]
-        return _Advanced(solution, pose, sum(work, 0.0), sum(lost, 0.0))
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
@@ -189,7 +214,7 @@ class Press:
             second,
             residual=max(first.residual, second.residual),
             iterations=whole.iterations + first.iterations + second.iterations,
-            method="cut back",
+            method=SNAPPED if SNAPPED in (first.method, second.method) else "cut back",
         ), done + more
 
     def _wanted(self, load: Load) -> tuple[float, float]:
@@ -199,18 +224,18 @@ class Press:
             self._leg_start_N = force
         return force, self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
 
-    def _along_path(self, move: Move, load: Load | None) -> _Advanced:
-        """Advance on the exact path, to a pose or to a prescribed normal force."""
-        force = None
-        if load is not None:
-            force = NormalForce(*self._wanted(load), self._deepest)
-        end = solve_path(self.problem, self.state, move, force)
-        return _Advanced(end.solution, end.pose, end.work_mJ, end.dissipation_mJ)
-
     @property
     def _deepest(self) -> float:
         model = self.problem.model
         return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
+
+    def _along_path(self, move: Move, load: Load | None) -> _Advanced:
+        """Advance on the exact path, to a pose or to a prescribed normal force."""
+        force = None if load is None else NormalForce(*self._wanted(load), self._deepest)
+        solution, ends, energies = solve_path(self.problem, self.state, move, force)
+        starts = [(self.pose, self.state), *ends]
+        parts = [_Substep(a[1], b[1], Move(a[0], b[0])) for a, b in pairwise(starts)]
+        return _Advanced(solution, parts, starts[-1][0], energies)
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:
         """Advance to the depth where the normal force is the prescribed one.
@@ -248,9 +273,9 @@ class Press:
         last = search.run(first_trial(start_mm, stride, wanted, begin))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
-            return _Advanced(replace(last.solution, state=state, iterations=spent), move.start, 0.0, 0.0)
+            return _Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
         solution = replace(last.solution, iterations=spent)
-        return self._reached(solution, replace(move.end, depth_mm=last.depth), parts[last.depth])
+        return _Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
 
     def _normal_force(self, state: State[Any]) -> float:
         return -float(self.problem.world_force(state.contact)[:, 1].sum())

@@ -158,7 +158,8 @@ def refine(
     """Yield the results of runs with more and more increments, each with its estimate; the first run has none.
 
     The iteration ends when the tolerances are met or the largest number of increments is reached.  A run that fails is
-    omitted if one with fewer increments converged or one with twice as many does.
+    omitted if one with fewer increments converged or one with twice as many does.  If it fails before the first
+    automatic leg, none follows.
 
     Parameters
     ----------
@@ -175,9 +176,10 @@ def refine(
         if not results[-1].outcome.ok:
             if runs:
                 return
-            if failed:
+            again = not failed and len(results) > _fixed_first(problem.model)
+            failed = failed or results
+            if not again:
                 break
-            failed = results
         else:
             runs.append((steps, results))
             estimate = _estimate(problem, runs) if len(runs) > 1 else None
@@ -187,6 +189,12 @@ def refine(
         steps *= 2
     if not runs:
         yield failed, None
+
+
+def _fixed_first(model: Model) -> int:
+    """Return the number of increments before the first automatic leg."""
+    before = itertools.takewhile(lambda leg: leg.steps != "auto", model.legs)
+    return sum(int(leg.steps) for leg in before)
 
 
 def _run(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,21 +37,19 @@ class NormalForce:
     largest_depth_mm: float
 
 
-@dataclass(frozen=True)
-class PathSolution:
+class PathSolution(NamedTuple):
     """Solution of a path between two poses.
 
     Attributes
     ----------
-    solution : at its end, or why it could not be followed
-    pose : at its end; its depth is the one found under a prescribed force
-    work_mJ, dissipation_mJ : of the object on the finger, and of friction, on the way
+    solution : at its end, or why it cannot be followed
+    events : pose of the object and state at every event, the end is the last; none unless it converged
+    energies : work of the object and dissipation (mJ) on the way
     """
 
     solution: ContactSolution[State[Float]]
-    pose: ObjectPose
-    work_mJ: float
-    dissipation_mJ: float
+    events: list[tuple[ObjectPose, State[Float]]]
+    energies: tuple[float, float]
 
 
 def has_exact_path(model: Model) -> bool:
@@ -73,10 +72,7 @@ def has_exact_path(model: Model) -> bool:
 def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalForce | None = None) -> PathSolution:
     """Advance a state as the object moves straight from one pose to another.
 
-    Parameters
-    ----------
-    force : NormalForce, optional
-        If it is given, the depth of the end of the move is not used.
+    Under a prescribed force the depth at the end of the move is not used.
     """
     if force is not None:
         move = Move(move.start, replace(move.end, depth_mm=move.start.depth_mm))
@@ -118,12 +114,13 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
         )
     found, events = follow(contact, resultant)
     if not found.outcome.ok:
-        return PathSolution(found.with_state(state), move.start, 0.0, 0.0)
-    contact_state = replace(found.state, bases=bases)
-    after = State(contact_state, body.displacement(contact_state.force, bases))
-    pose = replace(move.end, depth_mm=move.end.depth_mm + events[-1].amplitude)
-    work, dissipation = _energies(problem, count, start, bases, move, events)
-    return PathSolution(found.with_state(after), pose, work, dissipation)
+        return PathSolution(found.with_state(state), [], (0.0, 0.0))
+    ends = []
+    for event in events:
+        pose = move.at(event.share)
+        after = State(replace(event.state, bases=bases), body.displacement(event.state.force, bases))
+        ends.append((replace(pose, depth_mm=pose.depth_mm + event.amplitude), after))
+    return PathSolution(found.with_state(ends[-1][1]), ends, _energies(problem, count, start, bases, move, events))
 
 
 def _along(bases: Float, displacement: Float) -> Float:

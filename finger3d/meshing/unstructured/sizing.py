@@ -19,6 +19,7 @@ RATE = 0.3
 
 _PLATEAU_STEPS = 1.2  # constant size around the zone, in background steps; the grid would miss a narrower zone
 _TETS_PER_CUBE = 10.0  # tets per (edge length)^3; measured 9.6 to 11
+_LAYER_EDGE = 0.85  # edge length in a layer that is thinner than the edges asked for, over its thickness
 _MAX_BACKGROUND_CELLS = 60  # along the longest side
 
 
@@ -132,8 +133,12 @@ def count_cells(design: Design, field: Sizing, samples: int = 40) -> float:
     x, z = np.meshgrid(field.low[0] + middle * spans[0], field.low[2] + middle * spans[2], indexing="ij")
     top = np.nan_to_num(design.top(x.ravel(), z.ravel()))
     column = spans[0] * spans[2] / samples**2 * top
-    total = 0.0
+    section, thickness, total = design.section(), 0.0, 0.0
+    if section is not None and section.layer is not None:
+        height, below = (float(part.top(np.zeros(1), np.zeros(1), 1.0)[0]) for part in (section, section.layer.below))
+        thickness = height - below
     for d, w in zip(depth, weight, strict=True):
         h = seen(np.stack([x.ravel(), top * (1.0 - d), z.ravel()], axis=1))
+        h = np.where(d * top < thickness, np.minimum(h, _LAYER_EDGE * thickness), h)
         total += w * float(column @ h**-3.0)
     return field.share_made * _TETS_PER_CUBE * total
