@@ -9,6 +9,9 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.objects.rigid import rotation
 
+_TIME = 3
+"""Place of the time among the coordinates of a pose."""
+
 
 @dataclass(frozen=True)
 class ObjectPose:
@@ -72,9 +75,20 @@ class Move:
         """Return the pose a share of the way from the start to the end."""
         return ObjectPose(*(self.start.coordinates + share * self.change).tolist())
 
+    def cut(self, share: float) -> tuple[Move, Move]:
+        """Return its two parts, the first of which is a share of it."""
+        middle = self.at(share)
+        return Move(self.start, middle), Move(middle, self.end)
+
     def length_ratio(self, before: Move) -> float | None:
-        """Return its length over that of the move before; None if the direction changes, or nothing moved before."""
+        """Return its length over that of the move before; None if the direction changes, or nothing moved before.
+
+        Time is compared only where the object rested before.
+        """
         last, now = before.change, self.change
+        in_space = np.arange(len(last)) != _TIME
+        if last[in_space].any():
+            last, now = last[in_space], now[in_space]
         if not last.any():
             return None
         ratio = float(now @ last) / float(last @ last)

@@ -29,6 +29,9 @@ from finger3d.progress import QUIET, Progress
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
+_FIRST_PART = 0.25
+"""Share of an increment that begins without contact at which it is cut: half of the contact's length under a ball."""
+
 
 @dataclass(frozen=True)
 class _Substep:
@@ -110,13 +113,17 @@ class Press:
         self.has_failed = False
         self._cancel, self._report = cancel, report
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
+        # where a compliance belongs to a pose or to a length of time, other increments have none or cost one
+        model, known_poses = problem.model, problem.contact_geometry is not None
+        costs = model.refactorises and not model.finite_strain
+        self._may_cut = not (model.is_defined_by_increments or known_poses or costs)
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
     def advance(
-        self, station: Station, guess: Float | None = None, solution: ContactSolution[State[Any]] | None = None
+        self, station: Station, guess: Float | None = None, solutions: Sequence[ContactSolution[State[Any]]] = ()
     ) -> StepResult:
         """Advance to a station, and return the result of the increment.
 
@@ -124,8 +131,8 @@ class Press:
         ----------
         guess : (c, d) array, N, optional
             Contact forces where the iteration starts; unless given, they are extrapolated from the last increment.
-        solution : ContactSolution, optional
-            Solution of the increment, if it is known already.
+        solutions : sequence of ContactSolution
+            Solutions of the motions that `moves_to` returns, if they are known already.
 
         Raises
         ------
@@ -134,11 +141,14 @@ class Press:
         """
         self._end_if_cancelled()
         move = Move(self.pose, station.pose)
-        if solution is not None:
-            end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
+        if solutions:
+            states = [self.state, *(solution.state for solution in solutions)]
+            moves = self.moves_to(station.pose)
+            parts = [_Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
+            end = _Advanced(solutions[-1], parts, station.pose)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
-            end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
+            end = _Advanced(*self._in_turn(self.state, self.moves_to(station.pose), self._cuts, start), station.pose)
         else:
             end = self._to_force(move, station.load)
         for part in end.parts:
@@ -158,6 +168,11 @@ class Press:
         now = self.state.contact.force
         return None if ratio is None else now + ratio * (now - force)
 
+    def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
+        """Return the motions in which an increment to a pose is solved: two where contact begins, and grows fastest."""
+        move = Move(self.pose, pose)
+        return move.cut(_FIRST_PART) if self._may_cut and not self.state.contact.force.any() else (move,)
+
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
             raise CancelledError
@@ -169,17 +184,23 @@ class Press:
         whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
         if whole.outcome.ok or cuts == 0:
             return whole, [_Substep(state, whole.state, move)]
-        middle = move.at(0.5)
-        first, done = self._increment(state, Move(move.start, middle), cuts - 1)
-        if not first.outcome.ok:
-            return replace(first, state=state, iterations=first.iterations + whole.iterations), done
-        second, more = self._increment(first.state, Move(middle, move.end), cuts - 1)
-        return replace(
-            second,
-            residual=max(first.residual, second.residual),
-            iterations=whole.iterations + first.iterations + second.iterations,
-            method="cut back",
-        ), done + more
+        halves, parts = self._in_turn(state, move.cut(0.5), cuts - 1)
+        return replace(halves, iterations=whole.iterations + halves.iterations, method="cut back"), parts
+
+    def _in_turn(
+        self, state: State[Any], moves: Sequence[Move], cuts: int, guess: Float | None = None
+    ) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
+        """Solve the parts of an increment one after another; the guess is that of the last."""
+        found, parts, residual, iterations = None, list[_Substep](), 0.0, 0
+        for move in moves:
+            start = state if found is None else found.state
+            found, more = self._increment(start, move, cuts, guess if move is moves[-1] else None)
+            parts += more
+            residual, iterations = max(residual, found.residual), iterations + found.iterations
+            if not found.outcome.ok:
+                break
+        assert found is not None
+        return replace(found, residual=residual, iterations=iterations), parts
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:
         """Advance to the depth where the normal force is the prescribed one.
@@ -208,7 +229,7 @@ class Press:
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
                 start = _expecting(state, there, ends, share) if problem.model.finite_strain else state
-            found, parts[depth] = self._increment(start, there, self._cuts, guess)
+            found, parts[depth] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from finger3d._types import freeze_arrays
+import numpy as np
+
+from finger3d._types import Float, freeze_arrays
+from finger3d.contact.friction import OPEN
 from finger3d.contact.state import ContactState
+from finger3d.objects import Move
 
 B = TypeVar("B")
 
@@ -19,10 +23,30 @@ class State(Generic[B]):
     ----------
     contact : state of the candidate contact points
     body : what the formulation of the body needs besides, see `finger3d.mechanics.formulation.Formulation`
+    last : tuple of Move and (c, d) array, optional
+        Motion of the object in the increment that led here, and the change of gap and tangential displacement, mm.
     """
 
     contact: ContactState
     body: B
+    last: tuple[Move, Float] | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+
+    def motion_until_touch(self, move: Move) -> Float:
+        """Return the tangential motion (c, d) mm, in x, y, z, of open points relative to the object until they touch.
+
+        Their gap g and their place are expected to change as in the last increment, so that a point touches after the
+        share g / (g - g') of the increment, where g' < 0 would be its gap at the end.  The motion is zero where the
+        path begins or turns.
+        """
+        contact = self.contact
+        ratio = None if self.last is None else move.length_ratio(self.last[0])
+        if self.last is None or ratio is None:
+            return np.zeros_like(contact.force)
+        motion, gap = ratio * self.last[1], np.maximum(contact.gap, 0.0)
+        closes = -motion[:, 0] > gap
+        share = np.where(contact.status == OPEN, 1.0, 0.0)
+        share[closes] *= gap[closes] / -motion[closes, 0]
+        return np.asarray(np.einsum("ct,ctk->ck", share[:, None] * motion[:, 1:], contact.own_bases[:, 1:]))
