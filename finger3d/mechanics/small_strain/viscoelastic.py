@@ -14,7 +14,7 @@ displacement in place of f_e: one factorisation of K_b + alpha K_s for each leng
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -96,15 +96,15 @@ class Viscoelastic:
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         delassus = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
-        before = replace(state, body=state.body.displacement)
+        before = State(state.contact, state.body.displacement, state.last)
         solution = solve_increment(problem, before, move, LinearBody(delassus, past.reshape(c, d)), guess, workspace)
         if solution.state is before:
             return solution.with_state(state)
         rows = problem.row_forces(problem.upright_force(solution.state.contact))
         if len(springs):
             rows[first:] = spring_forces(condensed, springs, body.moved + condensed @ rows)
-        body_after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
-        return solution.with_state(replace(solution.state, body=body_after))
+        after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
+        return solution.with_state(State(solution.state.contact, after, solution.state.last))
 
     def unknowns(self, problem: Problem, states: Sequence[State[ViscousBody]]) -> Iterator[Float]:
         """Yield the unknowns of each state from its internal variables."""
