@@ -113,10 +113,9 @@ class Press:
         self.has_failed = False
         self._cancel, self._report = cancel, report
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
-        # where a compliance belongs to a pose or to a length of time, other increments have none or cost one
-        model, known_poses = problem.model, problem.contact_geometry is not None
-        costs = model.refactorises and not model.finite_strain
-        self._may_cut = not (model.is_defined_by_increments or known_poses or costs)
+        # in small strain without bulk relaxation, an increment of another duration costs a factorisation
+        model = problem.model
+        self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
         body = problem.without_inclusions
@@ -157,7 +156,7 @@ class Press:
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
-        return self._result(end.solution, self._free_strain(station))
+        return self._result(end, self._free_strain(station))
 
     def expected_force(self, pose: ObjectPose) -> Float | None:
         """Return the forces (c, d) N extrapolated to a pose, if the path continues in its last direction."""
@@ -259,8 +258,8 @@ class Press:
         columns = [strain_columns(gauge.name) for gauge in self.problem.model.gauges]
         return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
-    def _result(self, solution: ContactSolution[State[Any]], free_strain: dict[Column, float]) -> StepResult:
-        problem, state, pose = self.problem, self.state, self.pose
+    def _result(self, end: _Advanced, free_strain: dict[Column, float]) -> StepResult:
+        problem, state, pose, solution = self.problem, self.state, self.pose, end.solution
         moment = self.formulation.loads(problem, state, pose).moment
         return StepResult(
             target=pose,
@@ -277,6 +276,7 @@ class Press:
             method=solution.method,
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
+            parts=tuple((part.move.end, part.after) for part in end.parts),
         )
 
 

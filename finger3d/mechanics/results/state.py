@@ -34,19 +34,23 @@ class State(Generic[B]):
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
-    def motion_until_touch(self, move: Move) -> Float:
-        """Return the tangential motion (c, d) mm, in x, y, z, of open points relative to the object until they touch.
+    def share_until_touch(self, move: Move) -> Float:
+        """Return the share (c,) of their last motion that open points make until they touch in a motion of the object.
 
-        Their gap g and their place are expected to change as in the last increment, so that a point touches after the
-        share g / (g - g') of the increment, where g' < 0 would be its gap at the end.  The motion is zero where the
+        Their gap g and their place are expected to change as in the last increment, so that a point touches when
+        g / (g - g') of the increment is over, where g' < 0 would be its gap at the end.  The share is zero where the
         path begins or turns.
         """
-        contact = self.contact
         ratio = None if self.last is None else move.length_ratio(self.last[0])
         if self.last is None or ratio is None:
-            return np.zeros_like(contact.force)
-        motion, gap = ratio * self.last[1], np.maximum(contact.gap, 0.0)
-        closes = -motion[:, 0] > gap
-        share = np.where(contact.status == OPEN, 1.0, 0.0)
-        share[closes] *= gap[closes] / -motion[closes, 0]
-        return np.asarray(np.einsum("ct,ctk->ck", share[:, None] * motion[:, 1:], contact.own_bases[:, 1:]))
+            return np.zeros(len(self.contact.gap))
+        closing, gap = -self.last[1][:, 0], np.maximum(self.contact.gap, 0.0)
+        share = np.divide(gap, closing, out=np.full_like(gap, np.inf), where=closing > 0.0)
+        return np.where(self.contact.status == OPEN, np.minimum(share, ratio), 0.0)
+
+    def motion_until_touch(self, move: Move) -> Float:
+        """Return the tangential motion (c, d) mm, in x, y, z, of open points over the object until they touch."""
+        if self.last is None:
+            return np.zeros_like(self.contact.force)
+        motion = self.share_until_touch(move)[:, None] * self.last[1][:, 1:]
+        return np.asarray(np.einsum("ct,ctk->ck", motion, self.contact.own_bases[:, 1:]))
