@@ -56,9 +56,9 @@ def test_presses_that_their_increments_define_take_these_as_they_are(
     assert all(len(step.parts) == 1 for step in steps)
 
 
-def test_the_increment_in_which_contact_begins_has_two_parts() -> None:
+def test_the_increment_in_which_contact_begins_has_three_parts() -> None:
     _, steps = run(half_cylinder(0.5, steps=4))
-    assert [len(step.parts) for step in steps] == [2, 1, 1, 1]
-    first, second = steps[0].parts
-    assert first[0].depth_mm == pytest.approx(0.25 * second[0].depth_mm)
-    assert second[1] is steps[0].meshed_state
+    assert [len(step.parts) for step in steps] == [3, 1, 1, 1]
+    depths = [pose.depth_mm / steps[0].target.depth_mm for pose, _ in steps[0].parts]
+    assert depths == pytest.approx([1.0 / 16.0, 0.25, 1.0])
+    assert steps[0].parts[-1][1] is steps[0].meshed_state

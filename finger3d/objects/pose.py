@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -75,10 +76,10 @@ class Move:
         """Return the pose a share of the way from the start to the end."""
         return ObjectPose(*(self.start.coordinates + share * self.change).tolist())
 
-    def cut(self, share: float) -> tuple[Move, Move]:
-        """Return its two parts, the first of which is a share of it."""
-        middle = self.at(share)
-        return Move(self.start, middle), Move(middle, self.end)
+    def cut(self, *shares: float) -> tuple[Move, ...]:
+        """Return its parts between ascending shares of it."""
+        poses = [self.start, *map(self.at, shares), self.end]
+        return tuple(Move(start, end) for start, end in pairwise(poses))
 
     def length_ratio(self, before: Move) -> float | None:
         """Return its length over that of the move before; None if the direction changes, or nothing moved before.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from finger3d.mechanics.model import Leg
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Move, ObjectPose
 
 AUTO_START = 10
@@ -33,6 +33,11 @@ class Station:
 
     pose: ObjectPose
     load: Load | None = None
+
+
+def is_exact(model: Model) -> bool:
+    """Whether increments leave no error, since the path between their ends is followed exactly."""
+    return False
 
 
 def stations(legs: tuple[Leg, ...]) -> list[Station]:

@@ -29,8 +29,9 @@ from finger3d.progress import QUIET, Progress
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
-_FIRST_PART = 0.25
-"""Share of an increment that begins without contact at which it is cut: half of the contact's length under a ball."""
+_FIRST_PARTS = 1.0 / 16.0, 0.25
+"""Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
+ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
 
 
 @dataclass(frozen=True)
@@ -168,9 +169,9 @@ class Press:
         return None if ratio is None else now + ratio * (now - force)
 
     def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
-        """Return the motions in which an increment to a pose is solved: two where contact begins, and grows fastest."""
+        """Return the motions in which an increment to a pose is solved: several where contact begins."""
         move = Move(self.pose, pose)
-        return move.cut(_FIRST_PART) if self._may_cut and not self.state.contact.force.any() else (move,)
+        return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
