@@ -13,7 +13,7 @@ from finger3d.scene import parse
 from tests.sensor_cases import scene
 
 NOISE = {"normal_force_N": 0.5, "gauge_g36": 3e-4}
-TRUE = {"material.E_MPa": 0.37, "friction.mu": 0.6}
+TRUE = {"material.E_MPa": 0.37, "friction.mu": 0.2}
 PRESS = {"depth_mm": 10.0, "steps": 8}
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.05, 1.0)}
 

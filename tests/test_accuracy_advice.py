@@ -1,4 +1,4 @@
-"""Advice: changes by large deformation and by more increments, told where they are known, beside the same press."""
+"""Advice: changes by large deformation, told where they are known, beside the same press."""
 
 from __future__ import annotations
 
@@ -43,20 +43,16 @@ def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
     places = [large.index(text) for text in told]
     assert places == sorted(places)
     assert not any(name in large for name in ("friction", "gauge_c"))
-    one = ChangeEstimate(changes={"friction_sum_N": Change(4.0, -0.2, 0.04, significant=True)})
-    more = advise(model, 0.02, increments=one)[0]
-    assert "-5 % (-6 to -4 %)" in more
-    assert "press.steps" in more
 
 
 def test_without_a_known_change_no_number_is_told() -> None:
     model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, significant=False)}
     for estimate in (None, ChangeEstimate(method="no estimate: why"), ChangeEstimate(changes=unknown)):
-        line, *_ = advise(model, 0.2, estimate, estimate)
+        line, *_ = advise(model, 0.2, estimate)
         assert "0.2" in line
         assert "[effects.large_deformation]" in line
         assert "%" not in line
-        assert not any("%" in line for line in advise(model, 0.06, estimate, estimate))
+        assert not any("%" in line for line in advise(model, 0.06, estimate))
     assert not any("large_deformation" in line for line in advise(LargeDeformation().apply(model), 0.2))
 
 
@@ -105,7 +101,6 @@ def test_advice_comes_with_numbers_and_goes_when_it_is_followed(tmp_path: Path) 
         said[name] = " ".join(json.loads((out / "summary.json").read_text(encoding="utf-8"))["advice"])
     assert "% (" in said["small"]
     assert "[effects.large_deformation]" in said["small"]
-    assert "press.steps" in said["small"]
     assert "[effects.large_deformation]" in said["viscous"]
     assert "large_deformation" not in said["large"]
     assert "% (" not in said["viscous"] + said["large"] + said["auto"]

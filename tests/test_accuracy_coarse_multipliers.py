@@ -88,10 +88,11 @@ def test_no_distance_from_a_curved_object_is_computed_again(name: str, monkeypat
 def test_an_increment_linearised_about_its_own_solution_is_that_solution(name: str) -> None:
     problem = build(MODELS[name])
     start, after = formulation_of(problem.model).start(problem), list(march(problem))[0]
-    contact, moved = after.meshed_state.contact, after.meshed_state.body
+    pose, state = after.parts[0]
+    contact, moved = state.contact, state.body
     own = ContactGeometry(contact.gap, np.ones(len(contact.gap)), np.zeros_like(moved), contact.bases)
-    known = replace(problem, contact_geometry={after.target: (own, moved)})
+    known = replace(problem, contact_geometry={pose: (own, moved)})
     body = LinearBody(problem.delassus, np.zeros_like(moved))
-    found = solve_linearised(known, start, Move(problem.origin, after.target), body, None)
+    found = solve_linearised(known, start, Move(problem.origin, pose), body, None)
     assert found.outcome.ok
     assert found.state.contact.force == pytest.approx(contact.force, abs=1e-6 * np.abs(contact.force).max())

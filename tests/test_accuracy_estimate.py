@@ -32,6 +32,9 @@ from tests.scenes import HALF_CYLINDER, changed, solid
 
 SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 
+UNRESOLVED = 0.005
+"""Relative error below which one comparison of two runs may agree by chance, as points close one by one."""
+
 
 def last_of(model: Model) -> dict[str, float]:
     problem, frames = run(model)
@@ -56,10 +59,10 @@ def test_the_step_error_falls_with_the_increments_and_bounds_the_true_one() -> N
     runs = {n: replace(problem, model=replace(problem.model, legs=(Leg(1.0, steps=n),))) for n in (5, 10, 20, 160)}
     told = {n: main_numbers(p, list(march(p))[-1]) for n, p in runs.items()}
     name = "friction_sum_N"
-    bars = {n: step_error(runs[n], told[n], main_numbers)[name] for n in (5, 10, 20)}
+    bars = {n: step_error(runs[n], told[n], main_numbers, 2.0)[name] for n in (5, 10, 20)}
     for n, bar in bars.items():
-        assert abs(told[n][name] - told[160][name]) <= 2.0 * bar
-    assert bars[20] < bars[5]
+        assert abs(told[n][name] - told[160][name]) <= max(2.0 * bar, UNRESOLVED * told[160][name])
+    assert bars[20] < bars[10]
 
 
 def test_few_increments_are_judged_by_more() -> None:
@@ -68,7 +71,8 @@ def test_few_increments_are_judged_by_more() -> None:
     told = main_numbers(problem, frames[-1])
     many = last_of(half_cylinder(0.2, steps=80))
     name = "friction_sum_N"
-    assert 0.0 < abs(told[name] - many[name]) <= 2.0 * step_error(problem, told, main_numbers)[name]
+    bar = step_error(problem, told, main_numbers, 2.0)[name]
+    assert 0.0 < abs(told[name] - many[name]) <= max(2.0 * bar, UNRESOLVED * many[name])
 
 
 def test_where_marching_is_dear_increments_are_judged_with_fewer_multipliers() -> None:
@@ -93,7 +97,7 @@ def test_increments_under_a_curved_object_have_bars_however_many_there_are(
     beside, last = run(replace(model, legs=(Leg(1.0, steps=320),)))
     many = press_numbers(beside, last[-1])
     for name in ("normal_force_N", "friction_sum_N", "external_work_mJ"):
-        within = 2.0 * found.steps[name] + 1e-4 * told[name]  # a point may change its state among the many only
+        within = max(2.0 * found.steps[name], UNRESOLVED * told[name])
         assert abs(told[name] - many[name]) <= within, name
 
 
@@ -115,15 +119,15 @@ def test_increments_that_cannot_be_judged_leave_the_bars_of_the_mesh(monkeypatch
 def test_a_run_that_fails_is_replaced_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, frames = run(half_cylinder(0.4, steps=4))
 
-    def only_down(problem: Problem, numbers: object, measurement: object, way: str) -> dict[str, float]:
-        if way != "down" or len(problem.surface.nodes) < len(frames[-1].meshed_state.contact.gap):
+    def only_half(problem: Problem, numbers: object, measurement: object, ratio: float) -> dict[str, float]:
+        if ratio > 1.0 or len(problem.surface.nodes) < len(frames[-1].meshed_state.contact.gap):
             raise Finger3dError("it did not converge")
         return {"normal_force_N": 0.5}
 
-    monkeypatch.setattr("finger3d.accuracy.estimate.step_error", only_down)
+    monkeypatch.setattr("finger3d.accuracy.estimate.step_error", only_half)
     found = estimate(problem, frames)
     assert found.steps == {"normal_force_N": 0.5}
-    assert found.method.endswith("steps: a quarter and half as many, order 1")
+    assert found.method.endswith("steps: half as many, order 1")
 
 
 def test_under_a_force_the_depth_has_the_bar() -> None:

@@ -91,10 +91,12 @@ def test_a_factor_without_gauges_changes_no_mesh() -> None:
 
 def test_a_gauge_of_a_solid_is_known_to_a_per_cent_with_few_unknowns() -> None:
     # meshes with equal edges have errors of 0.3 to 0.9 % at 91 000 unknowns (2 mm) and of 3 to 5 % at 35 000 (3 mm);
-    # 0.0338 was found on 155 000 unknowns with edges of 0.5 mm around the gauge and at the contact close to it
+    # 0.0338 was found on 155 000 unknowns with edges of 0.5 mm around the gauge and at the contact close to it; ten
+    # increments leave 0.4 % of the strain, forty nothing
     model = fig9(material=Isotropic(1.0, 0.49), mesh=MeshOptions(4.0, 16.0, "swept"), friction=Coulomb(0.25))
     found = refine_mesh(replace(model, legs=(Leg(10.0, steps=10),)), 0.015, goal="gauge_g36")
     assert found.met
     assert found.problem is not None
     assert found.best.dofs < 91_000 / 4
-    assert list(march(found.problem))[-1].gauges["g36"] == pytest.approx(0.0338, rel=0.02)
+    problem = replace(found.problem, model=replace(found.problem.model, legs=(Leg(10.0, steps=40),)))
+    assert list(march(problem))[-1].gauges["g36"] == pytest.approx(0.0338, rel=0.02)

@@ -8,11 +8,10 @@ from typing import Any
 
 import pytest
 
-from finger3d._cost import CHANGES, PressSize
+from finger3d._cost import PressSize
 from finger3d.accuracy import large_deformation as module
 from finger3d.accuracy.changes import changing_numbers
 from finger3d.accuracy.large_deformation import large_deformation
-from finger3d.accuracy.more_increments import more_increments
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -70,10 +69,6 @@ def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.Monke
         (large_deformation(papers, step, 2), "number of increments"),
         (large_deformation(whole, end, 2), "too coarse"),
         (large_deformation(forced, step, 2), "to a force"),
-        (more_increments(filled, step, 2), "kinetic_friction"),
-        (more_increments(papers, step, 2), "number of increments"),
-        (more_increments(forced, step, 2), "to a force"),
-        (more_increments(problem, step, 10**6), f" {CHANGES.seconds(problem.size.press_s(10**6)):.2g} s"),
     ):
         assert found.changes == {}
         assert why in found.method

@@ -56,7 +56,7 @@ def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> N
 def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> None:
     measured = bench(tmp_path / "bench.csv")
     found = finger3d.identify(
-        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.6"]
+        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.2"]
     )
     assert found.presses == 1
     assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
@@ -66,7 +66,7 @@ def test_a_hardness_is_fitted_by_the_modulus_that_it_gives(tmp_path: Path, scene
     """Forces scale with the modulus of the hardness, so that one press is enough."""
     measured, fitted = bench(tmp_path / "bench.csv"), {}
     for key, bounds in {"material.E_MPa": (0.05, 5.0), "material.shore_00": (5.0, 90.0)}.items():
-        options = ["friction.mu=0.6", "material.nu=0.45"]
+        options = ["friction.mu=0.2", "material.nu=0.45"]
         found = finger3d.identify(scene_file, measured, {key: bounds}, tmp_path / key, options)
         assert found.presses == 1
         fitted[key] = float(found.fitted.values[0])
@@ -76,7 +76,7 @@ def test_a_hardness_is_fitted_by_the_modulus_that_it_gives(tmp_path: Path, scene
 def test_an_offset_of_the_depth_is_found(tmp_path: Path, scene_file: Path) -> None:
     measured = bench(tmp_path / "bench.csv", offset=0.3)
     free = {"material.E_MPa": (0.05, 5.0), "depth_offset_mm": (-1.0, 0.0)}
-    found = finger3d.identify(scene_file, measured, free, tmp_path / "out", ["friction.mu=0.6", "press.depth_mm=10.5"])
+    found = finger3d.identify(scene_file, measured, free, tmp_path / "out", ["friction.mu=0.2", "press.depth_mm=10.5"])
     assert found.fitted.values[1] == pytest.approx(-0.3, abs=0.05)
 
 

@@ -48,12 +48,12 @@ def test_force_and_strain_are_those_of_the_scene(body: LiveBody) -> None:
 
 
 def test_the_standard_deviation_of_mu_is_that_of_a_calibration(body: LiveBody) -> None:
-    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), 0.3, 0.6, 1e-3)
-    low, high = (pressed(0.3 + step)[1] for step in (-MU_STEP, MU_STEP))
+    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), 0.15, 0.6, 1e-3)
+    low, high = (pressed(0.15 + step)[1] for step in (-MU_STEP, MU_STEP))
     assert found.slope == pytest.approx((high - low) / (2.0 * MU_STEP), rel=0.01)  # almost straight
     moved = [
         [
-            pressed(0.3, **{key: GAUGE[key] + sign * TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
+            pressed(0.15, **{key: GAUGE[key] + sign * TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
             for sign in (1.0, -1.0)
         ]
         for key in ("x_mm", "y_mm", "angle_deg")

@@ -36,13 +36,13 @@ def test_automatic_increments_end_within_their_estimate() -> None:
     problem = build(fig9(domain="plane-strain", legs=(Leg(10.0, steps="auto"),)))
     seen: list[tuple[int, int]] = []
     *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
-    assert seen[:6] == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5), (1, 10)]
+    assert seen[:11] == [*((k, 10) for k in range(1, 11)), (1, 20)]
     assert seen[-1] == (len(frames), len(frames))
     assert estimate is not None
     assert estimate.met
     assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01
     assert estimate.dissipation <= 0.05
-    assert [count for count, _ in estimate.runs] == [5 * 2**k for k in range(len(estimate.runs))]
+    assert [count for count, _ in estimate.runs] == [10 * 2**k for k in range(len(estimate.runs))]
     fine = list(march(replace(problem, model=replace(problem.model, legs=(Leg(10.0, steps=4 * len(frames)),)))))
     a, b = measure(problem.points, frames[-1]), measure(problem.points, fine[-1])
     assert a["normal_force_N"] == pytest.approx(b["normal_force_N"], rel=0.01)
@@ -59,8 +59,7 @@ def stuck(**changes: object) -> Model:
     return replace(model, **changes)
 
 
-def test_two_counts_that_agree_by_chance_do_not_pass() -> None:
-    # in 5 and 20 increments the friction sum is the same by chance, in 80 a fifth less
+def test_errors_of_a_press_that_sticks_are_within_twice_their_estimate() -> None:
     model = stuck()
     problem = build(model)
     told = {}
@@ -68,19 +67,12 @@ def test_two_counts_that_agree_by_chance_do_not_pass() -> None:
         trial = replace(problem, model=replace(model, legs=(Leg(10.0, steps=steps),)))
         told[steps] = press_numbers(trial, list(march(trial))[-1])
         if steps < 320:
-            bars = step_error(trial, told[steps], press_numbers)
+            bars = step_error(trial, told[steps], press_numbers, 2.0)
             told[steps] |= {f"bar {name}": bar for name, bar in bars.items()}
     for steps in (5, 10, 20, 40):
         for name in ("normal_force_N", "friction_sum_N", "gauge_g36", "external_work_mJ", "dissipation_mJ"):
-            assert abs(told[steps][name] - told[320][name]) <= 2.0 * told[steps][f"bar {name}"], (steps, name)
-
-
-def test_dissipation_below_its_floor_is_said_not_to_be_resolved() -> None:
-    frames, estimate = march_automatic(build(stuck(legs=(Leg(10.0, steps="auto"),))))
-    assert estimate is not None
-    assert frames[-1].dissipation_mJ < estimate.dissipation_floor_mJ
-    assert not estimate.dissipation_resolved
-    assert f"{estimate.dissipation_floor_mJ:.2g} mJ" in estimate.advice
+            bar = max(2.0 * told[steps][f"bar {name}"], 1e-3 * abs(told[320][name]))
+            assert abs(told[steps][name] - told[320][name]) <= bar, (steps, name)
 
 
 @pytest.mark.parametrize("name", ["rule", "branch"])
@@ -131,12 +123,10 @@ def test_a_failure_before_the_automatic_legs_is_not_repeated() -> None:
     assert estimate is None
 
 
-def test_the_remaining_error_is_exact_at_the_first_order_and_keeps_the_largest() -> None:
-    counts = (10, 20, 40)
-    assert increment_error(counts, [1.0 + 1.0 / n for n in counts], 40) == pytest.approx(1.0 / 40.0)
-    assert increment_error(counts, [1.0 + 1.0 / n for n in counts], 10) == pytest.approx(1.0 / 10.0)
-    # 20 and 40 agree by chance: the change from 10 to 20, 20 / N, is not forgotten
-    assert increment_error(counts, [2.0, 1.0, 1.0], 40) == pytest.approx(20.0 / 40.0)
+@pytest.mark.parametrize("ratio", [0.25, 0.5, 2.0])
+def test_the_error_is_exact_at_first_order(ratio: float) -> None:
+    value, other = (3.0 + 1.0 / n for n in (20.0, 20.0 * ratio))
+    assert increment_error(value, other, ratio) == pytest.approx(1.0 / 20.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])
@@ -146,6 +136,6 @@ def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Dom
         limits(model, PressSize(2 if domain == "plane-strain" else 3, 1e4 * points, points))
         for points in (30, 300, 3000)
     ]
-    assert all(first == 5 and last >= 20 for first, last in found)
+    assert all(first == 10 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
-    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (3, 12)
+    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (6, 12)

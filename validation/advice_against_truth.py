@@ -1,6 +1,6 @@
-"""Is what a press says that large deformation, or more increments, would change within a factor of 1.5 of the truth?
+"""Is what a press says that large deformation would change within a factor of 1.5 of the truth?
 
-Truth is the same press on the same mesh at large deformation, or in 640 increments.  The scenes are drawn at random:
+Truth is the same press on the same mesh at large deformation.  The scenes are drawn at random:
 sections as in error_bars, with another seed, so that none was used to choose the factors of the estimates, and coarse
 swept solids.  A press reports a change if the half-width of its interval is below a third of it, and if it is at least
 1 % of a force or of the largest gauge strain.  What it reports is judged by the factor in nine cases of ten, and by the
@@ -20,7 +20,6 @@ import numpy as np
 from finger3d.accuracy.advice import LEAST_STRAIN, largest_principal_strain
 from finger3d.accuracy.changes import Change, changing_numbers
 from finger3d.accuracy.large_deformation import large_deformation
-from finger3d.accuracy.more_increments import more_increments
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.solids.material import Isotropic
@@ -41,10 +40,9 @@ SEED = 23
 """The factors of the estimates were chosen with the seed 2026."""
 
 SECTIONS, SOLIDS = 54, 6
-COUNTS, TRUE_COUNT = (5, 10, 20), 640
 FACTOR, SHARE, COVERED = 1.5, 0.9, 0.8
 KINDS = {"normal_force_N": "normal force", "friction_sum_N": "friction sum", "gauge": "gauge"}
-LARGE, MORE = "large deformation", "more increments"
+LARGE = "large deformation"
 CLAIM = "claim of finger3d for its advice"
 COLUMNS = "scene by number value change error reported true_change"
 
@@ -134,33 +132,21 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
         yield from _judged(name, LARGE, estimate.changes, changing_numbers(truth, end))
 
 
-def by_more_increments(name: str, model: Model, count: int, true_count: int) -> Iterator[Judged]:
-    """Yield the changes by more increments than `count` in each leg."""
-    few, many = (replace(model, legs=tuple(replace(leg, steps=n) for leg in model.legs)) for n in (count, true_count))
-    problem = build(few)
-    estimate = more_increments(problem, last(problem), count * len(few.legs))
-    end = last(replace(problem, model=many))
-    if end.outcome.ok:
-        yield from _judged(name, MORE, estimate.changes, changing_numbers(problem, end))
-
-
 def _judged(name: str, by: str, changes: Mapping[str, Change], truth: Mapping[str, float]) -> Iterator[Judged]:
     for number, change in changes.items():
         yield Judged(name, by, number, change, truth[number] - change.value)
 
 
 def run(quick: bool) -> Result:
-    """Large deformation and more increments in every scene."""
+    """Large deformation in every scene."""
     found: list[Judged] = []
     pressed = 0
-    for number, (name, model) in enumerate(scenes(quick)):
+    for name, model in scenes(quick):
         found += by_large_deformation(name, model)
         pressed += 1
-        found += by_more_increments(name, model, COUNTS[number % len(COUNTS)], 160 if quick else TRUE_COUNT)
     rows = [_estimated(found, pressed)]
-    for by in (LARGE, MORE):
-        for kind in KINDS:
-            rows += _rows([j for j in found if j.by == by and j.kind == kind], f"{KINDS[kind]} by {by}")
+    for kind in KINDS:
+        rows += _rows([j for j in found if j.kind == kind], f"{KINDS[kind]} by {LARGE}")
     lines = [
         (j.scene, j.by, j.number, j.estimate.value, j.estimate.change, j.estimate.error, j.estimate.significant, j.true)
         for j in found
@@ -212,10 +198,10 @@ def _rows(found: list[Judged], what: str) -> list[Row]:
 
 def _draw(figure: Any, found: list[Judged]) -> None:
     """Draw true over estimated changes, and the band of the factor."""
-    figure.set_size_inches(13.5, 8.6)
-    panels = figure.subplots(2, 3)
+    figure.set_size_inches(13.5, 4.5)
+    panels = figure.subplots(1, 3, squeeze=False)
     figure.suptitle("True change against the change that a press reports; the band is a factor of 1.5")
-    for line, by in zip(panels, (LARGE, MORE), strict=True):
+    for line, by in zip(panels, (LARGE,), strict=True):
         for axes, kind in zip(line, KINDS, strict=True):
             here = [j for j in found if j.by == by and j.kind == kind]
             reach = 0.0

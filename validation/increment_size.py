@@ -78,7 +78,7 @@ def _automatic(here: str, problem: Problem) -> list[Row]:
         "normal force": ([p.force for p in profiles], TOLERANCE),
         "sum of |f_t|": ([float(np.abs(p.q) @ p.area) for p in profiles], TOLERANCE),
     }
-    if chosen.dissipation_resolved:
+    if chosen.dissipation <= DISSIPATION_TOLERANCE:
         numbers["dissipation"] = [end.dissipation_mJ for end in ends], DISSIPATION_TOLERANCE
     return [
         Row(

@@ -3,23 +3,27 @@
 In increment k the contact forces r_k are linear functions P_k x_k of the unknowns of the active set, and satisfy its
 linear equations (`finger3d.contact.newton.ActiveSet`)::
 
-    D_k (W r_k - S_k W r_{k-1} + q_k) + E_k x_k = 0
+    D_k (W r_k - B_k W r_{k-1} - C_k W r_{k-2} + q_k) + E_k x_k = 0
 
-S_k keeps tangential components, since slip is counted from the increment before.  For a number J(r, W r) with the
-derivatives g_k by the forces and v_k by the displacements of increment k, the adjoint equations, backwards from the
-last increment, are ::
+B_k keeps tangential components, since slip is counted from the increment before.  A point that closes in the increment
+slips from where it touches, which depends on its motion in the increment before; B_k and C_k have the derivatives.  For
+a number J(r, W r) with the derivatives g_k by the forces and v_k by the displacements of increment k, the adjoint
+equations, backwards from the last increment, are ::
 
-    A_k^T y_k = P_k^T (g_k + W v_k + W S_{k+1} z_{k+1}),   z_k = D_k^T y_k,   A_k = D_k W P_k + E_k
+    A_k^T y_k = P_k^T (g_k + W (v_k + p_k)),   z_k = D_k^T y_k,   A_k = D_k W P_k + E_k
+    p_k = B_{k+1}^T z_{k+1} + C_{k+2}^T z_{k+2}
 
 and a change of the Delassus operator changes the number by ``sum_k l_k . dW r_k`` with the adjoint loads
-``l_k = v_k - z_k + S_{k+1} z_{k+1}``.  Active sets and the normals of the object are held fixed.
+``l_k = v_k - z_k + p_k``.  Active sets and the normals of the object are held fixed.  An increment that was solved in
+parts counts as several.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from itertools import pairwise
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -36,8 +40,12 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
-from finger3d.objects import vertical_frame
+from finger3d.objects import Move, vertical_frame
+
+_ROUND_OFF = 1e-12
+"""Relative round-off of the share of a motion until touch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +80,11 @@ class LinearisedIncrement:
     forces : (c d, k) sparse, P
     weights : (k, c d) sparse, D
     factor : LU factors of A
-    turn : (c d, c d) sparse
-        From the directions of an upright object to those of each point.
     """
 
     forces: Any
     weights: Any
     factor: tuple[Float, Float]
-    turn: Any
 
     @classmethod
     def of(cls, problem: Problem, before: ContactState, after: ContactState) -> LinearisedIncrement:
@@ -113,7 +118,7 @@ class LinearisedIncrement:
         matrix = cast("Float", assemble_in_place(local, active, np.float64))
         factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)
         turned = turn[(points[:, None] * d + np.arange(d)).ravel()]
-        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, factor, turn)
+        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, factor)
 
     def adjoint(self, gradient: Float) -> Float:
         """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""
@@ -121,11 +126,40 @@ class LinearisedIncrement:
             return np.zeros_like(gradient)
         return np.asarray(self.weights.T @ lu_solve(self.factor, self.forces.T @ gradient, trans=1))
 
-    def tangential(self, vectors: Float, dim: int) -> Float:
-        """Return S times vectors (c d, g): their parts along the object's surface."""
-        local = self.turn @ vectors
-        local[::dim] = 0.0
-        return np.asarray(self.turn.T @ local)
+
+@dataclass(frozen=True)
+class SlipReference:
+    """Where slip in an increment is counted from, as a function of the displacements before it.
+
+    Attributes
+    ----------
+    by_last, by_earlier : (c d, c d) sparse
+        Derivatives B and C by the displacements at the start of the increment and of the one before, in the directions
+        of an upright object.
+    """
+
+    by_last: Any
+    by_earlier: Any
+
+    @classmethod
+    def of(cls, problem: Problem, part: _Part) -> SlipReference:
+        """Return the reference of the increment between two states."""
+        d = part.after.contact.force.shape[1]
+        end, bases = (state.contact.own_bases @ vertical_frame(d).T for state in (part.after, part.before))
+        along = np.einsum("ctk,ctl->ckl", end[:, 1:], end[:, 1:])
+        if part.before.last is None or problem.model.is_defined_by_increments:
+            return cls(_block_diagonal(along), _block_diagonal(np.zeros_like(along)))
+        share, motion = part.before.share_until_touch(part.move), part.before.last[1]
+        slope = np.zeros_like(motion[:, 1:])
+        touches = (
+            (share > 0.0)
+            & (motion[:, 0] < 0.0)
+            & (share * -motion[:, 0] >= (1.0 - _ROUND_OFF) * part.before.contact.gap)
+        )
+        slope[touches] = motion[touches, 1:] / -motion[touches, :1]
+        normal = np.einsum("ct,ctk,cl->ckl", slope, bases[:, 1:], bases[:, 0])
+        moved = share[:, None, None] * (np.einsum("ctk,ctl->ckl", bases[:, 1:], bases[:, 1:]) + normal)
+        return cls(_block_diagonal(along @ (np.eye(d) + normal + moved)), _block_diagonal(-along @ moved))
 
 
 def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence[Goal]) -> Float:
@@ -138,30 +172,32 @@ def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence
     """
     c, d = problem.delassus.shape[:2]
     delassus = problem.delassus.reshape(c * d, c * d)
-    states = _states(problem, steps)
-    out = np.zeros((len(steps), c * d, len(goals)))
-    later = np.zeros((c * d, len(goals)))  # S z of the increment after
-    for k in range(len(steps) - 1, -1, -1):
-        increment = LinearisedIncrement.of(problem, states[k], states[k + 1])
+    parts = _parts(problem, steps)
+    out = np.zeros((len(parts), c * d, len(goals)))
+    later, last = np.zeros((2, c * d, len(goals)))  # p of the increment, and the term of the one before it
+    for k in range(len(parts) - 1, -1, -1):
+        increment = LinearisedIncrement.of(problem, parts[k].before.contact, parts[k].after.contact)
         direct = np.stack([goal.by_displacement[k] for goal in goals], axis=1)
         gradient = np.stack([goal.by_force[k] for goal in goals], axis=1) + delassus @ (direct + later)
         z = increment.adjoint(gradient)
         out[k] = direct - z + later
-        later = increment.tangential(z, d)
+        reference = SlipReference.of(problem, parts[k])
+        later, last = last + reference.by_last.T @ z, reference.by_earlier.T @ z
     return out
 
 
 def forces_of(problem: Problem, steps: Sequence[StepResult]) -> Float:
     """Return the contact forces (c d, N) of increments, in the directions of an upright object."""
-    return np.stack([problem.upright_force(step.meshed_state.contact).ravel() for step in steps], axis=1)
+    return np.stack([problem.upright_force(part.after.contact).ravel() for part in _parts(problem, steps)], axis=1)
 
 
 def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
     """Return forces and moments, friction sum, energies and readings of the last increment, linearised."""
     c, d = problem.delassus.shape[:2]
-    states, zero = _states(problem, steps), np.zeros((len(steps), c * d))
+    parts = _parts(problem, steps)
+    zero = np.zeros((len(parts), c * d))
     count: Float = np.bincount(problem.symmetry.image_of, problem.symmetry.multiplicity, c).astype(np.float64)
-    last = states[-1]
+    last = parts[-1].after.contact
     vertical, shear = np.zeros((c, d)), np.zeros((c, d))
     vertical[:, 0] = count  # the first direction of an upright object points down
     friction = np.linalg.norm(last.force[:, 1:], axis=1)
@@ -169,8 +205,8 @@ def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
     found = [
         Goal(name="normal_force_N", by_force=_at_end(zero, vertical), by_displacement=zero),
         Goal(name="friction_sum_N", by_force=_at_end(zero, _upright(last, shear)), by_displacement=zero),
-        _work(problem, states, count, zero),
-        _dissipation(states, count, zero),
+        _work(problem, parts, count, zero),
+        _dissipation(problem, parts, count, zero),
     ]
     found += [
         Goal(name=name, by_force=_at_end(zero, gradient), by_displacement=zero)
@@ -221,10 +257,19 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
     return {name: np.where(moves, gradient, 0.0) for name, gradient in found.items()}
 
 
-def _states(problem: Problem, steps: Sequence[StepResult]) -> list[ContactState]:
-    """Return the contact states of the meshed part: at first touch, then after every step."""
-    start = formulation_of(problem.model).start(problem)
-    return [start.contact, *(step.meshed_state.contact for step in steps)]
+class _Part(NamedTuple):
+    """Part of an increment: states of the meshed part before and after, and the motion of the object."""
+
+    before: State[Any]
+    after: State[Any]
+    move: Move
+
+
+def _parts(problem: Problem, steps: Sequence[StepResult]) -> list[_Part]:
+    """Return the parts that the increments were solved in."""
+    ends = [(problem.origin, formulation_of(problem.model).start(problem))]
+    ends += [part for step in steps for part in step.parts]
+    return [_Part(before, after, Move(start, end)) for (start, before), (end, after) in pairwise(ends)]
 
 
 def _upright(state: ContactState, local: Float) -> Float:
@@ -240,34 +285,44 @@ def _at_end(zero: Float, gradient: Float) -> Float:
     return out
 
 
-def _work(problem: Problem, states: Sequence[ContactState], count: Float, zero: Float) -> Goal:
+def _add_slip(by_displacement: Float, k: int, along: Float, reference: SlipReference) -> None:
+    """Add the derivatives (c d,) by the slip of an increment to those by displacements."""
+    by_displacement[k] += along
+    if k:
+        by_displacement[k - 1] -= reference.by_last.T @ along
+    if k > 1:
+        by_displacement[k - 2] -= reference.by_earlier.T @ along
+
+
+def _work(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -> Goal:
     """Return the external work: the stored energy plus the frictional dissipation of all increments."""
-    c, d = states[-1].force.shape
+    c, d = parts[-1].after.contact.force.shape
     by_force, by_displacement = zero.copy(), zero.copy()
-    for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
-        start = transported(before, after.own_bases)
+    for k, part in enumerate(parts):
+        after = part.after.contact
+        start = transported(part.before.contact, after.own_bases)
         slip, friction = np.zeros((c, d)), np.zeros((c, d))
         slip[:, 1:] = after.tangential_displacement - start.tangential_displacement
         friction[:, 1:] = (0.5 * (start.force + after.force))[:, 1:]
         half_slip = 0.5 * _upright(after, count[:, None] * slip).ravel()
         along = _upright(after, count[:, None] * friction).ravel()
         by_force[k] -= half_slip
-        by_displacement[k] -= along
         if k:
             by_force[k - 1] -= half_slip
-            by_displacement[k - 1] += along
-    last = problem.upright_force(states[-1]).ravel()
+        _add_slip(by_displacement, k, -along, SlipReference.of(problem, part))
+    last = problem.upright_force(parts[-1].after.contact).ravel()
     half = 0.5 * 2.0 ** len(problem.axes)
     by_force[-1] += half * (problem.delassus.reshape(c * d, c * d) @ last)
     by_displacement[-1] += half * last
     return Goal(name="external_work_mJ", by_force=by_force, by_displacement=by_displacement)
 
 
-def _dissipation(states: Sequence[ContactState], count: Float, zero: Float) -> Goal:
+def _dissipation(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -> Goal:
     """Return the dissipation, mu times the mean normal force times the slip of all increments."""
     by_force, by_displacement = zero.copy(), zero.copy()
-    for k, (before, after) in enumerate(zip(states, states[1:], strict=False)):
-        start = transported(before, after.own_bases)
+    for k, part in enumerate(parts):
+        after = part.after.contact
+        start = transported(part.before.contact, after.own_bases)
         slips = (after.status == SLIP) & (after.status != OPEN) & (after.force[:, 0] > 0.0)
         slip = np.where(slips[:, None], after.tangential_displacement - start.tangential_displacement, 0.0)
         end = np.where(slips, after.force[:, 0], 1.0)
@@ -279,10 +334,9 @@ def _dissipation(states: Sequence[ContactState], count: Float, zero: Float) -> G
         along[:, 1:] = np.where(slips[:, None], -after.force[:, 1:] * share[:, None], 0.0)
         normal, along = _upright(after, normal).ravel(), _upright(after, along).ravel()
         by_force[k] += normal
-        by_displacement[k] += along
         if k:
             by_force[k - 1] += normal
-            by_displacement[k - 1] -= along
+        _add_slip(by_displacement, k, along, SlipReference.of(problem, part))
     return Goal(name="dissipation_mJ", by_force=by_force, by_displacement=by_displacement)
 
 

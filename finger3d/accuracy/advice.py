@@ -1,4 +1,4 @@
-"""Advice: neglected effects, and more increments, that would change the results of a press significantly."""
+"""Advice: neglected effects that would change the results of a press significantly."""
 
 from __future__ import annotations
 
@@ -27,15 +27,13 @@ def largest_principal_strain(strain: Float) -> float:
     return float(np.quantile(np.abs(np.linalg.eigvalsh(strain)).max(axis=1), _QUANTILE))
 
 
-def advise(
-    model: Model, strain: float, large: ChangeEstimate | None = None, increments: ChangeEstimate | None = None
-) -> list[str]:
+def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> list[str]:
     """Return lines of advice for a finished press.
 
     Parameters
     ----------
     strain : largest principal strain
-    large, increments : what large deformation and more increments would change, if it was estimated
+    large : what large deformation would change, if it was estimated
     """
     out = []
     if not model.finite_strain:
@@ -47,9 +45,6 @@ def advise(
                 f"principal strains reach {strain:.2g}, large for linear elasticity: switch on "
                 "[effects.large_deformation]"
             )
-    if increments and increments.significant:
-        said = _changes(increments.significant)
-        out.append(f'more increments would change {said}: press.steps = "auto" chooses as many as are needed')
     return out + _width(model)
 
 

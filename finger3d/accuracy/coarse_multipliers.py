@@ -27,6 +27,7 @@ from finger3d.fem.tensors import bases_of
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.state import State
 
 _LEAST_POINTS = 4
 """Points of a face that are all kept: fewer leave nothing to interpolate between."""
@@ -82,16 +83,16 @@ def _coarsened(problem: Problem, steps: Sequence[StepResult], first: int) -> Pro
         reading_rows=system.reading_rows @ both,
         active_dofs=np.flatnonzero(active.ravel()),
     )
-    flat = problem.model.object.is_flat
-    known = None if flat else {step.target: _geometry(problem, step, mean, kept) for step in steps}
+    parts = () if problem.model.object.is_flat else [part for step in steps for part in step.parts]
+    known = {pose: _geometry(problem, state, mean, kept) for pose, state in parts} or None
     return replace(problem, symmetry=symmetric, system=coarse, contact_geometry=known)
 
 
 def _geometry(
-    problem: Problem, step: StepResult, mean: sp.csr_array, kept: NDArray[np.intp]
+    problem: Problem, state: State[Float], mean: sp.csr_array, kept: NDArray[np.intp]
 ) -> tuple[ContactGeometry, Float]:
-    """Return the mean contact geometry (c') of the coarse multipliers after an increment, and their displacement."""
-    contact, moved = step.meshed_state.contact, step.meshed_state.body
+    """Return the mean contact geometry (c') of the coarse multipliers in a state, and their displacement."""
+    contact, moved = state.contact, state.body
     normal = np.asarray(mean @ contact.own_bases[:, 0])
     for k in axis_numbers(problem.axes):
         normal[problem.surface.points[kept, k] == 0.0, k] = 0.0

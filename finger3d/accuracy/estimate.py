@@ -29,16 +29,15 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
-    COUNT_RATIOS,
     Run,
-    choices_of_counts,
-    errors_from_counts,
+    errors_between,
     last_step,
     step_error,
     with_increments_of,
 )
 from finger3d.mechanics.readings.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
 from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 
@@ -176,26 +175,28 @@ def _of_increments(
     beside, where : a press that costs less, and what it differs in, in words; None without one
     runs : runs that chose automatic increments
     """
+    if has_exact_path(own.model):
+        return dict.fromkeys(numbers(own, steps[-1]), 0.0), "exact"
     if runs:
-        used = runs[-4:]
-        errors = errors_from_counts({count: numbers(own, run[-1]) for count, run in used}, used[-1][0])
-        return errors, ", ".join(str(count) for count, _ in used) + ", order 1"
+        (few, coarse), (many, fine) = runs[-2:]
+        errors = errors_between(numbers(own, fine[-1]), numbers(own, coarse[-1]), few / many)
+        return errors, f"{few} and {many}, order 1"
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
     own_s = _marching_cost(own)
     budget = INCREMENT_ERRORS.seconds(own.size.condensation_s + own_s)
-    for on_own_mesh, way in choices_of_counts(own_s, beside_s, budget):
-        judged = own if on_own_mesh else beside
-        if judged is None:
+    trials = [(own, 2.0, own_s), (beside, 2.0, beside_s), (beside, 0.5, 0.0), (own, 0.5, 0.0)]
+    for judged, ratio, seconds in trials:
+        if judged is None or ratio * seconds > budget:
             continue
         try:
-            last = steps[-1] if on_own_mesh else last_step(judged)
-            errors = step_error(judged, numbers(judged, last), numbers, way)
+            last = steps[-1] if judged is own else last_step(judged)
+            errors = step_error(judged, numbers(judged, last), numbers, ratio)
         except _FAILURES as error:
             failure = failure or error
             continue
-        by = " and ".join({0.25: "a quarter", 0.5: "half", 2: "twice", 4: "four times"}[t] for t in COUNT_RATIOS[way])
-        return errors, f"{by} as many{'' if on_own_mesh else ' ' + where}, order 1"
+        by = "twice" if ratio > 1.0 else "half"
+        return errors, f"{by} as many{'' if judged is own else ' ' + where}, order 1"
     raise failure or Finger3dError("no run with another number of increments")
 
 

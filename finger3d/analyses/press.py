@@ -256,11 +256,9 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:
-    """Estimate the effects of large deformation and of more increments where they may matter; add advice on them."""
+    """Estimate the effect of large deformation where it may matter; add advice on it."""
     from finger3d.accuracy.advice import LEAST_STRAIN
-    from finger3d.accuracy.changes import changing_numbers
     from finger3d.accuracy.large_deformation import large_deformation
-    from finger3d.accuracy.more_increments import may_matter, more_increments
 
     problem, steps = record.problem, record.steps
     if problem.model.finite_strain or not steps or not steps[-1].outcome.ok:
@@ -268,10 +266,6 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
     if record.largest_strain >= LEAST_STRAIN:
         report.stage("estimating what large deformation would change")
         record.large_deformation = large_deformation(problem, steps[-1], len(steps))
-    errors = record.error_estimate.steps if record.error_estimate else {}
-    if record.step_estimate is None and may_matter(changing_numbers(problem, steps[-1]), errors):
-        report.stage("estimating what more increments would change")
-        record.more_increments = more_increments(problem, steps[-1], len(steps))
     _advise(record)
 
 
@@ -280,9 +274,5 @@ def _advise(record: PressRecord) -> None:
     from finger3d.accuracy.advice import advise
     from finger3d.mechanics.results.penetration import penetration_advice
 
-    record.advice = advise(
-        record.problem.model, record.largest_strain, record.large_deformation, record.more_increments
-    )
+    record.advice = advise(record.problem.model, record.largest_strain, record.large_deformation)
     record.advice += penetration_advice(record.problem, record.surface_checks)
-    if record.step_estimate and record.step_estimate.advice:
-        record.advice.append(record.step_estimate.advice)

@@ -52,7 +52,7 @@ class PressRecord:
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
     largest_strain : principal strain at the end, without singular corners
-    large_deformation, more_increments : what these would change, where it may matter
+    large_deformation : what it would change, where it may matter
     warnings, advice : lines for the user
     seconds : time by stage, s
     workspace : factors that increments leave for the next, those of the error estimate not among them
@@ -69,7 +69,6 @@ class PressRecord:
     error_estimate: ErrorEstimate | None = None
     largest_strain: float = 0.0
     large_deformation: ChangeEstimate | None = None
-    more_increments: ChangeEstimate | None = None
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -133,7 +132,6 @@ class PressRecord:
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
             "large_deformation_estimate": self.large_deformation.as_dict() if self.large_deformation else None,
-            "more_increments_estimate": self.more_increments.as_dict() if self.more_increments else None,
             "refinement": self.refinement.as_dict() if self.refinement else None,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": _mesh(self.problem),

@@ -45,6 +45,11 @@ class FrictionLaw(ABC):
         """Whether the solution depends on the number of increments and has no limit as they become many."""
         return False
 
+    @property
+    def is_defined_by_increments(self) -> bool:
+        """Whether the law itself speaks of increments, so that these are not refined."""
+        return False
+
     @abstractmethod
     def coefficients(self, status: Status, pressure: Float) -> Float:
         """Return the coefficients (c,) for points with this status (c,) and pressure (c,), MPa."""
@@ -103,6 +108,11 @@ class TwoCoefficients(FrictionLaw):
     def depends_on_steps(self) -> bool:
         """True where every increment starts with all points stuck."""
         return self.branch == "paper"
+
+    @property
+    def is_defined_by_increments(self) -> bool:
+        """True where the coefficients differ."""
+        return self.ratio < 1.0
 
     def coefficients(self, status: Status, pressure: Float) -> Float:
         """Return the kinetic coefficient for points that slip, if they keep it, and the static one elsewhere."""

@@ -9,7 +9,7 @@ from typing import Literal
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
-from finger3d.contact.rules import RuleName
+from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.solids.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
@@ -172,6 +172,11 @@ class Model:
         In small strain they do so if the shear modulus alone relaxes: every length of time step has its own factor.
         """
         return self.finite_strain or (self.relaxation is not None and not self.relaxation.bulk)
+
+    @property
+    def is_defined_by_increments(self) -> bool:
+        """Whether the solution is that of the increments as they are: by the paper's rule, or with mu_k < mu_s."""
+        return self.rule in STEP_DEPENDENT_RULES or self.friction.is_defined_by_increments
 
     @property
     def contact_law(self) -> ContactLaw:

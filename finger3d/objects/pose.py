@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from finger3d._types import Float
 from finger3d.objects.rigid import rotation
+
+_TIME = 3
+"""Place of the time among the coordinates of a pose."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +76,20 @@ class Move:
         """Return the pose a share of the way from the start to the end."""
         return ObjectPose(*(self.start.coordinates + share * self.change).tolist())
 
+    def cut(self, *shares: float) -> tuple[Move, ...]:
+        """Return its parts between ascending shares of it."""
+        poses = [self.start, *map(self.at, shares), self.end]
+        return tuple(Move(start, end) for start, end in pairwise(poses))
+
     def length_ratio(self, before: Move) -> float | None:
-        """Return its length over that of the move before; None if the direction changes, or nothing moved before."""
+        """Return its length over that of the move before; None if the direction changes, or nothing moved before.
+
+        Time is compared only where the object rested before.
+        """
         last, now = before.change, self.change
+        in_space = np.arange(len(last)) != _TIME
+        if last[in_space].any():
+            last, now = last[in_space], now[in_space]
         if not last.any():
             return None
         ratio = float(now @ last) / float(last @ last)

@@ -65,7 +65,6 @@ _STEP_COLUMNS = {
 
 _CHANGES = {
     "large_deformation_estimate": "What large deformation would change",
-    "more_increments_estimate": "What more increments would change",
 }
 """Key of summary.json -> heading on the page."""
 

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
 from finger3d.contact.rules import RULES
-from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
 from finger3d.fem.recovery.recover import displacement
@@ -40,7 +40,7 @@ from finger3d.mechanics.finite_strain.state import (
 )
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import carried_by_object, transported
+from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_object, motion_until_touch, transported
 from finger3d.objects import Move, vertical_frame
 
 _TARGET_RESIDUAL = 5e-9
@@ -115,6 +115,10 @@ class IncrementEquations:
     @property
     def _has_inclusions(self) -> bool:
         return self.body.bars is not None
+
+    @cached_property
+    def _until_touch(self) -> Float:
+        return motion_until_touch(self.problem, self.start, self.move)
 
     @cached_property
     def length_scale(self) -> float:
@@ -261,10 +265,13 @@ class IncrementEquations:
         return out.reshape(-1, self.problem.dim)
 
     def _relative_displacement(self, now: Configuration, force: Float) -> Float:
-        """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions."""
+        """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions.
+
+        Points that close in the increment slip from where they touch.
+        """
         problem, bases = self.problem, now.contact.bases
         u, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
-        increment = u - before - carried_by_object(problem, self.move, u)
+        increment = u - before - carried_by_object(problem, self.move, u) - self._until_touch
         out = np.empty_like(force)
         out[:, 0] = now.contact.gap
         compliance = problem.system.object_compliance
@@ -304,8 +311,6 @@ class IncrementEquations:
 
     def _state(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
         """Return the state at the end of the increment."""
-        moved = self._relative_displacement(now, solution.force)
-        start = transported(self.start.contact, now.contact.bases)
-        after = next_state(start, solution.force, moved, solution.status)
-        body = DeformedBody(now.x, previous=(self.move, self.start.body.unknowns))
-        return State(replace(after, bases=now.contact.bases), body)
+        moved, contact = self._relative_displacement(now, solution.force), replace(solution, bases=now.contact.bases)
+        reached = advanced(self.start, contact, moved, self._until_touch, self.move)
+        return replace(reached, body=DeformedBody(now.x, previous=(self.move, self.start.body.unknowns)))

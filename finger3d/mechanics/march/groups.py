@@ -19,7 +19,6 @@ from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.objects import Move
 
 
 def march_in_groups(
@@ -63,31 +62,39 @@ class _Presses:
             together = self._solved_together(group, leader, self._stations[increment])
             for number in group:
                 if together is None or number == leader or number in together:
-                    self._advance(number, self._stations[increment], together.get(number) if together else None)
+                    self._advance(number, self._stations[increment], together.get(number, ()) if together else ())
                     ended += [number] * (number not in self.running)
         return ended
 
-    def _advance(self, number: int, station: Station, solution: ContactSolution[State[Any]] | None) -> None:
+    def _advance(self, number: int, station: Station, solutions: Sequence[ContactSolution[State[Any]]]) -> None:
         """Take the next increment of a press; one that has ended is not running any more."""
         press = self.running[number]
-        self.steps[number].append(press.advance(station, solution=solution))
+        self.steps[number].append(press.advance(station, solutions=solutions))
         if press.has_failed or len(self.steps[number]) == len(self._stations):
             del self.running[number]
 
     def _solved_together(
         self, group: list[int], leader: int, station: Station
-    ) -> dict[int, ContactSolution[State[Any]]] | None:
+    ) -> dict[int, list[ContactSolution[State[Any]]]] | None:
         """Return the solutions found together, by their numbers; None if each press is to be solved by itself."""
         presses = [self.running[number] for number in group]
         formulation = presses[0].formulation
         if len(group) < 2 or self._cancel.is_set() or station.load or not isinstance(formulation, FiniteStrain):
             return None
         assert isinstance(self._workspace, FiniteStrainWorkspace)
-        solutions = formulation.increments(
-            [press.problem for press in presses],
-            [(press.state, press.expected_force(station.pose)) for press in presses],
-            Move(presses[0].pose, station.pose),
-            self._workspace,
-            group.index(leader),
-        )
-        return {number: one for number, one in zip(group, solutions, strict=True) if one is not None}
+        starts = {n: (press.state, press.expected_force(station.pose)) for n, press in zip(group, presses, strict=True)}
+        found: dict[int, list[ContactSolution[State[Any]]]] = {number: [] for number in group}
+        for move in presses[0].moves_to(station.pose):
+            solutions = formulation.increments(
+                [self.running[number].problem for number in found],
+                [starts[number] for number in found],
+                move,
+                self._workspace,
+                list(found).index(leader),
+            )
+            converged = [(number, one) for number, one in zip(found, solutions, strict=True) if one is not None]
+            found = {number: [*found[number], one] for number, one in converged}
+            starts = {number: (one.state, None) for number, one in converged}
+            if leader not in found:
+                return {}
+        return found

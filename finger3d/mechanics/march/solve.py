@@ -31,6 +31,10 @@ from finger3d.progress import QUIET, Progress
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
+_FIRST_PARTS = 1.0 / 16.0, 0.25
+"""Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
+ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
+
 
 @dataclass(frozen=True)
 class _Substep:
@@ -117,6 +121,9 @@ class Press:
         self._cancel, self._report = cancel, report
         self._is_exact = has_exact_path(problem.model) and problem.contact_geometry is None
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
+        # in small strain without bulk relaxation, an increment of another duration costs a factorisation
+        model = problem.model
+        self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
         self._previous: tuple[Move, Float] | None = None
         self._work = self._dissipation = self._leg_start_N = 0.0
         self._before: tuple[State[Any], float, float] | None = None
@@ -124,7 +131,7 @@ class Press:
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
     def advance(
-        self, station: Station, guess: Float | None = None, solution: ContactSolution[State[Any]] | None = None
+        self, station: Station, guess: Float | None = None, solutions: Sequence[ContactSolution[State[Any]]] = ()
     ) -> StepResult:
         """Advance to a station, and return the result of the increment.
 
@@ -132,8 +139,8 @@ class Press:
         ----------
         guess : (c, d) array, N, optional
             Contact forces where the iteration starts; unless given, they are extrapolated from the last increment.
-        solution : ContactSolution, optional
-            Solution of the increment, if it is known already.
+        solutions : sequence of ContactSolution
+            Solutions of the motions that `moves_to` returns, if they are known already.
 
         Raises
         ------
@@ -142,15 +149,18 @@ class Press:
         """
         self._end_if_cancelled()
         move = Move(self.pose, station.pose)
-        if solution is not None:
-            end = _Advanced(solution, [_Substep(self.state, solution.state, move)], station.pose)
+        if solutions:
+            states = [self.state, *(solution.state for solution in solutions)]
+            moves = self.moves_to(station.pose)
+            parts = [_Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
+            end = _Advanced(solutions[-1], parts, station.pose)
         elif self._is_exact:
             end = self._along_path(move, station.load)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
-            end = _Advanced(*self._increment(self.state, move, self._cuts, start), station.pose)
+            end = self._to_pose(station.pose, start)
             if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
-                end = _Advanced(*self._increment(self.state, move, self._cuts), station.pose)
+                end = self._to_pose(station.pose, None)
         else:
             end = self._to_force(move, station.load)
         self._before = self.state, self._work, self._dissipation
@@ -158,7 +168,7 @@ class Press:
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
-        return self._result(end.solution, self._free_strain(station))
+        return self._result(end, self._free_strain(station))
 
     def _add_energies(self, end: _Advanced) -> None:
         work, lost = end.energies or (0.0, 0.0)
@@ -175,13 +185,11 @@ class Press:
         """
         if self._before is None or self._previous is None or not self._cuts:
             return False
-        (state, work, dissipation), whole, parts = self._before, self._previous[0], list[_Substep]()
-        for half in (Move(whole.start, whole.at(0.5)), Move(whole.at(0.5), whole.end)):
-            found, more = self._increment(state, half, self._cuts - 1)
-            if not found.outcome.ok:
-                return False
-            state, parts = found.state, parts + more
-        self.state, self._work, self._dissipation = state, work, dissipation
+        (state, work, dissipation), whole = self._before, self._previous[0]
+        found, parts = self._in_turn(state, whole.cut(0.5), self._cuts - 1)
+        if not found.outcome.ok:
+            return False
+        self.state, self._work, self._dissipation = found.state, work, dissipation
         self._add_energies(_Advanced(found, parts, whole.end))
         return True
 
@@ -194,6 +202,14 @@ class Press:
         now = self.state.contact.force
         return None if ratio is None else now + ratio * (now - force)
 
+    def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
+        """Return the motions in which an increment to a pose is solved: several where contact begins."""
+        move = Move(self.pose, pose)
+        return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
+
+    def _to_pose(self, pose: ObjectPose, guess: Float | None) -> _Advanced:
+        return _Advanced(*self._in_turn(self.state, self.moves_to(pose), self._cuts, guess), pose)
+
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
             raise CancelledError
@@ -205,17 +221,28 @@ class Press:
         whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
         if whole.outcome.ok or cuts == 0:
             return whole, [_Substep(state, whole.state, move)]
-        middle = move.at(0.5)
-        first, done = self._increment(state, Move(move.start, middle), cuts - 1)
-        if not first.outcome.ok:
-            return replace(first, state=state, iterations=first.iterations + whole.iterations), done
-        second, more = self._increment(first.state, Move(middle, move.end), cuts - 1)
+        halves, parts = self._in_turn(state, move.cut(0.5), cuts - 1)
+        method = SNAPPED if halves.method == SNAPPED else "cut back"
+        return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts
+
+    def _in_turn(
+        self, state: State[Any], moves: Sequence[Move], cuts: int, guess: Float | None = None
+    ) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
+        """Solve the parts of an increment one after another; the guess is that of the last."""
+        found, parts, now = list[ContactSolution[State[Any]]](), list[_Substep](), state
+        for move in moves:
+            one, more = self._increment(now, move, cuts, guess if move is moves[-1] else None)
+            found, parts, now = [*found, one], parts + more, one.state
+            if not one.outcome.ok:
+                now = state
+                break
         return replace(
-            second,
-            residual=max(first.residual, second.residual),
-            iterations=whole.iterations + first.iterations + second.iterations,
-            method=SNAPPED if SNAPPED in (first.method, second.method) else "cut back",
-        ), done + more
+            found[-1],
+            state=now,
+            residual=max(one.residual for one in found),
+            iterations=sum(one.iterations for one in found),
+            method=SNAPPED if any(one.method == SNAPPED for one in found) else found[-1].method,
+        ), parts
 
     def _wanted(self, load: Load) -> tuple[float, float]:
         """Return the normal force (N) now, and the one prescribed at the end of the increment."""
@@ -261,7 +288,7 @@ class Press:
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
                 start = _expecting(state, there, ends, share) if problem.model.finite_strain else state
-            found, parts[depth] = self._increment(start, there, self._cuts, guess)
+            found, parts[depth] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
@@ -290,8 +317,8 @@ class Press:
         columns = [strain_columns(gauge.name) for gauge in self.problem.model.gauges]
         return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
-    def _result(self, solution: ContactSolution[State[Any]], free_strain: dict[Column, float]) -> StepResult:
-        problem, state, pose = self.problem, self.state, self.pose
+    def _result(self, end: _Advanced, free_strain: dict[Column, float]) -> StepResult:
+        problem, state, pose, solution = self.problem, self.state, self.pose, end.solution
         moment = self.formulation.loads(problem, state, pose).moment
         return StepResult(
             target=pose,
@@ -308,6 +335,7 @@ class Press:
             method=solution.method,
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
+            parts=tuple((part.move.end, part.after) for part in end.parts),
         )
 
 

@@ -1,12 +1,13 @@
 """Number of increments, chosen by the estimated error of the result.
 
-The path is solved in N, 2 N, 4 N, ... increments.  The error of a quantity x(N) is assumed to be proportional to 1/N;
-then each pair of successive counts gives an estimate,
+The path is solved in N, 2 N, 4 N, ... increments.  The error of a quantity x(N) is of second order on the whole, but
+points close one by one, so that it falls unevenly.  Two runs are compared as if it were of first order, with which four
+of five errors that count are within twice their estimate (second order: two of five)::
 
-    error of x(n) = |x(N) - x(2 N)| / (1/N - 1/(2 N)) / n,
+    error of x(2 N) = |x(2 N) - x(N)|
 
-of which the largest is taken, since two counts may agree by chance.  ``validation/error_bars.py`` measures how often
-the true error is within twice this estimate.
+``validation/error_bars.py`` measures how often the true
+error is within twice this estimate.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, of_kind
 from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 
 Measurement = Callable[[Problem, StepResult], dict[str, float]]
 """Quantities by name, measured at the end of a press."""
@@ -40,22 +42,14 @@ TOLERANCE = 0.01
 """Relative error allowed in normal force, friction sum and strain; a strain's is relative to the largest strain."""
 
 DISSIPATION_TOLERANCE = 0.05
-"""Relative error allowed in the dissipation."""
+"""Relative error allowed in the dissipation, or in a fiftieth of the external work if that is larger."""
 
-FLOOR = 1e-4
-"""Share of the external work below which the dissipation is not resolved: only a few points slip, in the first
-increments."""
+_LEAST_DISSIPATION = 0.02
+"""Share of the external work in which the error of a smaller dissipation is measured."""
 
-_PAIRS = {2: 4, 3: 3}
-"""Largest number of pairs of successive counts in an estimate, by dimension.  With three pairs, one of eight random
-sections had an estimate below 1 % and an error of 1.8 %; in a solid four pairs would double the time."""
-
-_LEAST_RUNS = {2: 4, 3: 3}
-"""Least number of runs before the tolerances may be met; three sometimes agree by chance."""
-
-_FIRST, _LARGEST = 5, 640
-_FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 3, 12
-"""Counts if every increment factors the stiffness again: 3, 6 and 12 increments cost twice as much as 10."""
+_FIRST, _LARGEST = 10, 640
+_FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 6, 12
+"""Counts if every increment factors the stiffness again: 6 and 12 increments cost nearly twice as much as 10."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +61,8 @@ class StepEstimate:
     steps : increments of each automatic leg
     normal_force, friction_sum : relative to the largest over the ends of the legs
     gauges : relative to the largest strain of all gauges
-    dissipation : relative, where dissipation is above the floor
-    dissipation_floor_mJ : `FLOOR` times the largest external work
-    dissipation_resolved : False if the dissipation at the end is below the floor, so that its own error is not limited
-    met : whether every error is below its tolerance; that of the dissipation counts only above the floor
+    dissipation : relative to the dissipation, or to a fiftieth of the external work if that is larger
+    met : whether every error is below its tolerance
     runs : in the order of their numbers of increments
     """
 
@@ -79,8 +71,6 @@ class StepEstimate:
     friction_sum: float
     gauges: float
     dissipation: float
-    dissipation_floor_mJ: float
-    dissipation_resolved: bool
     met: bool
     tolerance: float = TOLERANCE
     dissipation_tolerance: float = DISSIPATION_TOLERANCE
@@ -102,16 +92,6 @@ class StepEstimate:
             "dissipation; give press.steps for more"
         )
 
-    @property
-    def advice(self) -> str:
-        """One line if the dissipation is too small to be resolved, else empty."""
-        if self.dissipation_resolved:
-            return ""
-        return (
-            f"the dissipation is below {self.dissipation_floor_mJ:.2g} mJ, {FLOOR:g} of the external work; the "
-            "increments do not resolve it, and its error_estimate says how far it is off"
-        )
-
 
 def automatic(model: Model) -> bool:
     """Whether the number of increments of any leg is chosen by the error.
@@ -120,7 +100,7 @@ def automatic(model: Model) -> bool:
     increments; there "auto" is a fixed number, `finger3d.mechanics.march.path.AUTO_START`.
     """
     depends_on_steps = model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps
-    return not depends_on_steps and any(leg.steps == "auto" for leg in model.legs)
+    return not (depends_on_steps or has_exact_path(model)) and any(leg.steps == "auto" for leg in model.legs)
 
 
 def with_steps(problem: Problem, steps: int) -> Problem:
@@ -129,24 +109,15 @@ def with_steps(problem: Problem, steps: int) -> Problem:
     return replace(problem, model=replace(problem.model, legs=legs))
 
 
-def increment_error(counts: Sequence[int], values: Sequence[float], count: int) -> float:
-    """Estimated error of a quantity computed in `count` increments.
-
-    Parameters
-    ----------
-    counts, values : sequences
-        At least two numbers of increments in ascending order, and the values of the quantity.
-    count : int
-        A number of increments, whether among `counts` or not.
+def increment_error(value: float, other: float, ratio: float) -> float:
+    """Estimated error of a quantity in N increments, from its value in `ratio` times as many.
 
     Examples
     --------
-    >>> increment_error([8, 16, 32], [1.125, 1.0625, 1.03125], 32)  # 1 + 1/N
-    0.03125
+    >>> round(increment_error(1.1, 1.2, 0.5), 12)  # 1 + 1/N in N = 10 and 5 increments
+    0.1
     """
-    runs = list(zip(counts, values, strict=True))
-    rates = [abs(b - a) / abs(1.0 / m - 1.0 / n) for (n, a), (m, b) in zip(runs, runs[1:], strict=False)]
-    return max(rates) / count
+    return abs(value - other) / abs(1.0 - 1.0 / ratio)
 
 
 def refine(
@@ -225,9 +196,9 @@ def limits(model: Model, size: PressSize) -> tuple[int, int]:
     if model.finite_strain:
         return _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED
     if size.dim == 3 and model.refactorises:
-        return _FIRST, 4 * _FIRST  # a condensation for each length of the increments
+        return _FIRST, 2 * _FIRST  # a condensation for each length of the increments
     most = (AUTOMATIC_S + size.condensation_s) / size.contact_s / len(model.legs)
-    steps = 4 * _FIRST
+    steps = 2 * _FIRST
     while steps < _LARGEST and 2.0 * (2 * steps) <= most:
         steps *= 2
     return _FIRST, steps
@@ -240,39 +211,30 @@ def _leg_ends(problem: Problem, results: tuple[StepResult, ...]) -> tuple[StepRe
 
 
 def _estimate(problem: Problem, runs: Sequence[Run]) -> StepEstimate:
-    used = runs[-(_PAIRS[problem.dim] + 1) :]
-    counts = [count for count, _ in used]
-    ends = [
+    """Return the errors of the last run, from the one before."""
+    (few, _), (many, _) = used = runs[-2:]
+    before, finest = (
         [_quantities(problem, end) for end in _leg_ends(with_steps(problem, count), results)] for count, results in used
-    ]
-    finest = ends[-1]
-    errors = [
-        {name: increment_error(counts, [run[leg][name] for run in ends], counts[-1]) for name in quantities}
-        for leg, quantities in enumerate(finest)
-    ]
+    )
+    errors = [errors_between(quantities, others, few / many) for quantities, others in zip(finest, before, strict=True)]
     strains = [name for name, value in finest[-1].items() if name not in _FORCES_AND_ENERGIES and not math.isnan(value)]
-    floor = FLOOR * max(abs(quantities["external_work_mJ"]) for quantities in finest)
+    least = _LEAST_DISSIPATION * max(abs(quantities["external_work_mJ"]) for quantities in finest)
 
-    def largest_error(*names: str) -> float:
+    def largest_error(*names: str, least: float = 0.0) -> float:
         largest = max((abs(quantities[name]) for quantities in finest for name in names), default=0.0)
-        error = max((leg[name] for leg in errors for name in names), default=0.0)
-        return error / largest if largest else 0.0
+        error = max((leg.get(name, math.inf) for leg in errors for name in names), default=0.0)
+        return error / max(largest, least) if error else 0.0
 
-    dissipation = [(end["dissipation_mJ"], error["dissipation_mJ"]) for end, error in zip(finest, errors, strict=True)]
-    resolved = [error / max(value, floor) for value, error in dissipation if value + error > floor]
-    normal_force, friction_sum = largest_error("normal_force_N"), largest_error("friction_sum_N")
-    gauges, dissipation_error = largest_error(*strains), max(resolved, default=0.0)
+    forces, gauges = (largest_error(name) for name in _FORCES_AND_ENERGIES[:2]), largest_error(*strains)
+    normal_force, friction_sum = forces
+    dissipation = largest_error("dissipation_mJ", least=least)
     return StepEstimate(
-        steps=counts[-1],
+        steps=many,
         normal_force=normal_force,
         friction_sum=friction_sum,
         gauges=gauges,
-        dissipation=dissipation_error,
-        dissipation_floor_mJ=floor,
-        dissipation_resolved=sum(dissipation[-1]) > floor or not any(dissipation[-1]),
-        met=len(runs) >= _LEAST_RUNS[problem.dim]
-        and max(normal_force, friction_sum, gauges) <= TOLERANCE
-        and dissipation_error <= DISSIPATION_TOLERANCE,
+        dissipation=dissipation,
+        met=max(normal_force, friction_sum, gauges) <= TOLERANCE and dissipation <= DISSIPATION_TOLERANCE,
         runs=tuple(runs),
     )
 
@@ -288,14 +250,10 @@ def _quantities(problem: Problem, result: StepResult) -> dict[str, float]:
     return {name: measured[name] for name in _FORCES_AND_ENERGIES} | by_key(strains)
 
 
-COUNT_RATIOS: dict[str, tuple[float, float]] = {"up": (2.0, 4.0), "both": (0.5, 2.0), "down": (0.25, 0.5)}
-"""Ratios of the counts of increments that an error is estimated from to the count of the result, the best first."""
-
-
 def step_error(
-    problem: Problem, quantities: Mapping[str, float], measurement: Measurement, ratios: str = "up"
+    problem: Problem, quantities: Mapping[str, float], measurement: Measurement, ratio: float
 ) -> dict[str, float]:
-    """Error by name due to the increments, from two further runs on the same condensation.
+    """Error by name due to the increments, from one further run on the same condensation.
 
     Parameters
     ----------
@@ -304,50 +262,24 @@ def step_error(
         Quantities by name in the increments of the problem.
     measurement : callable
         Returns these quantities at the end of a run.
-    ratios : str
-        Key of `COUNT_RATIOS`.
+    ratio : float
+        Increments of the further run over those of the problem.
     """
     legs = problem.model.legs
     own = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in legs]
-    runs = {sum(own): dict(quantities)}
-    for ratio in COUNT_RATIOS[ratios]:
-        counts = [max(1, round(ratio * count)) for count in own]
-        if sum(counts) not in runs:
-            changed = tuple(replace(leg, steps=count) for leg, count in zip(legs, counts, strict=True))
-            trial = replace(problem, model=replace(problem.model, legs=changed))
-            runs[sum(counts)] = measurement(trial, last_step(trial))
-    if len(runs) < 2:
+    counts = [max(1, round(ratio * count)) for count in own]
+    if counts == own:
         raise Finger3dError("a single increment cannot be halved")
-    return errors_from_counts(runs, sum(own))
+    changed = tuple(replace(leg, steps=count) for leg, count in zip(legs, counts, strict=True))
+    trial = replace(problem, model=replace(problem.model, legs=changed))
+    other = measurement(trial, last_step(trial))
+    return errors_between(quantities, other, sum(counts) / sum(own))
 
 
-def errors_from_counts(runs: Mapping[int, Mapping[str, float]], count: int) -> dict[str, float]:
-    """Error by name of the quantities in `count` increments, from the quantities in several counts of increments."""
-    counts = sorted(runs)
-    errors = {name: increment_error(counts, [runs[n][name] for n in counts], count) for name in runs[count]}
+def errors_between(quantities: Mapping[str, float], others: Mapping[str, float], ratio: float) -> dict[str, float]:
+    """Error by name of quantities, from those in `ratio` times as many increments; see `increment_error`."""
+    errors = {name: increment_error(value, others[name], ratio) for name, value in quantities.items()}
     return {name: float(error) for name, error in errors.items() if math.isfinite(error)}
-
-
-def choices_of_counts(own_s: float, companion_s: float, budget_s: float) -> list[tuple[bool, str]]:
-    """Return the meshes and counts of increments that the error due to the increments may be estimated on.
-
-    Parameters
-    ----------
-    own_s, companion_s : float
-        Seconds of all increments on the mesh of the problem and on its companion.
-    budget_s : float
-        Seconds that the estimate may take.
-
-    Returns
-    -------
-    list of (on_own_mesh, ratios)
-        Those that the budget allows, the best first, then fewer increments on the companion, and on the mesh itself.
-        `ratios` is a key of `COUNT_RATIOS`.
-    """
-    seconds = {True: own_s, False: companion_s}
-    choices = [(own, ratios) for ratios in ("up", "both") for own in (True, False)]
-    affordable = [(own, ratios) for own, ratios in choices if sum(COUNT_RATIOS[ratios]) * seconds[own] <= budget_s]
-    return [*affordable, (False, "down"), (True, "down")]
 
 
 def last_step(problem: Problem) -> StepResult:

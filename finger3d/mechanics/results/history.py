@@ -123,7 +123,8 @@ class StepResult:
     `meshed_state` is the state of the meshed part (c points), from which fields are recovered; `moment` (3,), N mm,
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface
-    (`finger3d.mechanics.results.penetration`); `detail` describes a failure.
+    (`finger3d.mechanics.results.penetration`); `detail` describes a failure.  `parts` are the pose and the state of the
+    meshed part at the end of every part that the increment was solved in, the last one included.
     """
 
     target: ObjectPose
@@ -140,6 +141,7 @@ class StepResult:
     method: str
     penetration_mm: float
     detail: str = ""
+    parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
 
     @property
     def named_readings(self) -> dict[str, float]:

@@ -11,6 +11,8 @@ normal between those of the adjacent faces is one of the edge (its generalised g
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, cont
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace, length_scale
 from finger3d.mechanics.march.passing import moves_too_far, passes_through, pulls
-from finger3d.mechanics.results.state import State
+from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, vertical_frame
 
 _TARGET = 1e-9
@@ -169,6 +171,10 @@ class _Increment:
     body: LinearBody
     tracker: DistanceTracker
 
+    @cached_property
+    def _until_touch(self) -> Float:
+        return motion_until_touch(self.problem, self.state, self.move)
+
     def geometry(self, displacement: Float, within: float = _NEAR) -> ContactGeometry:
         """Return the contact geometry at the end of the increment, at a displacement (c, d).
 
@@ -208,11 +214,15 @@ class _Increment:
         return replace(part, state=replace(start, force=force, status=status))
 
     def _relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
-        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one."""
+        """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one.
+
+        Points that close in the increment slip from where they touch.
+        """
         bases = geometry.bases
         out: Float = np.einsum("cak,ck->ca", bases, displacement - expansion_point)
         out[:, 0] += geometry.gap
         slid = displacement - self.state.body - carried_by_object(self.problem, self.move, expansion_point)
+        slid = slid - self._until_touch
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], slid)
         return out
 
@@ -236,14 +246,37 @@ class _Increment:
         gap: Float | None,
     ) -> State[Float]:
         """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement."""
-        start, relative = (
-            transported(self.state.contact, geometry.bases),
-            self._relative(geometry, expansion_point, displacement),
-        )
+        relative = self._relative(geometry, expansion_point, displacement)
         if gap is not None:
             relative[:, 0] = gap
-        after = next_state(start, contact.force, relative, contact.status)
-        return State(replace(after, bases=geometry.bases), displacement)
+        reached = advanced(self.state, replace(contact, bases=geometry.bases), relative, self._until_touch, self.move)
+        return replace(reached, body=displacement)
+
+
+def motion_until_touch(problem: Problem, state: State[Any], move: Move) -> Float:
+    """Return the motion (c, d) mm of open points until they touch; zero in a press that its increments define."""
+    if problem.model.is_defined_by_increments:
+        return np.zeros_like(state.contact.force)
+    return state.motion_until_touch(move)
+
+
+def advanced(state: State[B], contact: ContactState, relative: Float, until_touch: Float, move: Move) -> State[B]:
+    """Return a state after an increment, with the body as it was.
+
+    Parameters
+    ----------
+    contact : ContactState
+        Forces, status and bases at the end.
+    relative : (c, d) mm
+        Gap at the end, and slip since the point touched if it closes in the increment.
+    until_touch : (c, d) mm
+        Tangential motion before, see `motion_until_touch`.
+    """
+    start, moved, opened = transported(state.contact, contact.own_bases), relative.copy(), contact.status == OPEN
+    moved[opened, 1:] += np.einsum("ctk,ck->ct", contact.own_bases[opened, 1:], until_touch[opened])
+    after = replace(next_state(start, contact.force, moved, contact.status), bases=contact.bases)
+    change = np.column_stack([after.gap - start.gap, after.tangential_displacement - start.tangential_displacement])
+    return State(after, state.body, (move, change))
 
 
 def transported(state: ContactState, bases: Float) -> ContactState:

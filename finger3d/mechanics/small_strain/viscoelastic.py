@@ -96,16 +96,15 @@ class Viscoelastic:
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         delassus = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
-        before = State(state.contact, state.body.displacement)
+        before = State(state.contact, state.body.displacement, state.last)
         solution = solve_increment(problem, before, move, LinearBody(delassus, past.reshape(c, d)), guess, workspace)
         if solution.state is before:
             return solution.with_state(state)
-        contact = solution.state.contact
-        rows = problem.row_forces(problem.upright_force(contact))
+        rows = problem.row_forces(problem.upright_force(solution.state.contact))
         if len(springs):
             rows[first:] = spring_forces(condensed, springs, body.moved + condensed @ rows)
-        after = State(contact, ViscousBody(solution.state.body, step.after(memory, body.shape(rows))))
-        return solution.with_state(after)
+        after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
+        return solution.with_state(State(solution.state.contact, after, solution.state.last))
 
     def unknowns(self, problem: Problem, states: Sequence[State[ViscousBody]]) -> Iterator[Float]:
         """Yield the unknowns of each state from its internal variables."""
