@@ -103,8 +103,8 @@ def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> N
     assert away > 5.0 * found.noise[0]
     assert away < 2.0 * float(found.readings[0].reading_sd([0.6])[0])
     (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
-    assert abs(sure.mu - 0.6) > 5.0 * sure.std
-    assert abs(honest.mu - 0.6) < 2.0 * honest.std
+    assert abs(sure.mu - 0.6) > 4.0 * sure.std
+    assert honest.low <= 0.6 <= honest.high  # which two increments do not tell any nearer
 
 
 def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:

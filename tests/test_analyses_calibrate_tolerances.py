@@ -73,7 +73,7 @@ def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
 
 def test_slopes_between_the_few_mu_that_are_tried() -> None:
     """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
-    the effect of nu turns between two of them.
+    the effect of nu jumps between two of them, which leaves a quarter.
     """
     fine, mus = scene(mesh={"size_mm": 0.6, "base_size_mm": 4.0}), runs.MUS[::2]
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003, "tilt_deg": 0.5}
@@ -83,9 +83,10 @@ def test_slopes_between_the_few_mu_that_are_tried() -> None:
     tried, between = (calibrate(fine, "g36", mus=mus[first::2], tolerances=told) for first in (0, 1))
     for a, b, c in zip(*(one.readings[0].tolerances for one in (few, tried, between)), strict=True):
         assert a.name == b.name == c.name
+        share = 0.25 if a.name == "nu" else 0.2
         assert a.slope[::2] == pytest.approx(b.slope, rel=1e-6)
-        assert 0.0 < np.abs(a.slope[1::2] - c.slope).max() <= 0.2 * np.abs(b.slope).max(), a.name
-        assert np.abs(a.spread[1::2] - c.spread).max() <= 0.2 * b.spread.max(), a.name
+        assert 0.0 < np.abs(a.slope[1::2] - c.slope).max() <= share * np.abs(b.slope).max(), a.name
+        assert np.abs(a.spread[1::2] - c.spread).max() <= share * b.spread.max(), a.name
 
 
 def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> None:

@@ -1,4 +1,4 @@
-"""Estimated changes of the numbers of a press by a better model or more increments, each with its own error."""
+"""Estimated changes of the numbers of a press by a better model, each with its own error."""
 
 from __future__ import annotations
 
