@@ -23,7 +23,7 @@ from tests.models import large_fig9
 def test_light_load_is_small_strain(nu: float) -> None:
     ratios = []
     for depth in (0.08, 0.01):
-        model = large_fig9(nu, legs=(Leg(depth, steps=2),), mesh=MeshOptions(0.2, 8.0))
+        model = large_fig9(nu, legs=(Leg(depth, steps=8),), mesh=MeshOptions(0.2, 8.0))
         problem = build(model)
         small = list(march(replace(problem, model=replace(model, hyperelastic_law=None))))
         large = list(march(problem))

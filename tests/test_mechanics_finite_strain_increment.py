@@ -97,7 +97,8 @@ def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> Non
     force = [measure(problem.points, frame)["normal_force_N"] for frame in frames]
     (line,) = snap_warnings(frames)
     number = int(re.findall(r"in step (\d+)", line)[0])
-    assert force[number - 1] < force[number - 2]
+    parts = [problem.world_force(state.contact)[:, 1].sum() for _, state in frames[number - 1].parts]
+    assert -parts[0] < force[number - 2]
     assert min(np.diff(force[: number - 1])) > 0.0
     assert snap_warnings(frames[: number - 1]) == []
     state = frames[-1].meshed_state

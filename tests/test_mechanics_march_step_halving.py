@@ -28,12 +28,12 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.objects import Plane
+from finger3d.objects import Cylinder, Plane
 from tests.models import block, fig9
 
 
 def test_automatic_increments_end_within_their_estimate() -> None:
-    problem = build(fig9(domain="plane-strain", legs=(Leg(10.0, steps="auto"),)))
+    problem = build(fig9(domain="plane-strain", object=Cylinder(radius_mm=80.0), legs=(Leg(10.0, steps="auto"),)))
     seen: list[tuple[int, int]] = []
     *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
     assert seen[:11] == [*((k, 10) for k in range(1, 11)), (1, 20)]
@@ -52,9 +52,10 @@ def test_automatic_increments_end_within_their_estimate() -> None:
 
 
 def stuck(**changes: object) -> Model:
-    """The Fig. 9 section in plane stress at a large coefficient of friction: nearly all of it sticks."""
+    """The Fig. 9 section in plane stress under a bar, at a large coefficient of friction: nearly all of it sticks."""
     model = fig9(
         domain="plane-stress", material=Isotropic(1.0, 0.485), friction=Coulomb(0.988), mesh=MeshOptions(2.9, 11.6),
+        object=Cylinder(radius_mm=80.0),
     )  # fmt: skip
     return replace(model, **changes)
 

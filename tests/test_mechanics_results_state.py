@@ -13,7 +13,7 @@ from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.results.state import State
-from finger3d.objects import Move, ObjectPose
+from finger3d.objects import Cylinder, Move, ObjectPose
 from tests.models import half_cylinder, run
 
 
@@ -57,7 +57,7 @@ def test_presses_that_their_increments_define_take_these_as_they_are(
 
 
 def test_the_increment_in_which_contact_begins_has_three_parts() -> None:
-    _, steps = run(half_cylinder(0.5, steps=4))
+    _, steps = run(replace(half_cylinder(0.5, steps=4), object=Cylinder(radius_mm=20.0)))
     assert [len(step.parts) for step in steps] == [3, 1, 1, 1]
     depths = [pose.depth_mm / steps[0].target.depth_mm for pose, _ in steps[0].parts]
     assert depths == pytest.approx([1.0 / 16.0, 0.25, 1.0])

@@ -37,8 +37,8 @@ from finger3d.meshing.limits import check_memory
 from finger3d.meshing.unstructured.sizing import Sizing
 from finger3d.objects import PlacedObject
 
-_USUAL = 80
-"""Median of automatic increments over the cases of validation/error_bars.py."""
+_USUAL = 20
+"""Usual number of automatic increments, at second order."""
 
 _LATTICE = 100
 """Places along each side of a part at which the contact face of an unstructured mesh is counted."""

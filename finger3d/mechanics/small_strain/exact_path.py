@@ -12,6 +12,7 @@ from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.events import Event, Resultant, follow
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
@@ -114,13 +115,25 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
         )
     found, events = follow(contact, resultant)
     if not found.outcome.ok:
-        return PathSolution(found.with_state(state), [], (0.0, 0.0))
+        detail = (
+            _shortfall(force, move, events) if force and found.outcome is Outcome.FORCE_NOT_REACHED else found.detail
+        )
+        return PathSolution(replace(found.with_state(state), detail=detail), [], (0.0, 0.0))
     ends = []
     for event in events:
         pose = move.at(event.share)
         after = State(replace(event.state, bases=bases), body.displacement(event.state.force, bases))
         ends.append((replace(pose, depth_mm=pose.depth_mm + event.amplitude), after))
     return PathSolution(found.with_state(ends[-1][1]), ends, _energies(problem, count, start, bases, move, events))
+
+
+def _shortfall(force: NormalForce, move: Move, events: list[Event]) -> str:
+    """Return how much of a force was reached, and at which depth."""
+    if not events or not events[-1].share:
+        return f"{force.end:.6g} N asked; the object does not touch the finger down to {force.largest_depth_mm:.4g} mm"
+    reached = force.start + events[-1].share * (force.end - force.start)
+    depth = move.start.depth_mm + events[-1].amplitude
+    return f"{force.end:.6g} N asked; the largest force is {reached:.6g} N, at a depth of {depth:.4g} mm"
 
 
 def _along(bases: Float, displacement: Float) -> Float:
