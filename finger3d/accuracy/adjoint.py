@@ -14,8 +14,8 @@ equations, backwards from the last increment, are ::
     p_k = B_{k+1}^T z_{k+1} + C_{k+2}^T z_{k+2}
 
 and a change of the Delassus operator changes the number by ``sum_k l_k . dW r_k`` with the adjoint loads
-``l_k = v_k - z_k + p_k``.  Active sets, the normals of the object, and the places of the events of an exact path are
-held fixed.  An increment that was solved in
+``l_k = v_k - z_k + p_k``.  Active sets and the normals of the object are held fixed; an
+exact path counts as the increments between its results.  An increment that was solved in
 parts counts as several.
 """
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from threading import Event
 from typing import Any
 
@@ -259,10 +258,8 @@ class Press:
     def _along_path(self, move: Move, load: Load | None) -> _Advanced:
         """Advance on the exact path, to a pose or to a prescribed normal force."""
         force = None if load is None else NormalForce(*self._wanted(load), self._deepest)
-        solution, ends, energies = solve_path(self.problem, self.state, move, force)
-        starts = [(self.pose, self.state), *ends]
-        parts = [_Substep(a[1], b[1], Move(a[0], b[0])) for a, b in pairwise(starts)]
-        return _Advanced(solution, parts, starts[-1][0], energies)
+        solution, pose, energies = solve_path(self.problem, self.state, move, force)
+        return _Advanced(solution, [_Substep(self.state, solution.state, Move(self.pose, pose))], pose, energies)
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:
         """Advance to the depth where the normal force is the prescribed one.

@@ -44,12 +44,12 @@ class PathSolution(NamedTuple):
     Attributes
     ----------
     solution : at its end, or why it cannot be followed
-    events : pose of the object and state at every event, the end is the last; none unless it converged
+    pose : at its end, with the depth that was found under a prescribed force
     energies : work of the object and dissipation (mJ) on the way
     """
 
     solution: ContactSolution[State[Float]]
-    events: list[tuple[ObjectPose, State[Float]]]
+    pose: ObjectPose
     energies: tuple[float, float]
 
 
@@ -118,13 +118,10 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
         detail = (
             _shortfall(force, move, events) if force and found.outcome is Outcome.FORCE_NOT_REACHED else found.detail
         )
-        return PathSolution(replace(found.with_state(state), detail=detail), [], (0.0, 0.0))
-    ends = []
-    for event in events:
-        pose = move.at(event.share)
-        after = State(replace(event.state, bases=bases), body.displacement(event.state.force, bases))
-        ends.append((replace(pose, depth_mm=pose.depth_mm + event.amplitude), after))
-    return PathSolution(found.with_state(ends[-1][1]), ends, _energies(problem, count, start, bases, move, events))
+        return PathSolution(replace(found.with_state(state), detail=detail), move.start, (0.0, 0.0))
+    after = State(replace(found.state, bases=bases), body.displacement(found.state.force, bases))
+    pose = replace(move.end, depth_mm=move.end.depth_mm + events[-1].amplitude)
+    return PathSolution(found.with_state(after), pose, _energies(problem, count, start, bases, move, events))
 
 
 def _shortfall(force: NormalForce, move: Move, events: list[Event]) -> str:
