@@ -3,73 +3,87 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments, pairwise_error
+from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import Press
 from finger3d.sensor import estimate, load
-from tests.sensor_cases import NONE, SCENE, scene
+from finger3d.sensor.calibration import summary
+from tests.sensor_cases import FEW, NONE, SCENE, scene
 
 NOISE = 1.5e-4
 
 
 def steps(count: int | str) -> Any:
-    return scene(press={"depth_mm": 10.0, "steps": count})
-
-
-def test_an_error_that_falls_as_one_over_n_is_told_exactly() -> None:
-    true, slope = np.array([0.02, 0.05]), np.array([3e-3, -1e-3])
-    strains = {n: true + slope / n for n in (10, 20, 40, 80)}
-    for n in strains:
-        assert pairwise_error(strains, n) == pytest.approx(np.abs(slope) / n, rel=1e-9)
-
-
-def test_levels_that_agree_by_chance_do_not_hide_the_error() -> None:
-    """10, 20 and 40 increments of a section in plane stress gave these sums of friction; 80 gave 0.0212."""
-    strains = {n: np.array([v]) for n, v in ((5, 0.0272), (10, 0.0249), (20, 0.0274), (40, 0.0221))}
-    assert abs(0.0272 - 0.0274) < 3e-4  # four times as many
-    # |0.0272 - 0.0221| / (1 - 5 / 40)
-    assert pairwise_error(strains, 5) == pytest.approx(0.0051 / 0.875, rel=1e-9)
-    assert pairwise_error(strains, 5) >= 0.0272 - 0.0212 - 2e-4
-
-
-def test_a_press_that_failed_tells_nothing() -> None:
-    strains = {10: np.array([1.0, np.nan]), 20: np.array([2.0, np.nan]), 40: np.array([np.nan, 1.0])}
-    assert pairwise_error(strains, 20) == pytest.approx([1.0, np.nan], nan_ok=True)
+    """A section under a curved object, which is pressed in increments."""
+    curved = {"shape": "cylinder", "radius_mm": 300.0}
+    return scene(press={"depth_mm": 10.0, "steps": count}, object=curved)
 
 
 @pytest.mark.parametrize(
     ("slope", "expected"),
     [
-        (0.0, 40),  # two pairs of levels are asked whatever they say
-        (1e-3, 80),  # 1e-3 / n <= 1.5e-5 from n = 67 on
-        (1.0, 320),  # the limit of a section
+        (0.0, 20),  # one comparison is made whatever it says
+        (1e-2, 80),  # 3e-2 / n^2, the difference to half as many, is 1.5e-5 at n = 45
+        (10.0, 320),  # the limit of a section
     ],
 )
 def test_increments_are_doubled_until_the_error_is_a_tenth_of_the_noise(slope: float, expected: int) -> None:
-    problem = build(steps("auto").model())
-    found = choose_increments(problem, lambda p: np.array([slope / p.model.legs[0].steps / NOISE]))
+    problem, tried = build(steps("auto").model()), list[int]()
+
+    def read_once(p: Any) -> Any:
+        tried.append(p.model.legs[0].steps)
+        return np.array([[slope / tried[-1] ** 2 / NOISE]])
+
+    found = choose_increments(problem, read_once)
     assert found.chosen
     assert [leg.steps for leg in found.legs] == [expected]
-    assert found.error == pytest.approx(slope / expected / NOISE)
-    assert found.comparison_legs[0].steps == 40
+    assert found.error == pytest.approx(3.0 * slope / expected**2 / NOISE)
+    assert tried == [10 * 2**k for k in range(len(tried))]
+
+
+def test_increments_are_not_settled_by_a_press_that_fails() -> None:
+    found = choose_increments(build(steps("auto").model()), lambda p: np.array([[0.0, np.nan]]))
+    assert found.legs[0].steps == 320
+    assert np.isnan(found.error)
+
+
+def test_a_section_under_a_plane_has_no_increments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every mu is one press to the end of the path, and what has no error is no tolerance, in no file."""
+    advanced, advance = list[float](), Press.advance
+
+    def counted(press: Press, station: Any, *more: Any) -> Any:
+        advanced.append(press.problem.model.friction.mu)
+        return advance(press, station, *more)
+
+    monkeypatch.setattr(Press, "advance", counted)
+    for count in ("auto", 7):
+        advanced.clear()
+        flat = scene(press={"depth_mm": 10.0, "steps": count})
+        found = calibrate(flat, "g36", tmp_path / str(count), FEW, tolerances={**NONE, "increments": 1.0})
+        assert advanced == list(FEW)
+        assert found.readings[0].tolerances == ()
+        data = json.loads((tmp_path / str(count) / "calibration.json").read_text())
+        assert "increments" not in data["about"]
+        assert not any("increments" in row for row in summary(found))
+    assert "increments" not in (tmp_path / "7" / "calibration.csv").read_text()
 
 
 def test_a_number_that_is_given_is_kept() -> None:
     model = steps(7).model()
     found = choose_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"))
     assert not found.chosen
-    assert found.legs == found.comparison_legs == model.legs
+    assert found.legs == model.legs
 
 
 def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
@@ -91,47 +105,58 @@ def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
 
 def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> None:
     rough = steps(2)
-    found = calibrate(rough, "g36", tmp_path, (0.1, 0.4, 0.5, 0.6, 0.7, 0.9), tolerances={**NONE, "increments": 1.0})
+    found = calibrate(rough, "g36", tmp_path, (0.1, 0.3, 0.4, 0.5, 0.6, 0.9), tolerances={**NONE, "increments": 1.0})
     data = json.loads((tmp_path / "calibration.json").read_text())
     assert data["about"]["increments"] == {"steps": [2], "chosen": False}
     increments = data["readings"]["g36"]["tolerances"]["increments"]
     assert (increments["unit"], increments["sd"]) == ("error bar", 1.0)
-    assert found.reductions([0.7])["increments"][0] > 0.5
+    assert found.reductions([0.5])["increments"][0] > 0.5
     # read by a press of many: off by far more than the noise, but not by more than what is told
-    strain = float(read(build(steps(160).model()), ("g36",), np.array([0.6]))[0, 0])
-    away = abs(strain - float(found.at(0.6)[0]))
-    assert away > 5.0 * found.noise[0]
-    assert away < 2.0 * float(found.readings[0].reading_sd([0.6])[0])
+    strain = float(read(build(steps(160).model()), ("g36",), np.array([0.5]))[0, 0])
+    away = abs(strain - float(found.at(0.5)[0]))
+    assert away > 2.0 * found.noise[0]
+    assert away < 2.0 * float(found.readings[0].reading_sd([0.5])[0])
     (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
-    assert abs(sure.mu - 0.6) > 4.0 * sure.std
-    assert honest.low <= 0.6 <= honest.high  # which two increments do not tell any nearer
+    assert abs(sure.mu - 0.5) > 2.0 * sure.std
+    assert honest.low <= 0.5 <= honest.high  # which two increments do not tell any nearer
 
 
-def test_chosen_increments_press_the_curve_and_fewer_the_differences() -> None:
-    """Where the strain hardly depends on them, 40 do, and depth is a difference of two presses of as many."""
-    calm = replace(steps("auto").model(), friction=scene().model().friction)
+def test_chosen_increments_press_the_curve() -> None:
+    """Where the strain hardly depends on them, 20 do, and the error left is told from presses of ten."""
     mus = (0.02, 0.03, 0.04, 0.05)
-    found, curve = calibrated(calm, "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0})
+    found, curve = calibrated(
+        steps("auto").model(), "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0}
+    )
     assert curve.increments.chosen
-    assert curve.problem.model.legs[0].steps == 40
-    same = calibrate(steps(40), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
+    assert curve.problem.model.legs[0].steps == 20
+    same = calibrate(steps(20), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
     assert found.readings[0].reading == pytest.approx(same.readings[0].reading, rel=1e-9)
     assert found.readings[0].tolerances[0].slope == pytest.approx(same.readings[0].tolerances[0].slope, rel=1e-6)
     assert found.readings[0].tolerances[1].name == "increments"
-    assert found.readings[0].tolerances[1].spread.max() <= 0.1 * found.noise[0]
+    ten = calibrate(steps(10), "g36", mus=mus, tolerances=NONE).readings[0].reading
+    told = found.readings[0].tolerances[1].spread
+    assert told == pytest.approx(np.abs(found.readings[0].reading - ten), rel=1e-6, abs=1e-12)
+    assert told.max() <= 0.1 * found.noise[0]
 
 
 @pytest.mark.parametrize("count", [4, "auto"])
 def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_path: Path) -> None:
-    given = {**SCENE, "press": {"depth_mm": 2.0, "steps": count}, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
+    given = steps(count).as_dict() | {"mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
     free = (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),)
     found = find_best(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
     told = json.loads((tmp_path / "design.json").read_text())["increments"]
     assert told["chosen"] is (count == "auto")
-    assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 40
+    assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 20
     assert told["strain_error"] >= 0.0
     assert found.scene.as_dict()["press"]["steps"] == count
     # the same number again, where the start is remembered and the search goes on
     more = find_best(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
     assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
     assert more.evaluations[: len(found.evaluations)] == found.evaluations
+
+
+def test_a_search_under_a_plane_tells_no_increments(tmp_path: Path) -> None:
+    given = {**SCENE, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
+    find_best(Search(given, (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),), mus=(0.1, 0.5), budget=2), tmp_path)
+    assert json.loads((tmp_path / "design.json").read_text())["increments"] == {}
+    assert "increments" not in (tmp_path / "report.html").read_text()

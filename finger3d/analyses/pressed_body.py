@@ -32,6 +32,7 @@ from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
@@ -91,6 +92,14 @@ def under(
     return replace(problem, model=model)
 
 
+def ends_only(problem: Problem) -> Problem:
+    """Return the problem with one station a leg where its path is exact, as only the ends are wanted; else as it is."""
+    if not has_exact_path(problem.model):
+        return problem
+    legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
+    return replace(problem, model=replace(problem.model, legs=legs))
+
+
 def _poses(legs: tuple[Leg, ...]) -> list[Leg]:
     """Return the legs without their increments and durations."""
     return [replace(leg, steps=1, duration_s=None) for leg in legs]
@@ -104,7 +113,7 @@ def press(
     cancel: Event | None = None,
 ) -> PressAtMu:
     """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
-    problem = under(problem, problem.model.friction.with_mu(mu))
+    problem = ends_only(under(problem, problem.model.friction.with_mu(mu)))
     workspace = workspace or formulation_of(problem.model).workspace()
     before = workspace.factorizations
     if automatic(problem.model):

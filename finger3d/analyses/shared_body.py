@@ -17,7 +17,7 @@ from itertools import dropwhile
 from pathlib import Path
 from threading import Event
 
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.pressed_body import PressedBody, ends_only, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
@@ -208,7 +208,7 @@ class SharedBody(PressedBody):
         start = time.perf_counter()
         frames: tuple[StepResult, ...] | Exception
         try:
-            problem = under(self.problem, variant.friction, variant.legs, variant.rule)
+            problem = ends_only(under(self.problem, variant.friction, variant.legs, variant.rule))
             frames = march_automatic(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames

@@ -26,6 +26,7 @@ from finger3d.io import claimed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import (
@@ -196,7 +197,7 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
     mus = settings.mus
     three = np.array(mus)[[0, len(mus) // 2, -1]]
     report.stage("increments")
-    increments = choose_increments(problem, lambda p: (read(p, settings.names, three) / settings.noise).ravel())
+    increments = choose_increments(problem, lambda p: read(p, settings.names, three) / settings.noise)
     if increments.chosen:
         report.say(str(increments))
     problem = under(problem, legs=increments.legs)
@@ -264,5 +265,5 @@ def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
         "mesh_hash": problem.body.report.hash,
         "factorizations": curve.factorizations,
         "versions": versions(),
-        "increments": curve.increments.as_dict(),
+        **({} if has_exact_path(problem.model) else {"increments": curve.increments.as_dict()}),
     }

@@ -33,6 +33,7 @@ from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
@@ -131,16 +132,13 @@ def evaluate_tolerances(
 
     Notes
     -----
-    A tolerance is left out if the presses that it needs fail.
+    A tolerance is left out if the presses that it needs fail, and that of the increments where the path is exact.
     """
     names = tuple(r.name for r in readings)
     mu = base.mu[base.sample]
     own = np.array([base.readings[name][base.sample] for name in names])
     body = ReferenceBody(problem, names, mu, own, base.pressed)
     others = set(tolerances) - {*GAUGE_PLACES, "increments"}
-    if others and increments.comparison_legs != problem.model.legs:
-        legs = increments.comparison_legs
-        body = ReferenceBody.of(under(problem, legs=legs), names, mu)
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
@@ -153,7 +151,10 @@ def evaluate_tolerances(
         if name == "mesh":
             effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
         elif name == "increments":
-            effects = [(sd, sd * _increment_errors(problem, names, own, increments, mu))]
+            if has_exact_path(problem.model):
+                continue
+            error = error_of_increments(problem, own, increments.chosen, lambda other: read(other, names, mu))
+            effects = [(sd, sd * error)]
         elif name in GAUGE_PLACES and not problem.model.inclusions:
             known = base.mu
             effects = _effects_of_displaced_gauges(problem.model, readings, name, sd, base)
@@ -344,9 +345,3 @@ def _mesh_errors(
         known = error[np.isfinite(error)]
         found.append(np.maximum(error, math.sqrt(float(np.mean(known**2)))) if len(known) else error)
     return np.array(found)
-
-
-def _increment_errors(problem: Problem, names: tuple[str, ...], own: Float, increments: Increments, mu: Float) -> Float:
-    """Return the errors (k, m) of readings due to the increments, from presses with more or fewer of them."""
-    error = error_of_increments(problem, own.ravel(), increments.chosen, lambda other: read(other, names, mu).ravel())
-    return error.reshape(own.shape)

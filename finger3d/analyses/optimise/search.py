@@ -26,10 +26,13 @@ from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.path import AUTO_START
+from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene
@@ -148,7 +151,7 @@ class Search:
     def _legs(self, body: _DesignBody, model: Model) -> tuple[Leg, ...]:
         """Return the path with the increments chosen for the first design, so that errors are comparable."""
         gauge = self._gauge(model)
-        if gauge is None or all(isinstance(leg.steps, int) for leg in model.legs):
+        if gauge is None or not automatic(model):
             return model.legs
         if self.chosen is None:
             mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
@@ -161,26 +164,27 @@ class Search:
         """Choose the increments at the start design, whose evaluation in the journal does not store them."""
         try:
             model = self.problem.scene(start).model()
-            if any(leg.steps == "auto" for leg in model.legs):
+            if automatic(model):
                 self._legs(_DesignBody(model, self.report), model)
         except Finger3dError:
             pass  # as in a new search, the increments are chosen at the first design that can be built
 
     def increments(self, values: Sequence[float]) -> Tree:
-        """Return the increments of a design and the resulting error of its strain."""
+        """Return the increments of a design and the resulting error of its strain; none where the path is exact."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
-        if gauge is None:
+        if gauge is None or has_exact_path(model):
             return {}
         body = _DesignBody(model, self.report)
-        legs = self._legs(body, model)
-        problem = under(body.problem, legs=legs)
+        problem = with_steps(under(body.problem, legs=self._legs(body, model)), AUTO_START)
 
         def strain(other: Any) -> Float:
             return body.strain(gauge, mus, other.model.legs)
 
-        left = error_of_increments(problem, strain(problem), legs != model.legs, strain)
-        return {"steps": [leg.steps for leg in legs], "chosen": legs != model.legs, "strain_error": float(left.max())}
+        chosen = automatic(model)
+        left = error_of_increments(problem, strain(problem), chosen, strain)
+        steps = [leg.steps for leg in problem.model.legs]
+        return {"steps": steps, "chosen": chosen, "strain_error": float(left.max())}
 
     def _record(self, found: Evaluation) -> None:
         self.known[found.values] = found

@@ -17,9 +17,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from threading import Event
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from finger3d._cost import AUTOMATIC_S, PressSize
+from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -34,6 +35,8 @@ from finger3d.mechanics.small_strain.exact_path import has_exact_path
 
 Measurement = Callable[[Problem, StepResult], dict[str, float]]
 """Quantities by name, measured at the end of a press."""
+
+Value = TypeVar("Value", float, Float)
 
 Run: TypeAlias = tuple[int, tuple[StepResult, ...]]
 """Number of increments in an automatic leg, and the results of all increments."""
@@ -109,7 +112,24 @@ def with_steps(problem: Problem, steps: int) -> Problem:
     return replace(problem, model=replace(problem.model, legs=legs))
 
 
-def increment_error(value: float, other: float, ratio: float) -> float:
+def with_scaled_steps(problem: Problem, ratio: float) -> tuple[Problem, float]:
+    """The problem in `ratio` times as many increments, and the ratio after rounding to whole numbers.
+
+    Raises
+    ------
+    Finger3dError
+        If all legs have a single increment, which cannot be halved.
+    """
+    legs = problem.model.legs
+    own = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in legs]
+    counts = [max(1, round(ratio * count)) for count in own]
+    if counts == own:
+        raise Finger3dError("a single increment cannot be halved")
+    scaled = tuple(replace(leg, steps=count) for leg, count in zip(legs, counts, strict=True))
+    return replace(problem, model=replace(problem.model, legs=scaled)), sum(counts) / sum(own)
+
+
+def increment_error(value: Value, other: Value, ratio: float) -> Value:
     """Estimated error of a quantity in N increments, from its value in `ratio` times as many.
 
     Examples
@@ -265,15 +285,8 @@ def step_error(
     ratio : float
         Increments of the further run over those of the problem.
     """
-    legs = problem.model.legs
-    own = [leg.steps if isinstance(leg.steps, int) else AUTO_START for leg in legs]
-    counts = [max(1, round(ratio * count)) for count in own]
-    if counts == own:
-        raise Finger3dError("a single increment cannot be halved")
-    changed = tuple(replace(leg, steps=count) for leg, count in zip(legs, counts, strict=True))
-    trial = replace(problem, model=replace(problem.model, legs=changed))
-    other = measurement(trial, last_step(trial))
-    return errors_between(quantities, other, sum(counts) / sum(own))
+    trial, ratio = with_scaled_steps(problem, ratio)
+    return errors_between(quantities, measurement(trial, last_step(trial)), ratio)
 
 
 def errors_between(quantities: Mapping[str, float], others: Mapping[str, float], ratio: float) -> dict[str, float]:
