@@ -104,7 +104,10 @@ def steps_row(what: str, error: Float, change: float, quick: bool = False) -> Ro
 
 @dataclass(frozen=True)
 class Profile:
-    """Tractions (MPa) on the finger along x (mm), ascending, in a section or at z = 0 of a solid; friction along +x."""
+    """Tractions (MPa) on the finger along x (mm), ascending, in a section or at z = 0 of a solid; friction along +x.
+
+    `area` (mm2) is that of the points of a section 1 mm wide; of a solid, that of a strip 1 mm wide about z = 0.
+    """
 
     x: Float
     area: Float
@@ -123,11 +126,13 @@ class Profile:
         along = np.zeros((len(points.points), points.dim))
         along[:, 1:] = frame.state.tangential_displacement
         columns = [np.asarray(table[k])[on] for k in ("x_mm", "area_mm2", "pressure_MPa", "shear_x_MPa")]
+        if points.dim == 3:
+            columns[1] = np.gradient(columns[0])
         return cls(*columns, frame.state.status[on], points.to_global(along)[on, 0])  # type: ignore[call-arg]
 
     @property
     def force(self) -> float:
-        """Normal force (N) of a section."""
+        """Normal force (N) of a section, or of the strip about z = 0 of a solid."""
         return float(self.p @ self.area)
 
     @property
