@@ -97,8 +97,8 @@ def statements(here: str, profiles: Sequence[Profile]) -> list[Row]:
             "Fig. 3", 0.0, max(map(roundness, profiles)), "5 % is the width of a drawn line", 0.05, "absolute",
         ),
         said(
-            f"f_t has one minimum and one maximum: extrema at full depth, {here}", "Fig. 3", 2.0, extrema(profiles[-1].q),
-            "a count; wiggles below a fifth of the range are not counted", 0.0, "absolute",
+            f"f_t has one minimum and one maximum: extrema at full depth, {here}", "Fig. 3", 2.0,
+            extrema(profiles[-1].q), "a count; wiggles below a fifth of the range are not counted", 0.0, "absolute",
         ),
         said(
             f"the sum of f_t is zero: |sum f_t| / sum |f_t|, {here}", "Sec. II-B", 0.0, net, "round-off", 1e-6,

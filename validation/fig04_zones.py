@@ -61,8 +61,9 @@ def statements(here: str, early: Profile, last: Profile) -> list[Row]:
             (last.a - last.c) - (early.a - early.c), "more than the points can tell", 0.0, "at least",
         ),
         said(
-            f"slip zones grow in their share of the contact: 1 - c/a at full depth less at a fifth, {here}", "Sec. II-B",
-            error / early.a, last.c / -last.a + early.c / early.a, "more than the points can tell", 0.0, "at least",
+            f"slip zones grow in their share of the contact: 1 - c/a at full depth less at a fifth, {here}",
+            "Sec. II-B", error / early.a, last.c / -last.a + early.c / early.a, "more than the points can tell", 0.0,
+            "at least",
         ),
     ]  # fmt: skip
 

@@ -3,9 +3,9 @@
 Source: Maeno 2004, Fig. 5 and Sec. II-B: R = 5 mm, mu = 0.25, plane stress: "the distribution of the shear strain
 changes as a function of the change in the tangential contact force, whereas the distribution of normal strains do not
 change noticeably".  Taken literally: the largest change along the line of nodes between 0.2 and 1 mm of each normal
-strain is compared with that of the shear.  All strains grow with the depth, so the shapes are judged as well: every profile
-is divided by its own largest value.  The paper does not give the depth of the line; half and twice the depth assumed
-here are in the table.
+strain is compared with that of the shear.  All strains grow with the depth, so the shapes are judged as well: every
+profile is divided by its own largest value.  The paper does not give the depth of the line; half and twice the depth
+assumed here are in the table.
 """
 
 from __future__ import annotations
