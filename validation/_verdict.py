@@ -243,10 +243,11 @@ def _numbers(rows: Sequence[Row]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def counts(kept: Mapping[str, Sequence[Row]]) -> dict[str, tuple[int, int, int]]:
-    """Return for each column how many claims hold, hold partly and fail."""
-    out = {}
+def summary(kept: Mapping[str, Sequence[Row]]) -> str:
+    """Return a sentence with the number of claims that hold, hold partly and fail in every column."""
+    parts = []
     for column in COLUMNS:
         told = [verdict(rows) for claim in CLAIMS if (rows := claim.found(column, kept))]
-        out[column] = (told.count(HOLDS), told.count(PARTLY), told.count(FAILS))
-    return out
+        numbers = ", ".join(f"{told.count(state)} {state}" for state in (HOLDS, PARTLY, FAILS))
+        parts.append(f"{column}: {numbers} of {len(told)}")
+    return "Claims by column: " + "; ".join(parts) + "."
