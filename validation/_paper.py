@@ -192,9 +192,9 @@ def _rosettes(x: Float, y: Float) -> list[Gauge]:
     ]
 
 
-def strains(frame: StepResult, count: int) -> Float:
-    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line."""
-    read = np.array([[frame.gauges[f"{i}:{k}"] for k in range(3)] for i in range(count)])
+def strains(frame: StepResult, count: int, line: str = "") -> Float:
+    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line, whose gauges are named after it."""
+    read = np.array([[frame.gauges[f"{line}{i}:{k}"] for k in range(3)] for i in range(count)])
     along_x, slanted, along_y = read.T
     return np.array([along_x, along_y, 2.0 * slanted - along_x - along_y])
 

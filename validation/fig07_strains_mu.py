@@ -9,6 +9,7 @@ Pressed in 160 increments: in the paper's ten the strains at large mu are not se
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,18 +39,20 @@ NAMES = ("eps_x", "eps_y", "gamma_xy")
 def run(quick: bool) -> Result:
     """Strains along lines under the surface for five coefficients."""
     size, count = (0.2, 15) if quick else (0.05, 45)
+    depths = (BELOW_R5,) if quick else (BELOW_R5 / 2.0, BELOW_R5, 2.0 * BELOW_R5)
+    along = {below: line_r5(below, count) for below in depths}
+    gauges = [replace(g, name=f"{below} {g.name}") for below, (_, own) in along.items() for g in own]
     found, left, half, lines = {}, {}, {}, []
-    for below in (BELOW_R5,) if quick else (BELOW_R5 / 2.0, BELOW_R5, 2.0 * BELOW_R5):
-        x, gauges = line_r5(below, count)
-        for plane, nu in CASES:
-            problem = half_cylinder(nu, plane, size, gauges)
-            for mu in MUS:
-                frame, half_as_many = settled(problem, mu, quick)
-                found[below, plane, nu, mu] = strains(frame, count)
-                left[below, plane, nu, mu] = found[below, plane, nu, mu] - strains(half_as_many, count)
-                half[plane, nu] = Profile.of(problem, frame).a
-                points = zip(x, *found[below, plane, nu, mu], strict=True)
-                lines += [(plane, nu, below, mu, *map(float, point)) for point in points]
+    for plane, nu in CASES:
+        problem = half_cylinder(nu, plane, size, gauges)
+        for mu in MUS:
+            frame, half_as_many = settled(problem, mu, quick)
+            half[plane, nu] = Profile.of(problem, frame).a
+            for below, (x, _) in along.items():
+                key = (below, plane, nu, mu)
+                found[key] = strains(frame, count, f"{below} ")
+                left[key] = found[key] - strains(half_as_many, count, f"{below} ")
+                lines += [(plane, nu, below, mu, *map(float, point)) for point in zip(x, *found[key], strict=True)]
     x, _ = line_r5(BELOW_R5, count)
     rows = []
     for plane, nu in JUDGED:

@@ -141,9 +141,9 @@ def _gauge(name: str, leaning: str, y: float, z: float, length: float = 0.0, sid
 
 def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> Model:
     body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    size = (6.0 if quick else 2.0) if domain == "solid" else (3.0 if quick else 1.0)
+    size = (6.0 if quick else 2.5) if domain == "solid" else (3.0 if quick else 1.0)
     mesh = MeshOptions(size, 3.0 * size, "swept")
-    legs = (Leg(10.0, steps=4 if quick else 20 if large else 80),)
+    legs = (Leg(10.0, steps=4 if quick else 10 if large else 80),)
     model = Model(body, Isotropic(1.0, nu), mesh, legs, gauges=tuple(gauges), domain=domain)
     return LargeDeformation().apply(model) if large else model
 

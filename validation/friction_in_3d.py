@@ -132,14 +132,15 @@ def with_foils(
 
 
 def _inside(body: Model, gauge: Gauge) -> Gauge:
-    """Return the gauge, lowered until both ends of its foil and what displaces them are in the body."""
-    margin = 0.02 * body.design.height_mm
+    """Return the gauge, moved until both ends of its foil and what displaces them are in the body."""
+    margin = max(0.02 * body.design.height_mm, 0.4)
     while True:
         ends = np.array(gauge.ends)
         top = body.design.top(ends[:, 0], ends[:, 2])
-        if np.isfinite(top).all() and (ends[:, 1] < top - margin).all():
+        low = ends[:, 1].min() <= margin
+        if np.isfinite(top).all() and (ends[:, 1] < top - margin).all() and not low:
             return gauge
-        gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm - 0.5 * margin)
+        gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm + (0.5 if low else -0.5) * margin)
 
 
 def _sd(joint: Calibration) -> Float:

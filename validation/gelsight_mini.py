@@ -1,12 +1,12 @@
 """Does finger3d reproduce a measured press, of a ball on a GelSight Mini gel, and what does that tell of the gel?
 
-Source: Helmut, Dziarski, Funk, Belousov and Peters 2024 (the repository feats-ai/feats): a steel ball of 15 mm diameter
-pressed 0.5, 1, 1.5 and 2 mm into the gel.  Neither errors of the forces nor friction are published; the gel is taken as
-a block of 20.75 x 25.25 x 4 mm, without its rounded rim, on a rigid back, pressed along its short axis at large
-deformation.  `finger3d identify` finds Young's modulus and the depth at which the bench has its zero, with a standard
-deviation of 3 % of every force, for three laws, five coefficients of friction and four Poisson's ratios; then from the
-first three depths alone, which predicts the fourth.  Helmut et al. fit a neo-Hookean law with C10 = 0.0725 MPa to the
-same forces, with tied contact; they give no constant of volume, for which CalculiX takes nu = 0.475.
+Source: Helmut et al. 2024, validation/REFERENCES.md, 9.1: a steel ball of 15 mm diameter pressed 0.5, 1, 1.5 and 2 mm
+into the gel.  Neither errors of the forces nor friction are published; the gel is taken as a block of 20.75 x 25.25 x 4
+mm, without its rounded rim, on a rigid back, at large deformation.  `finger3d identify` finds Young's modulus and the
+depth at which the bench has its zero, with a standard deviation of 3 % of every force, for three laws, four
+coefficients of friction and three Poisson's ratios; then from the first three depths alone, which predicts the fourth.
+Helmut et al. fit a neo-Hookean law with C10 = 0.0725 MPa to the same forces, with tied contact; they give no constant
+of volume, for which CalculiX takes nu = 0.475.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from finger3d.analyses.press import press
 from ._paper import Float, columns
 from ._rows import Result, Row
 
-SOURCE = "Helmut et al. 2024, measured"
+SOURCE = "Helmut et al. 2024; REFERENCES.md, 9.1"
 DEPTHS, FORCES = np.array([0.5, 1.0, 1.5, 2.0]), np.array([1.6503, 5.9641, 13.5257, 23.2532])
 SHARE = 0.03
 """Standard deviation of a force over the force; the publication has none."""
@@ -34,9 +34,9 @@ C10, CCX_NU = 0.0725, 0.475
 LAWS: dict[str, dict[str, Any]] = {
     "neo-Hookean": {},
     "Mooney-Rivlin": {"law": "mooney-rivlin", "c01_share": 0.3},
-    "Yeoh": {"law": "yeoh", "c2_over_c1": -0.04, "c3_over_c1": 0.004},
+    "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02},
 }
-MUS, NUS = (0.02, 0.1, 0.2, 0.4, 1.0), (0.45, 0.47, 0.48, 0.49)
+MUS, NUS = (0.02, 0.1, 0.3, 1.0), (0.45, 0.47, 0.49)
 E, ZERO = "material.E_MPa", "depth_offset_mm"
 FREE = {E: (0.05, 3.0), ZERO: (-0.3, 0.3)}
 
@@ -75,7 +75,7 @@ def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> di
     return {
         "finger": {"geometry": "block", "half_length_mm": 10.375, "height_mm": 4.0, "width_mm": 25.25},
         "material": {"E_MPa": E_MPa, "nu": nu},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": 2.0 * size},
+        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": min(2.0 * size, 4.0)},
         "object": {"shape": "sphere", "radius_mm": 7.5},
         "friction": {"mu": mu},
         "press": {"depth_mm": 2.4, "steps": 12},
@@ -85,8 +85,8 @@ def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> di
 
 def run(quick: bool) -> Result:
     """Quick: two models on a coarse mesh."""
-    size = 2.0 if quick else 1.0
-    laws, mus, nus = (list(LAWS)[:1], MUS[::4], NUS[2:3]) if quick else (list(LAWS), MUS, NUS)
+    size = 2.5 if quick else 1.2
+    laws, mus, nus = (list(LAWS)[:1], MUS[::3], NUS[1:2]) if quick else (list(LAWS), MUS, NUS)
     with tempfile.TemporaryDirectory() as folder:
         models = [_identified(law, mu, nu, size, Path(folder)) for law in laws for mu in mus for nu in nus]
         best = min(models, key=lambda m: m.misfit)
@@ -162,7 +162,7 @@ def _checks(best: Model, finer: Model, size: float) -> list[Row]:
     return [
         Row(
             f"Young's modulus on edges of {0.7 * size:.2g} mm, MPa", f"edges of {size:g} mm", best.E, finer.E, 0.1,
-            "25 cells under the contact; 3 % in the zero", "sensitivity",
+            "the contact of 2 mm is some 9 mm wide", "sensitivity",
         ),
         Row(
             "force by the published constant, tied, at 2 mm over the measured one", "Helmut et al. 2024, C10", 1.0,

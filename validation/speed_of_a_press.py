@@ -143,7 +143,7 @@ def _checks(name: str, body: Problem, found: Found) -> list[Row]:
             left = [1.0 - sum(rate * (1.0 - np.exp(-age * time / tau)) for tau in DECADES) for time in DURATIONS]
             wanted, got = (float(f[-1] / f[0]) for f in (left @ np.diff(elastic), [r.force for r in reads.values()]))
             rows.append(Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
-                            "Lee and Radok 1960; REFERENCES.md, 4.1", wanted, got, 0.01, "increments", ))  # fmt: skip
+                            "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", ))  # fmt: skip
     return rows
 
 
