@@ -84,9 +84,9 @@ def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> di
 
 
 def run(quick: bool) -> Result:
-    """Quick: two models on a coarse mesh."""
+    """Quick: one model on a coarse mesh."""
     size = 2.5 if quick else 1.2
-    laws, mus, nus = (list(LAWS)[:1], MUS[::3], NUS[1:2]) if quick else (list(LAWS), MUS, NUS)
+    laws, mus, nus = (list(LAWS)[:1], MUS[:1], NUS[1:2]) if quick else (list(LAWS), MUS, NUS)
     with tempfile.TemporaryDirectory() as folder:
         models = [_identified(law, mu, nu, size, Path(folder)) for law in laws for mu in mus for nu in nus]
         best = min(models, key=lambda m: m.misfit)
