@@ -5,9 +5,9 @@ applicable even when the size ... changed".  In small strain a finger of half th
 tolerances and foils do not shrink with it.  Half cylinders of R = 5 and 10 mm, 1.2 R wide, are pressed by a fifth of R
 (nu = 0.49), in small strain and, R = 5 mm, at large deformation (neo-Hookean).  They are read by one and by two gauges
 at the places that `finger3d optimise --gauges` finds, by two foils of 2 mm, 0.02 x 1.5 mm and 3000 MPa, and by seven
-markers on the contact face, each 0.02 mm.  The tolerances are the defaults of a calibration, of a gauge laid by hand on a bench
-(depth 0.1 mm, place 0.3 mm, 2 degrees), and those of a gauge cast in a mold on a precise bench (0.02 mm, 0.1 mm, 1
-degree); mesh and increments are left out.  The standard deviation of mu is that of friction_in_3d.py.
+markers on the contact face, each 0.02 mm.  The tolerances are the defaults of a calibration, of a gauge laid by hand on
+a bench (depth 0.1 mm, place 0.3 mm, 2 degrees), and those of a gauge cast in a mold on a precise bench (0.02 mm, 0.1
+mm, 1 degree); mesh and increments are left out.  The standard deviation of mu is that of friction_in_3d.py.
 """
 
 from __future__ import annotations
