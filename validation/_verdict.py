@@ -244,10 +244,10 @@ def _numbers(rows: Sequence[Row]) -> str:
 
 
 def summary(kept: Mapping[str, Sequence[Row]]) -> str:
-    """Return a sentence with the number of claims that hold, hold partly and fail in every column."""
+    """Return a sentence with the numbers of claims that hold, hold partly and fail in every column."""
     parts = []
     for column in COLUMNS:
         told = [verdict(rows) for claim in CLAIMS if (rows := claim.found(column, kept))]
-        numbers = ", ".join(f"{told.count(state)} {state}" for state in (HOLDS, PARTLY, FAILS))
-        parts.append(f"{column}: {numbers} of {len(told)}")
-    return "Claims by column: " + "; ".join(parts) + "."
+        numbers = ", ".join(str(told.count(state)) for state in (HOLDS, PARTLY, FAILS))
+        parts.append(f"{column} {numbers}")
+    return f"Claims that hold, hold partly and fail: {'; '.join(parts)}."
