@@ -192,10 +192,13 @@ def _rosettes(x: Float, y: Float) -> list[Gauge]:
     ]
 
 
-def strains(frame: StepResult, count: int, line: str = "") -> Float:
-    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line, whose gauges are named after it."""
+def strains(frame: StepResult, count: int, line: str = "", finite: bool = False) -> Float:
+    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line, whose gauges are named after it.
+
+    At finite strain they are those of Green and Lagrange, as the three elongations give no shear otherwise.
+    """
     read = np.array([[frame.gauges[f"{line}{i}:{k}"] for k in range(3)] for i in range(count)])
-    along_x, slanted, along_y = read.T
+    along_x, slanted, along_y = (read + 0.5 * read**2).T if finite else read.T
     return np.array([along_x, along_y, 2.0 * slanted - along_x - along_y])
 
 

@@ -90,10 +90,11 @@ def extrema(q: np.ndarray) -> int:
 
 def statements(here: str, profiles: Sequence[Profile]) -> list[Row]:
     """What Sec. II-B says of the tractions, from small to full depth."""
+    shown = "all depths" if len(profiles) > 1 else "full depth"
     net = max(abs(p.q @ p.area) / (np.abs(p.q) @ p.area) for p in profiles)
     return [
         said(
-            f"f_n is semi-circular: largest distance from a half ellipse over its peak, all depths, {here}",
+            f"f_n is semi-circular: largest distance from a half ellipse over its peak, {shown}, {here}",
             "Fig. 3", 0.0, max(map(roundness, profiles)), "5 % is the width of a drawn line", 0.05, "absolute",
         ),
         said(

@@ -4,10 +4,10 @@ Source: Maeno 2004, Sec. V: "miniaturization of the sensor" is left for the futu
 applicable even when the size ... changed". In small strain a finger of half the size has the same strains, but noise,
 tolerances and foils do not shrink with it. Half cylinders of R = 5 and 10 mm, 1.2 R wide, are pressed by a fifth of R
 (nu = 0.49), in small strain and, R = 5 mm, at large deformation (neo-Hookean). They are read by one and by two gauges
-at the places that `finger3d optimise --gauges` finds in small strain, by two foils of 2 mm, 0.02 x 1.5 mm and 3000 MPa,
-and by seven markers on the contact face, each 0.02 mm. The tolerances are the defaults of a calibration, of a gauge
-laid by hand on a bench (depth 0.1 mm, place 0.3 mm, 2 degrees), and those of a gauge cast in a mold on a precise bench
-(0.02 mm, 0.1 mm, 1 degree); mesh and increments are left out. The standard deviation of mu is that of
+at the places that `finger3d optimise --gauges` finds in small strain, by two foils of 2 mm, 0.02 x 1.5 mm and 3000 MPa
+(R = 5 mm), and by seven markers on the contact face, each 0.02 mm. The tolerances are the defaults of a calibration, of
+a gauge laid by hand on a bench (depth 0.1 mm, place 0.3 mm, 2 degrees), and those of a gauge cast in a mold on a
+precise bench (0.02 mm, 0.1 mm, 1 degree); mesh and increments are left out. The standard deviation of mu is that of
 friction_in_3d.py.
 """
 
@@ -64,7 +64,7 @@ def run(quick: bool) -> Result:
             marked = markers(body, 0.55 * radius, 0.01 * radius)
             for readings, sd in spreads(body, sets, marked, off).items():
                 found[radius, measure, name, readings] = sd
-            if (measure, name) == (SMALL, CAST):
+            if (radius, measure, name) == (RADII[0], SMALL, CAST):
                 last = list(sets)[-1]
                 found[radius, measure, name, "2 foils"] = with_foils(body, sets[last], FOIL, FOIL_MM, off)
     lines = [(*key, mu, sd) for key, sds in found.items() for mu, sd in zip(MUS, sds, strict=True)]
