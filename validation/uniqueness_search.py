@@ -37,7 +37,7 @@ PATHS = {
     "one increment each": (Leg(10.0, steps=1), Leg(10.0, 5.0, steps=1), Leg(4.0, 5.0, steps=1)),
     "five increments each": (Leg(10.0, steps=5), Leg(10.0, 5.0, steps=5), Leg(4.0, 5.0, steps=5)),
 }
-STARTS = {STRESS: 40, STRAIN: 40, WIDE: 10}
+STARTS = {STRESS: 20, STRAIN: 20, WIDE: 6}
 DIFFERENT = 1e-6
 """Largest difference of a force over the largest force, from which a state is another one."""
 
