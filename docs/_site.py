@@ -44,7 +44,7 @@ def write_generated(docs: Path) -> None:
     """Write the generated parts of pages into docs/_generated; files that stay the same are left alone."""
     folder = docs / "_generated"
     folder.mkdir(exist_ok=True)
-    pages = {"keys": keys(), "outputs": outputs(), "commands": commands(), "studies": studies()}
+    pages = {"keys": keys(), "outputs": outputs(), "commands": commands(), "studies": studies(), "verdict": verdict()}
     for name, text in pages.items():
         _write(folder / f"{name}.md", text)
 
@@ -166,8 +166,18 @@ def commands() -> str:
 def studies() -> str:
     """Return the index of validation/, its links relative to docs/."""
     text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
-    index = text[text.index("\n- *Verification*") : text.index("\n| study | what |")]
-    return re.sub(r"\]\((?!https?:|#)", "](../validation/", index) + "\n"
+    return _part_of(text, "\n- *Verification*", "\n## All rows")
+
+
+def verdict() -> str:
+    """Return the table of the paper's claims from the index of validation/, its links relative to docs/."""
+    text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
+    return _part_of(text, "\nEvery cell", "\n## Studies")
+
+
+def _part_of(text: str, first: str, last: str) -> str:
+    part = text[text.index(first) : text.index(last)]
+    return re.sub(r"\]\((?!https?:|#)", "](../validation/", part) + "\n"
 
 
 _SHORT = re.compile(r"^(\w+(?:, \w+)*) : (.+)$")

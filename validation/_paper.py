@@ -104,7 +104,10 @@ def steps_row(what: str, error: Float, change: float, quick: bool = False) -> Ro
 
 @dataclass(frozen=True)
 class Profile:
-    """Tractions (MPa) on the finger along x (mm), ascending, in a section or at z = 0 of a solid; friction along +x."""
+    """Tractions (MPa) on the finger along x (mm), ascending, in a section or at z = 0 of a solid; friction along +x.
+
+    `area` (mm2) is that of the points of a section 1 mm wide; of a solid, that of a strip 1 mm wide about z = 0.
+    """
 
     x: Float
     area: Float
@@ -123,11 +126,13 @@ class Profile:
         along = np.zeros((len(points.points), points.dim))
         along[:, 1:] = frame.state.tangential_displacement
         columns = [np.asarray(table[k])[on] for k in ("x_mm", "area_mm2", "pressure_MPa", "shear_x_MPa")]
+        if points.dim == 3:
+            columns[1] = np.gradient(columns[0])
         return cls(*columns, frame.state.status[on], points.to_global(along)[on, 0])  # type: ignore[call-arg]
 
     @property
     def force(self) -> float:
-        """Normal force (N) of a section."""
+        """Normal force (N) of a section, or of the strip about z = 0 of a solid."""
         return float(self.p @ self.area)
 
     @property
@@ -187,10 +192,13 @@ def _rosettes(x: Float, y: Float) -> list[Gauge]:
     ]
 
 
-def strains(frame: StepResult, count: int) -> Float:
-    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line."""
-    read = np.array([[frame.gauges[f"{i}:{k}"] for k in range(3)] for i in range(count)])
-    along_x, slanted, along_y = read.T
+def strains(frame: StepResult, count: int, line: str = "", finite: bool = False) -> Float:
+    """eps_x, eps_y, gamma_xy (3, n) of the `count` points of a line, whose gauges are named after it.
+
+    At finite strain they are those of Green and Lagrange, as the three elongations give no shear otherwise.
+    """
+    read = np.array([[frame.gauges[f"{line}{i}:{k}"] for k in range(3)] for i in range(count)])
+    along_x, slanted, along_y = (read + 0.5 * read**2).T if finite else read.T
     return np.array([along_x, along_y, 2.0 * slanted - along_x - along_y])
 
 

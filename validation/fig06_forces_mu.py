@@ -7,6 +7,7 @@ area of the slip region at the edge of the contact area is small".
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,15 +32,19 @@ def run(quick: bool) -> Result:
             outward = float((profile.q * np.sign(profile.x)) @ profile.area)
             zones = (profile.a, profile.c, profile.edge_error())
             lines.append((plane, nu, mu, profile.force, float(profile.p.max()), friction, outward, *zones))
-    rows = [row for case in JUDGED for row in _statements(*case, [found[*case, mu] for mu in MUS])]
+    rows = [row for case in JUDGED for row in _judged(*case, [found[*case, mu] for mu in MUS])]
     names = "plane nu mu force_N_per_mm peak_MPa friction_sum_N_per_mm outward_N_per_mm a_mm c_mm error_mm"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found))
 
 
-def _statements(plane: str, nu: float, profiles: list[Profile]) -> list[Row]:
-    here = f"{plane}, nu = {nu:g}"
+def _judged(plane: str, nu: float, profiles: list[Profile]) -> list[Row]:
     force = [p.force for p in profiles]
-    friction = [np.abs(p.q) @ p.area for p in profiles]
+    friction = [float(np.abs(p.q) @ p.area) for p in profiles]
+    return statements(f"{plane}, nu = {nu:g}", profiles, force, friction)
+
+
+def statements(here: str, profiles: Sequence[Profile], force: Sequence[float], friction: Sequence[float]) -> list[Row]:
+    """What Sec. II-B says of the normal force and of the sum of |f_t| for the five coefficients."""
     slip = [p.a - p.c for p in profiles]
     return [
         said(

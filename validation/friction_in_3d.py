@@ -47,6 +47,7 @@ NAMES = {"plane-strain": "section", "solid": "20 mm wide"}
 FOIL = EmbeddedGauge(3000.0, 0.02, 3.0)
 IDEAL = {"mesh": 0.0, "increments": 0.0}
 PAPER, MARKERS = "paper's gauge", "7 markers"
+PAPER_GAUGE = Gauge("p", 36.0, 40.0, angle=math.radians(30.0))
 FREE, READ = "free", "foil"
 MOST = 3
 
@@ -71,26 +72,27 @@ def run(quick: bool) -> Result:
         for measure in (SMALL,) if quick else (SMALL, LARGE):
             large = measure == LARGE
             body = model(domain, sizes, large, 4 if quick else 10 if large else 20)
-            sets = _gauge_sets(body, 2 if quick else MOST)
+            sets = {PAPER: (PAPER_GAUGE,), **best_gauges(body, 2 if quick else MOST)}
             placed += [
                 (domain, measure, name, g.x_mm, g.y_mm, math.degrees(g.angle)) for name, s in sets.items() for g in s
             ]
-            for name, sd in _free(body, sets, quick).items():
+            off = {**IDEAL, "tilt_deg": 0.0} if quick else IDEAL
+            for name, sd in spreads(body, sets, markers(body, 36.0), off).items():
                 spread[domain, measure, name, FREE] = sd
             if not quick:
-                for name, sd in _with_foils(body, sets).items():
-                    spread[domain, measure, name, READ] = sd
+                name = list(sets)[-1]
+                spread[domain, measure, name, READ] = with_foils(body, sets[name], FOIL, 4.0, IDEAL)
     lines = [(*key, mu, sd) for key, sds in spread.items() for mu, sd in zip(MUS, sds, strict=True)]
     lines += [(domain, measure, name, "place", x, y) for domain, measure, name, x, y, _ in placed]
     names = "domain strain_measure readings read mu_or_x_mm mu_sd_or_y_mm"
     return Result(tuple(_rows(spread)), columns(names, lines), lambda figure: _draw(figure, spread))
 
 
-def _gauge_sets(body: Model, most: int) -> dict[str, tuple[Gauge, ...]]:
-    """Return the paper's gauge, and the best one, two and so on."""
-    tolerances = with_defaults({"increments": 0.0})
-    fields = GaugeFields.of(body, MUS[::2], NOISE, tolerances, QUIET)
-    found = {PAPER: (Gauge("p", 36.0, 40.0, angle=math.radians(30.0)),)}
+def best_gauges(body: Model, most: int, tolerances: Mapping[str, float] | None = None) -> dict[str, tuple[Gauge, ...]]:
+    """Return the best gauge, the best two and so on, under the default tolerances and those given."""
+    judged = with_defaults({**(tolerances or {}), "increments": 0.0})
+    fields = GaugeFields.of(body, MUS[::2], NOISE, judged, QUIET)
+    found = {}
     for count in range(1, most + 1):
         chosen, _ = search(fields, Region.of(body), count, QUIET)
         found[f"{count} best gauge{'s' if count > 1 else ''}"] = tuple(
@@ -100,42 +102,45 @@ def _gauge_sets(body: Model, most: int) -> dict[str, tuple[Gauge, ...]]:
     return found
 
 
-def _markers(body: Model) -> tuple[Marker, ...]:
-    """Return seven markers on the contact face at z = 0."""
-    x = np.linspace(-36.0, 36.0, 7)
+def markers(body: Model, reach: float, below: float = 0.5) -> tuple[Marker, ...]:
+    """Return seven markers `below` mm under the contact face at z = 0, up to `reach` mm from the middle."""
+    x = np.linspace(-reach, reach, 7)
     top = body.design.top(x, np.zeros_like(x))
-    return tuple(Marker(f"m{i}", float(a), float(b) - 0.5) for i, (a, b) in enumerate(zip(x, top, strict=True)))
+    return tuple(Marker(f"m{i}", float(a), float(b) - below) for i, (a, b) in enumerate(zip(x, top, strict=True)))
 
 
-def _free(body: Model, sets: Mapping[str, Sequence[Gauge]], quick: bool) -> dict[str, Float]:
+def spreads(
+    body: Model, sets: Mapping[str, Sequence[Gauge]], marked: Sequence[Marker], tolerances: Mapping[str, float]
+) -> dict[str, Float]:
     """Return the standard deviation of mu by every set of gauges, and by the markers, all in the same presses."""
-    markers = _markers(body)
     gauges = tuple(g for chosen in sets.values() for g in chosen)
     names = {name: [g.name for g in chosen] for name, chosen in sets.items()}
-    names[MARKERS] = [f"{m.name}.x" for m in markers]
-    whole = replace(body, gauges=gauges, markers=markers)
-    off = {**IDEAL, "tilt_deg": 0.0} if quick else IDEAL
-    joint, _ = calibrated(whole, [n for some in names.values() for n in some], MUS, tolerances=off)
+    names[MARKERS] = [f"{m.name}.x" for m in marked]
+    whole = replace(body, gauges=gauges, markers=tuple(marked))
+    joint, _ = calibrated(whole, [n for some in names.values() for n in some], MUS, tolerances=tolerances)
     return {name: _sd(joint.of(some)) for name, some in names.items()}
 
 
-def _with_foils(body: Model, sets: Mapping[str, Sequence[Gauge]]) -> dict[str, Float]:
-    """Return the standard deviation of mu by the largest set, where the gauges are foils."""
-    name = list(sets)[-1]
-    gauges = tuple(_inside(body, replace(g, length_mm=4.0)) for g in sets[name])
-    foils = FOIL.apply(replace(body, gauges=gauges))
-    joint, _ = calibrated(foils, [g.name for g in gauges], MUS, tolerances=IDEAL)
-    return {name: _sd(joint)}
+def with_foils(
+    body: Model, gauges: Sequence[Gauge], foil: EmbeddedGauge, length: float, tolerances: Mapping[str, float]
+) -> Float:
+    """Return the standard deviation of mu by gauges that are foils of a length (mm)."""
+    lowered = tuple(_inside(body, replace(g, length_mm=length)) for g in gauges)
+    foils = foil.apply(replace(body, gauges=lowered))
+    joint, _ = calibrated(foils, [g.name for g in lowered], MUS, tolerances=tolerances)
+    return _sd(joint)
 
 
 def _inside(body: Model, gauge: Gauge) -> Gauge:
-    """Return the gauge, lowered until both ends of its foil and what displaces them are in the body."""
+    """Return the gauge, moved until both ends of its foil and what displaces them are in the body."""
+    margin = max(0.02 * body.design.height_mm, 0.4)
     while True:
         ends = np.array(gauge.ends)
         top = body.design.top(ends[:, 0], ends[:, 2])
-        if np.isfinite(top).all() and (ends[:, 1] < top - 1.0).all():
+        low = ends[:, 1].min() <= margin
+        if np.isfinite(top).all() and (ends[:, 1] < top - margin).all() and not low:
             return gauge
-        gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm - 0.5)
+        gauge = replace(gauge, x_mm=0.98 * gauge.x_mm, y_mm=gauge.y_mm + (0.5 if low else -0.5) * margin)
 
 
 def _sd(joint: Calibration) -> Float:

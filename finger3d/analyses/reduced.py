@@ -1,4 +1,4 @@
-"""Reduced model of a press: the compliance of the contact points without the mesh, pressed in milliseconds.
+"""Reduced model of a press: the compliance of the contact points, pressed without the mesh.
 
 At small strain a press needs only the compliance of the contact points, the gauge rows, and the gap between object and
 surface (`finger3d.fem.solvers.condense`).  Without the mesh there are no fields, and no candidate points can be added:

@@ -1,0 +1,202 @@
+"""Does finger3d reproduce a measured press, of a ball on a GelSight Mini gel, and what does that tell of the gel?
+
+Source: Helmut et al. 2024, validation/REFERENCES.md, 9.1: a steel ball of 15 mm diameter pressed 0.5, 1, 1.5 and 2 mm
+into the gel.  Neither errors of the forces nor friction are published; the gel is taken as a block of 20.75 x 25.25 x 4
+mm, without its rounded rim, on a rigid back, at large deformation.  `finger3d identify` finds Young's modulus and the
+depth at which the bench has its zero, with a standard deviation of 3 % of every force, for two laws, four
+coefficients of friction and three Poisson's ratios; then from the first three depths alone, which predicts the fourth.
+Helmut et al. fit a neo-Hookean law with C10 = 0.0725 MPa to the same forces, with tied contact; they give no constant
+of volume, for which CalculiX takes nu = 0.475.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.analyses.identify.run import identify
+from finger3d.analyses.press import press
+
+from ._paper import Float, columns
+from ._rows import Result, Row
+
+SOURCE = "Helmut et al. 2024; REFERENCES.md, 9.1"
+DEPTHS, FORCES = np.array([0.5, 1.0, 1.5, 2.0]), np.array([1.6503, 5.9641, 13.5257, 23.2532])
+SHARE = 0.03
+"""Standard deviation of a force over the force; the publication has none."""
+FITS = 0.05
+"""Largest distance from a force, relative, of a model that is said to fit."""
+C10, CCX_NU = 0.0725, 0.475
+LAWS: dict[str, dict[str, Any]] = {
+    "neo-Hookean": {},
+    "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02},
+}
+MUS, NUS = (0.02, 0.1, 0.3, 1.0), (0.45, 0.47, 0.49)
+E, ZERO = "material.E_MPa", "depth_offset_mm"
+FREE = {E: (0.05, 3.0), ZERO: (-0.3, 0.3)}
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is assumed, and the values and forces that are found with it.
+
+    Attributes
+    ----------
+    E, E_sd, zero : Young's modulus and its standard deviation, MPa; zero of the depth, mm
+    forces : (4,) N at the measured depths
+    predicted, predicted_sd : force at the fourth depth from the first three, N
+    curve : depth, mm, and force, N, of the simulated press
+    """
+
+    law: str
+    mu: float
+    nu: float
+    E: float
+    E_sd: float
+    zero: float
+    forces: Float
+    predicted: float
+    predicted_sd: float
+    curve: tuple[Float, Float]
+
+    @property
+    def misfit(self) -> float:
+        """Largest distance from a measured force, relative."""
+        return float(np.abs(self.forces / FORCES - 1.0).max())
+
+
+def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> dict[str, Any]:
+    """The ball on the block."""
+    return {
+        "finger": {"geometry": "block", "half_length_mm": 10.375, "height_mm": 4.0, "width_mm": 25.25},
+        "material": {"E_MPa": E_MPa, "nu": nu},
+        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": min(2.0 * size, 4.0)},
+        "object": {"shape": "sphere", "radius_mm": 7.5},
+        "friction": {"mu": mu},
+        "press": {"depth_mm": 2.4, "steps": 12},
+        "effects": {"large_deformation": LAWS[law]},
+    }
+
+
+def run(quick: bool) -> Result:
+    """Quick: one model on a coarse mesh."""
+    size = 2.5 if quick else 1.2
+    laws, mus, nus = (list(LAWS)[:1], MUS[:1], NUS[1:2]) if quick else (list(LAWS), MUS, NUS)
+    with tempfile.TemporaryDirectory() as folder:
+        models = [_identified(law, mu, nu, size, Path(folder)) for law in laws for mu in mus for nu in nus]
+        best = min(models, key=lambda m: m.misfit)
+        finer = _identified(best.law, best.mu, best.nu, 0.7 * size, Path(folder) / "finer")
+    lines = [(m.law, m.mu, m.nu, m.E, m.E_sd, m.zero, m.misfit, m.predicted, m.predicted_sd, *m.forces) for m in models]
+    names = "law mu nu E_MPa E_sd_MPa zero_mm misfit predicted_N predicted_sd_N F0_N F1_N F2_N F3_N"
+    rows = (*_rows(models, best), *_checks(best, finer, size))
+    return Result(rows, columns(names, lines), lambda figure: _draw(figure, models, best))
+
+
+def _identified(law: str, mu: float, nu: float, size: float, folder: Path) -> Model:
+    """Identify from all forces and from the first three."""
+    found = {}
+    for count in (4, 3):
+        out = folder / f"{law} {mu} {nu} {count}"
+        out.mkdir(parents=True)
+        rows = [f"{d},{f},{SHARE * f}" for d, f in zip(DEPTHS[:count], FORCES[:count], strict=True)]
+        (out / "bench.csv").write_text("\n".join(["depth_mm,normal_force_N,normal_force_N_std", *rows]) + "\n")
+        found[count] = identify(scene(law, mu, nu, size), out / "bench.csv", FREE, out)
+    (modulus, zero), sds = found[4].fitted.values, found[4].fitted.stds
+    curve, fitted = found[3].curve, found[3].fitted
+    depth, force = np.asarray(curve["depth_mm"]), np.asarray(curve["normal_force_N"])
+    # by small changes of both values: the force is proportional to the modulus
+    at = DEPTHS[3] + fitted.values[1]
+    slopes = np.array([np.interp(at, depth, force) / fitted.values[0], np.interp(at, depth, np.gradient(force, depth))])
+    covariance = fitted.correlation * np.outer(fitted.stds, fitted.stds)
+    sd = float(np.sqrt(slopes @ covariance @ slopes))
+    whole = found[4].curve
+    return Model(
+        law, mu, nu, float(modulus), float(sds[0]), float(zero), np.asarray(found[4].simulated["normal_force_N"]),
+        float(np.interp(at, depth, force)), sd,
+        (np.asarray(whole["depth_mm"]) - zero, np.asarray(whole["normal_force_N"])),
+    )  # fmt: skip
+
+
+def _rows(models: list[Model], best: Model) -> list[Row]:
+    """What fits, what the forces tell, and the prediction."""
+    fitting = [m for m in models if m.misfit <= FITS]
+    told = f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}, E = {best.E:.3f} MPa"
+    rows = [
+        Row(
+            f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS, best.misfit,
+            0.0, "a block for a gel with a rounded rim; force and zero without published errors", "validation",
+            "at most",
+        ),
+        Row(
+            "models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models), 0.0,
+            "if the forces told nothing but modulus and zero", "statement", "at least",
+        ),
+    ]  # fmt: skip
+    for name, values in {"friction coefficient": [m.mu for m in fitting], "Young's modulus": [m.E for m in fitting],
+                         "Poisson's ratio": [m.nu for m in fitting]}.items():  # fmt: skip
+        ratio = max(values, default=np.nan) / min(values, default=np.nan)
+        rows.append(Row(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
+                        1.1, ratio, 0.0, "10 %", "statement", "at most"))  # fmt: skip
+    # of all models: which of them fit is known only with the fourth force
+    band = [m.predicted + sign * 2.0 * m.predicted_sd for m in models for sign in (-1.0, 1.0)]
+    outside = max(min(band) - FORCES[3], FORCES[3] - max(band), 0.0)
+    rows.append(
+        Row(
+            f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
+            f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
+            "two standard deviations about every model", "validation", "absolute",
+        )
+    )  # fmt: skip
+    return rows
+
+
+def _checks(best: Model, finer: Model, size: float) -> list[Row]:
+    """The error of the mesh, and the publication's own constants in tied contact."""
+    tied = press(scene("neo-Hookean", 10.0, CCX_NU, size, 4.0 * C10 * (1.0 + CCX_NU)), error=False)
+    depth, force = ([0.0, *(getattr(s, key) for s in tied.steps)] for key in ("depth_mm", "normal_force_N"))
+    theirs = np.interp(DEPTHS, depth, force) / FORCES
+    return [
+        Row(
+            f"Young's modulus on edges of {0.7 * size:.2g} mm, MPa", f"edges of {size:g} mm", best.E, finer.E, 0.1,
+            "the contact of 2 mm is some 9 mm wide", "sensitivity",
+        ),
+        Row(
+            "force by the published constant, tied, at 2 mm over the measured one", "Helmut et al. 2024, C10", 1.0,
+            float(theirs[3]), 0.1, "their rim is rounded, and their loss has absolute forces", "statement",
+        ),
+        Row(
+            "force by the published constant, tied, at 0.5 mm over the measured one", "Helmut et al. 2024, C10", 1.0,
+            float(theirs[0]), 0.1, "their rim is rounded, and their loss has absolute forces", "statement",
+        ),
+    ]  # fmt: skip
+
+
+def _draw(figure: Any, models: list[Model], best: Model) -> None:
+    figure.set_size_inches(14.0, 4.6)
+    left, middle, right = figure.subplots(1, 3)
+    fitting = [m for m in models if m.misfit <= FITS]
+    for m in fitting:
+        left.plot(*m.curve, color="#9ecae1", lw=0.8)
+    left.plot(*best.curve, color="#2166ac", lw=1.6, label=f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}")
+    left.errorbar(DEPTHS, FORCES, SHARE * FORCES, fmt="ko", ms=5, capsize=3, label="measured, 3 %")
+    left.set(xlabel="depth (mm)", ylabel="normal force (N)", xlim=(0.0, 2.2), ylim=(0.0, 30.0))
+    left.set_title("models that fit within 5 %", fontsize=10)
+    left.legend(frameon=False, fontsize=8)
+    for i, law in enumerate(dict.fromkeys(m.law for m in models)):
+        for j, nu in enumerate(dict.fromkeys(m.nu for m in models)):
+            own = [m for m in models if m.law == law and m.nu == nu]
+            style = ("-", "--", ":")[i]
+            middle.plot([m.mu for m in own], [100.0 * m.misfit for m in own], style, marker="o", ms=3, color=f"C{j}",
+                        label=f"{law}, nu = {nu:g}")  # fmt: skip
+            right.errorbar([m.E for m in own], [m.predicted for m in own], [2.0 * m.predicted_sd for m in own],
+                           fmt="osv"[i], ms=4, lw=0.8, color=f"C{j}")  # fmt: skip
+    middle.axhline(100.0 * FITS, color="#222222", lw=0.8)
+    middle.set(xscale="log", xlabel="mu that is assumed", ylabel="largest distance from a force (%)", ylim=(0.0, None))
+    middle.legend(fontsize=6.5, frameon=False, ncols=2)
+    right.axhline(FORCES[3], color="k", lw=1.0)
+    right.set(xlabel="Young's modulus that is identified (MPa)", ylabel="force at 2 mm from the first three (N)")
+    right.set_title("line: measured", fontsize=10)

@@ -1,0 +1,169 @@
+"""Does the speed of a press change the friction coefficient that a gauge reads, in a rubber that relaxes?
+
+Source: Maeno 2004, Sec. IV: "this experiment is performed by increasing the indentation slowly to avoid the effect of
+viscosity of the sensor". The relaxation of rubbers is given as a share of the stress per decade of time, a few per cent
+(Lindley 1978); a Prony series with 2, 5 or 10 % in each decade from 1 ms to 1000 s stands for it, since no series of a
+silicone was found with its numbers. The finger of Fig. 9 (nu = 0.49 at once) is calibrated by presses of 10 s and read
+in presses of 0.1 to 1000 s: at the same depth and at the same force; with all moduli relaxing, and in the section with
+the shear modulus alone, where Poisson's ratio grows. The section has the paper's gauge, the finger 20 mm wide the gauge
+that design_search.py finds best, at x = 6 mm and 85 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.viscosity import Effect as Viscosity
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Gauge, Leg
+from finger3d.mechanics.results.history import StepResult
+
+from ._paper import STRAIN, Float, columns, fig9, said, under
+from ._rows import Result, Row
+
+RATES = (0.02, 0.05, 0.1)
+"""Share of the stress at once that relaxes in every decade."""
+DECADES = tuple(10.0**k for k in range(-3, 4))
+DURATIONS = (0.1, 1.0, 10.0, 100.0, 1000.0)
+USUAL = 10.0
+"""Duration of the presses of the calibration, s."""
+MU = 0.25
+MUS = (0.15, 0.2, 0.25, 0.3, 0.35)
+WIDE = "20 mm wide"
+GAUGES = {
+    STRAIN: Gauge("g", 36.0, 40.0, angle=math.radians(30.0)),
+    WIDE: Gauge("g", 6.0, 46.5, angle=math.radians(85.0)),
+}
+DEPTH, FORCE = "same depth", "same force"
+DEPTH_MM = 10.0
+
+
+@dataclass(frozen=True)
+class Read:
+    """A press of some duration: error of the mu that is read, force (N) and depth (mm)."""
+
+    mu_error: float
+    force: float
+    depth: float
+
+
+Found = dict[tuple[str, str, bool, float], dict[float, Read]]
+"""Presses by duration; by model, control, whether all moduli relax, and rate."""
+
+
+def run(quick: bool) -> Result:
+    """Quick: the section on a coarse mesh with one rate."""
+    found: Found = {}
+    bodies = {}
+    for name in (STRAIN,) if quick else (STRAIN, WIDE):
+        body = fig9(0.49, "solid" if name == WIDE else STRAIN, 3.0 if quick or name == WIDE else 1.0, [GAUGES[name]])
+        bodies[name] = body
+        for rate in RATES if name == STRAIN and not quick else RATES[1:2]:
+            for bulk in (True, False) if name == STRAIN else (True,):
+                for control in (DEPTH, FORCE):
+                    found[name, control, bulk, rate] = _durations(body, control, bulk, rate, 10 if quick else 40)
+    rows = [row for case, reads in found.items() for row in _rows(case, reads)]
+    rows += [row for name, body in bodies.items() for row in _checks(name, body, found)]
+    lines = [
+        (name, control, "all moduli" if bulk else "shear modulus", rate, time, read.mu_error, read.force, read.depth)
+        for (name, control, bulk, rate), reads in found.items()
+        for time, read in reads.items()
+    ]
+    names = "model control relaxing share_per_decade duration_s mu_error force_N depth_mm"
+    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found))
+
+
+def _durations(body: Problem, control: str, bulk: bool, rate: float, steps: int) -> dict[float, Read]:
+    """Presses of all durations, each with the mu that the calibration makes of its strain."""
+    effect = Viscosity(tuple((rate, time) for time in DECADES), bulk)
+    model = effect.apply(replace(body.model, legs=(Leg(DEPTH_MM, steps=steps, duration_s=USUAL),)))
+    relaxing = build(model)
+    force = _force(_pressed(relaxing, MU)) if control == FORCE else None
+
+    def pressed(mu: float, time: float) -> StepResult:
+        leg = Leg(DEPTH_MM, steps=steps, duration_s=time, force_N=force)
+        return _pressed(replace(relaxing, model=replace(model, legs=(leg,))), mu)
+
+    strain = np.array([pressed(mu, USUAL).gauges["g"] for mu in MUS])
+    order = np.argsort(strain)
+    reads = {}
+    for time in DURATIONS:
+        frame = pressed(MU, time)
+        read = float(_extended(frame.gauges["g"], strain[order], np.array(MUS)[order]))
+        reads[time] = Read(read - MU, _force(frame), frame.target.depth_mm)
+    return reads
+
+
+def _extended(value: float, x: Float, y: Float) -> float:
+    """Interpolate, and go on along the last piece outside."""
+    i = int(np.clip(np.searchsorted(x, value), 1, len(x) - 1))
+    return float(y[i - 1] + (y[i] - y[i - 1]) * (value - x[i - 1]) / (x[i] - x[i - 1]))
+
+
+def _pressed(problem: Problem, mu: float) -> StepResult:
+    """Last frame of a press."""
+    *_, last = march(replace(problem, model=replace(problem.model, friction=Coulomb(mu))))
+    if not last.outcome.ok:
+        raise AssertionError(f"mu = {mu:g}: {last.outcome}")
+    return last
+
+
+def _force(frame: StepResult) -> float:
+    """Normal force, N."""
+    return float(frame.state.force[:, 0].sum())
+
+
+def _rows(case: tuple[str, str, bool, float], reads: dict[float, Read]) -> list[Row]:
+    name, control, bulk, rate = case
+    here = f"{control}, {100.0 * rate:g} % per decade of {'all moduli' if bulk else 'the shear modulus'}, {name}"
+    return [
+        said(
+            f"error of mu = .25 read in {time:g} s: {here}", "Sec. IV", 0.1, abs(reads[time].mu_error),
+            "the paper's error", 0.0, "at most",
+        )
+        for time in (DURATIONS[0], 100.0)
+    ]  # fmt: skip
+
+
+def _checks(name: str, body: Problem, found: Found) -> list[Row]:
+    """The force where all moduli relax, from that of an elastic press while contact grows."""
+    steps = 80
+    elastic = np.array([0.0, *(_force(frame) for frame in under(body, MU, steps))])
+    age = 1.0 - (np.arange(steps) + 0.5) / steps  # of the forces of an increment, over the duration
+    rows = []
+    for (own, control, bulk, rate), reads in found.items():
+        if own == name and control == DEPTH and bulk:
+            left = [1.0 - sum(rate * (1.0 - np.exp(-age * time / tau)) for tau in DECADES) for time in DURATIONS]
+            wanted, got = (float(f[-1] / f[0]) for f in (left @ np.diff(elastic), [r.force for r in reads.values()]))
+            rows.append(Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
+                            "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", ))  # fmt: skip
+    return rows
+
+
+def _draw(figure: Any, found: Found) -> None:
+    models = list(dict.fromkeys(key[0] for key in found))
+    figure.set_size_inches(5.2 * len(models) + 4.6, 4.6)
+    panels = figure.subplots(1, len(models) + 1)
+    for axes, model in zip(panels, models, strict=False):
+        for (name, control, bulk, rate), reads in found.items():
+            if name == model:
+                label = f"{control}, {'all moduli' if bulk else 'shear modulus'}" if rate == RATES[1] else None
+                style = "-" if bulk else "--"
+                axes.semilogx(list(reads), [r.mu_error for r in reads.values()], style, marker="o", ms=3, label=label,
+                              color="#2166ac" if control == DEPTH else "#b2182b", lw=0.5 + 12.0 * rate)  # fmt: skip
+        axes.axhspan(-0.1, 0.1, color="#eeeeee", lw=0)
+        axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
+        axes.legend(frameon=False, fontsize=8)
+    for (name, control, bulk, rate), reads in found.items():
+        if name == models[0] and control == DEPTH and bulk:
+            panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
+                                label=f"{100.0 * rate:g} % per decade")  # fmt: skip
+    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s")
+    panels[-1].legend(frameon=False, fontsize=8)
