@@ -2,54 +2,54 @@
 
 Source: Maeno 2004, Sec. II-A: "the value 0.1 was small enough for our model because the change in result was
 sufficiently small even when the increment value was made smaller".  The half cylinder under 1 mm, mu = .25, in 1 to 320
-increments and in automatic ones; each result against the one with 320, and the rate at which the error of the
-dissipation falls (1 or more: friction is taken under the mean normal force of an increment).
+plain increments, as the paper made them; each result against the path from event to event, which finger3d follows and
+which has no increments, and the rate at which the error of the dissipation falls (1 or more: friction is taken under
+the mean normal force of an increment).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
-from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 
-from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
+from ._increments import PlainCoulomb, pressed
+from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains
 from ._rows import Result, Row
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
-COUNTS = (1, 2, 5, 10, 20, 40, 80, 160)
+COUNTS = (1, 2, 5, 10, 20, 40, 80, 160, 320)
+PATH = 0
+"""Stands for the path among numbers of increments."""
 NAMES = ("normal force", "sum of |f_t|", "stick half-width", "dissipation", "largest gamma_xy")
 
 
 def run(quick: bool) -> Result:
     """One condensation for each case."""
-    size, finest = (0.2, 80) if quick else (0.05, 320)
-    counts = [n for n in COUNTS if n < finest]
+    size, most = (0.2, 80) if quick else (0.05, 320)
+    counts = [n for n in COUNTS if n <= most]
     x, gauges = line_r5(count=21)
     found, lines, rows = {}, [], []
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size, gauges)
-        for count in (*counts, finest):
-            frame = under(problem, 0.25, count)[-1]
+        for count in (PATH, *counts):
+            frame = pressed(problem, PlainCoulomb(0.25) if count else Coulomb(0.25), count or 1)[-1]
             profile = Profile.of(problem, frame)
             friction = float(np.abs(profile.q) @ profile.area)
             shear = float(np.abs(strains(frame, len(x))[2]).max())
             found[plane, nu, count] = np.array([profile.force, friction, profile.c, frame.dissipation_mJ, shear])
-            lines.append((plane, nu, count, 1.0 / count, *map(float, found[plane, nu, count])))
-        rows += _statements(plane, nu, found, counts, finest)
-        if not quick or (plane, nu) == CASES[0]:
-            rows += _automatic(f"{plane}, nu = {nu:g}", problem)
+            size_mm = 1.0 / count if count else 0.0
+            lines.append((plane, nu, count, size_mm, *map(float, found[plane, nu, count])))
+        rows += _statements(plane, nu, found, counts)
     names = "plane nu increments increment_mm force_N_per_mm friction_sum_N_per_mm c_mm dissipation_mJ_per_mm gamma_xy"
-    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found, counts, finest))
+    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found, counts))
 
 
-def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: list[int], finest: int) -> list[Row]:
+def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: list[int]) -> list[Row]:
     here = f"{plane}, nu = {nu:g}"
-    off = {n: np.abs(found[plane, nu, n] / found[plane, nu, finest] - 1.0) for n in counts}
+    off = {n: np.abs(found[plane, nu, n] / found[plane, nu, PATH] - 1.0) for n in counts}
     rows = [
         said(
             f".1 mm is small enough for the {NAMES[k]}: change by smaller increments, relative, {here}", "Sec. II-A",
@@ -57,8 +57,8 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
         )
         for k in (0, 1, 3, 4)
     ]  # fmt: skip
-    rate = float(np.log(off[5][3] / off[counts[-1] // 2][3]) / np.log(counts[-1] // 2 / 5))
-    what = f"rate at which the dissipation settles, 5 to {counts[-1] // 2} increments, {here}"
+    rate = float(np.log(off[5][3] / off[counts[-1]][3]) / np.log(counts[-1] / 5))
+    what = f"rate at which the dissipation settles, 5 to {counts[-1]} increments, {here}"
     reason = "about 1; c moves from point to point"
     return [
         *rows,
@@ -66,35 +66,12 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
     ]
 
 
-def _automatic(here: str, problem: Problem) -> list[Row]:
-    """Errors left by automatic increments that met their tolerances, against four times as many."""
-    legs = tuple(replace(leg, steps="auto") for leg in problem.model.legs)
-    frames, chosen = march_automatic(replace(problem, model=replace(problem.model, friction=Coulomb(0.25), legs=legs)))
-    if chosen is None or not chosen.met:
-        return []
-    ends = frames[-1], under(problem, 0.25, 4 * len(frames))[-1]
-    profiles = [Profile.of(problem, end) for end in ends]
-    numbers = {
-        "normal force": ([p.force for p in profiles], TOLERANCE),
-        "sum of |f_t|": ([float(np.abs(p.q) @ p.area) for p in profiles], TOLERANCE),
-    }
-    if chosen.dissipation <= DISSIPATION_TOLERANCE:
-        numbers["dissipation"] = [end.dissipation_mJ for end in ends], DISSIPATION_TOLERANCE
-    return [
-        Row(
-            f"error of the {name} in automatic increments, relative, {here}", "four times as many increments",
-            tolerance, abs(few / many - 1.0), 0.0, "the tolerance they are chosen by", measure="at most",
-        )
-        for name, ((few, many), tolerance) in numbers.items()
-    ]  # fmt: skip
-
-
-def _draw(figure: Any, found: dict[Any, np.ndarray], counts: list[int], finest: int) -> None:
+def _draw(figure: Any, found: dict[Any, np.ndarray], counts: list[int]) -> None:
     figure.set_size_inches(13.0, 4.8)
     panels = figure.subplots(1, 4, sharey=True)
-    figure.suptitle(f"Error against {finest} increments; dotted line: the paper's .1 mm")
+    figure.suptitle("Error of plain increments against the path; dotted line: the paper's .1 mm")
     for axes, (plane, nu) in zip(panels, CASES, strict=True):
-        last = found[plane, nu, finest]
+        last = found[plane, nu, PATH]
         for k, name in enumerate(NAMES):
             error = [100 * abs(found[plane, nu, n][k] / last[k] - 1.0) for n in counts]
             axes.loglog([1.0 / n for n in counts], np.maximum(error, 1e-4), "o-", ms=3, color=f"C{k}", label=name)

@@ -9,8 +9,10 @@ proportion to a/h: the integrals are computed at a/h = 1/100 and 1/200 and extra
 compared at equal a.  Since the solution is self-similar, means over the second half of the increments are used; they
 remove the scatter of a and c by one point.
 
-The values for 1 to 200 increments take friction at the end of each increment, as the integral equations did; so does
-the column of the table.  finger3d itself takes the friction under the mean normal force, which needs no extrapolation.
+The values for 1 to 200 increments are those of plain increments, in which a point that closes slips from where it was
+at their start, and of friction at the end of each increment, as in the integral equations; so is the column of the
+table.  finger3d itself holds a point where it touches and takes the friction under the mean normal force: its c/a and
+its dissipation are those of Spence in few increments, too.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ import numpy as np
 from finger3d.contact.friction import SLIP
 
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+from ._increments import PlainCoulomb
 from ._rows import Result, Row
 
 C_OVER_A = {  # REFERENCES.md, 2.1, fully coupled; (nu, mu)
@@ -38,7 +41,9 @@ STEPPED = "REFERENCES.md, 2.4"
 THREE = "first order in the point spacing, since c lies between two points; 0.6 % or less measured at 40 points to a"
 ONE = "0.14 % or less measured at 40 points to a; coarser meshes must pass too"
 COLUMNS = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a".split()
-COLUMNS += ["reported_D_over_AP2"]
+COLUMNS += ["reported_D_over_AP2", "plain"]
+FEW = 5
+"""Increments that already give Spence's constants."""
 HEIGHTS = (100.0, 200.0)
 STUCK = 1e6
 
@@ -82,7 +87,8 @@ def run(quick: bool) -> Result:
     curves: dict[float, Profile] = {}
     for nu in (0.3,) if quick else (0.3, 0.0):
         at: dict[tuple[float, int, float, int], np.ndarray] = {}
-        c_last = {}
+        plain: dict[tuple[float, int, float, int], np.ndarray] = {}
+        c_last, c_own = dict[Any, float](), dict[Any, float]()
         for height, points in [(HEIGHTS[0], finest), *((HEIGHTS[1], n) for n in meshes)]:
             problem = line(nu, points, loading(1), height)
             if height == HEIGHTS[1] and not quick:
@@ -90,15 +96,21 @@ def run(quick: bool) -> Result:
             for count in counts if points == finest else (most,):
                 profiles = under(problem, 0.25, loading(count, height))
                 at[height, points, 0.25, count] = numbers(profiles, nu)
-                c_last[height, count] = profiles[-1].c / profiles[-1].a
+                c_own[height, count] = profiles[-1].c / profiles[-1].a
+                if points == finest:
+                    stepped = under(problem, PlainCoulomb(0.25), loading(count, height))
+                    plain[height, points, 0.25, count] = numbers(stepped, nu)
+                    c_last[height, count] = stepped[-1].c / stepped[-1].a
             if height == HEIGHTS[1] and points == finest:
                 curves[nu] = profiles[-1]
                 for mu in [m for n, m in C_OVER_A if n == nu and m != 0.25 and not quick]:
                     at[height, points, mu, most] = numbers(under(problem, mu, loading(most, height)), nu)
-        table += [(nu, k[2], k[0], k[1], k[3], *v) for k, v in at.items()]
-        rows += _gates(nu, at, finest, most)
+        for kind, found in enumerate((at, plain)):
+            table += [(nu, k[2], k[0], k[1], k[3], *v, kind) for k, v in found.items()]
+        rows += _gates(nu, at, plain, finest, most)
+        rows += _few_rows(nu, at, c_own, finest, most)
         if nu == 0.3:
-            rows += _step_rows(at, c_last, finest, counts)
+            rows += _step_rows(plain, c_last, finest, counts)
             rows.append(_curve_row(curves[nu]))
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, curves[0.3], columns, finest, most))
@@ -109,7 +121,7 @@ def _extrapolated(at: dict[Any, np.ndarray], finest: int, mu: float, count: int)
     return 2.0 * far - near
 
 
-def _gates(nu: float, at: dict[Any, np.ndarray], finest: int, most: int) -> list[Row]:
+def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], finest: int, most: int) -> list[Row]:
     value = _extrapolated(at, finest, 0.25, most)
     force, outward, lost = INTEGRALS[nu]
     here = f"nu = {nu:g}, mu = .25"
@@ -119,10 +131,11 @@ def _gates(nu: float, at: dict[Any, np.ndarray], finest: int, most: int) -> list
         Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE, lost, value[4], 0.03, THREE),
     ]  # fmt: skip
     if most == 200:  # fewer increments are not yet on the line ~ 1/N
-        in_steps = value[2] + (value[2] - _extrapolated(at, finest, 0.25, 50)[2]) * 50 / (200 - 50)
+        few, many = (_extrapolated(plain, finest, 0.25, n)[2] for n in (50, most))
+        in_steps = many + (many - few) * 50 / (most - 50)
         rows.append(
             Row(
-                f"dissipation by end forces, {here}, extrapolated in 1/N from 50 and 200",
+                f"dissipation by end forces, {here}, plain increments, extrapolated in 1/N from 50 and 200",
                 SPENCE,
                 lost,
                 in_steps,
@@ -155,24 +168,39 @@ def _gates(nu: float, at: dict[Any, np.ndarray], finest: int, most: int) -> list
     return rows
 
 
+def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], finest: int, most: int) -> list[Row]:
+    """Rows of what few increments leave."""
+    here = f"nu = {nu:g}, mu = .25"
+    change = c_own[HEIGHTS[1], FEW] - c_own[HEIGHTS[1], most]
+    what = f"c/a at the end, {here}: change from {FEW} to {most} increments"
+    why = f"half a point spacing, a/{finest}"
+    lost = {n: at[HEIGHTS[1], finest, 0.25, n][4] for n in (FEW, 2 * FEW, most)}
+    rate = float(np.log2((lost[FEW] - lost[most]) / (lost[2 * FEW] - lost[most])))
+    settles = f"rate at which the dissipation settles, {here}, {FEW} to {2 * FEW} increments"
+    return [
+        Row(what, "self-similar, whatever the increments", 0.0, change, 0.5 / finest, why, measure="absolute"),
+        Row(settles, "second order", 2.0, rate, 0.5, "points close one by one", measure="at least"),
+    ]
+
+
 def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int, counts: list[int]) -> list[Row]:
     rows = []
     for count in counts:
         want_c, want_d = STEPS[count]
         got = _extrapolated(at, finest, 0.25, count)[2]
         rows.append(
-            Row(f"dissipation/(A P^2) by end forces, N = {count} increments", STEPPED, want_d, got, 0.03, THREE)
+            Row(f"dissipation/(A P^2) by end forces, N = {count} plain increments", STEPPED, want_d, got, 0.03, THREE)
         )
         rows.append(
             Row(
-                f"c/a, N = {count} increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
+                f"c/a, N = {count} plain increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
                 "one point spacing, since this is no mean over increments", measure="absolute",
             )
         )  # fmt: skip
     errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS[0.3][2] for n in (1, 10)]
     rows.append(
         Row(
-            "rate at which the error of the dissipation by end forces falls with N, 1 to 10", "1/N; REFERENCES.md, 2.4",
+            "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments", "1/N; REFERENCES.md, 2.4",
             1.0,
             float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
         )
@@ -203,7 +231,7 @@ def _draw(figure: Any, profile: Profile, columns: dict[str, list[float]], finest
     left.set(xlabel="x/a", ylabel="outward friction q A R/a", xlim=(0, 1), ylim=(0, None))
     left.legend()
     t = {k: np.array(v) for k, v in columns.items()}
-    tall = t["block_height_mm"] == HEIGHTS[1]
+    tall = (t["block_height_mm"] == HEIGHTS[1]) & (t["plain"] == 0)
     for nu, marker in ((0.3, "o"), (0.0, "s")):
         of = tall & (t["nu"] == nu)
         if of.any():
@@ -222,8 +250,11 @@ def _draw(figure: Any, profile: Profile, columns: dict[str, list[float]], finest
     middle.legend(fontsize=7)
     of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
     for height in HEIGHTS:
-        which = of & (t["block_height_mm"] == height)
-        right.loglog(t["increments"][which], 1e4 * t["D_over_AP2"][which], "o-", label=f"a/h = 1/{height:g}")
+        which = of & (t["block_height_mm"] == height) & (t["plain"] == 1)
+        right.loglog(t["increments"][which], 1e4 * t["D_over_AP2"][which], "o-", label=f"plain, a/h = 1/{height:g}")
+    own = of & tall
+    name = f"finger3d, a/h = 1/{HEIGHTS[1]:g}"
+    right.loglog(t["increments"][own], 1e4 * t["reported_D_over_AP2"][own], "s-", label=name)
     right.loglog(list(STEPS), [1e4 * d for _, d in STEPS.values()], "k+", ms=10, label="integral equations")
     right.axhline(1e4 * INTEGRALS[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
     right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="dissipation, nu = .3, mu = .25")

@@ -1,0 +1,45 @@
+"""Plain increments, in which a point that closes is held where it was at their start: what they leave is first order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.results.history import StepResult
+
+
+class PlainCoulomb(Coulomb):
+    """Coulomb's law in plain increments, as the integral equations, Maeno 2004 and most codes solve it.
+
+    Every press by it goes on in increments, and a point that closes in one slips from the place it had at its start.
+    """
+
+    @property
+    def is_defined_by_increments(self) -> bool:
+        """True: neither the exact path nor the place where a point touches is used."""
+        return True
+
+
+def pressed(problem: Problem, law: FrictionLaw, steps: int | None = None) -> list[StepResult]:
+    """Press under a friction law, in that many increments a leg; every increment converges."""
+    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
+    found = list(march(replace(problem, model=replace(problem.model, friction=law, legs=legs))))
+    if not found[-1].outcome.ok:
+        raise AssertionError(f"mu = {law.mu:g}, {steps} increments, {found[-1].target}: {found[-1].outcome}")
+    return found
+
+
+def stored_mJ(problem: Problem, step: StepResult) -> float:
+    """Elastic energy in small strain, from contact forces and displacements at the end of an increment."""
+    state = step.meshed_state
+    world = np.einsum("ca,cak->ck", state.contact.force, state.contact.own_bases)
+    return 0.5 * problem.symmetry.total(np.einsum("ck,ck->c", world, state.body))
+
+
+def imbalance(problem: Problem, step: StepResult) -> float:
+    """Work less stored energy less dissipation, over the work."""
+    return (step.external_work_mJ - stored_mJ(problem, step) - step.dissipation_mJ) / step.external_work_mJ
