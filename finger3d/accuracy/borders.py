@@ -22,6 +22,9 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.progress import QUIET, Progress
 
+MOST_STICK_REFINEMENT = 16.0
+"""Largest `mesh.stick_refinement`."""
+
 _REACH = 0.6
 """Distance from the border up to which edges are shortest, over the length of the edges that it crosses."""
 

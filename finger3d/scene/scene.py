@@ -25,7 +25,7 @@ from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.derived import legs_of, parts_of
-from finger3d.scene.mesh_sizes import mesh_options, refinements
+from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.tables import (
     LegsTable,
@@ -209,8 +209,7 @@ class _Parts:
         box, linear = initial_contact(way).contact_box, not set(self.settings) - {"kinetic_friction"}
         # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
         quick = linear and self.tables.friction.mu > 0.0 and all(leg.force_N is None for leg in self.legs)
-        finer = refinements(len(self.tables.gauge)) if quick else (1.0, 1.0)
-        return mesh_options(self.tables.mesh, self.design, domain, self.object, box, finer)
+        return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
         """Return the tables with every default."""
