@@ -94,7 +94,7 @@ def test_an_area_is_uncertain_by_a_share_of_a_spacing_all_round() -> None:
     assert 0.25 * around <= with_edges["contact_area_mm2"] <= 1.4 * 0.25 * around
     # both ends lie one spacing before the next point of the line
     # of the circle, the last points are alone
-    assert bars["stick_half_length_mm"] == pytest.approx(0.35, rel=1e-12)
+    assert bars["stick_half_length_mm"] == pytest.approx(0.35, rel=1e-12)  # the last points are alone
     assert with_edges["contact_half_length_mm"] == pytest.approx(0.25, rel=1e-12)
 
 

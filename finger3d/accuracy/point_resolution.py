@@ -23,12 +23,16 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
 lie within twice the bar, and 89 % with a factor of 0.1."""
 
-_CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.02}, 0.2, 0.25
+_CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.022}, 0.12, 0.25
 """Error of the place of the edge of contact over the distance of the points: the first, and the second times the square
 of that distance over the half-width of contact; the third at most, and under an object with edges."""
 
 _STICK_BORDER = {2: (0.2, 0.3), 3: (0.15, 0.35)}
 """The same at the border of stick, in sections and solids: where the zone is three points wide, and elsewhere."""
+
+_STICK_ENDS, _THIN = {2: 0.27, 3: 0.2}, 0.35
+"""Error of an end of stick on a line over the distance to the next point, and over the length before the end in which
+the zone is not three points wide."""
 
 _AT_ENDS = {2: 1.0, 3: 5.0}
 """Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others."""
@@ -125,7 +129,7 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_e
     reach = measure(points, step)["contact_half_length_mm"]
     one = _ONE_POINT * float(np.median(points.area[touching])) if touching.any() else 0.0
     edge = _edge_error(points, zones["contact"], has_edges)
-    at_ends = {"contact": (min(_AT_ENDS[points.dim] * edge, _CORNER), 0.0), "stick": _STICK_BORDER[points.dim]}
+    at_ends = {"contact": (min(_AT_ENDS[points.dim] * edge, _CORNER), 0.0), "stick": (_STICK_ENDS[points.dim], _THIN)}
     found: dict[str, float] = {}
     for name, zone in zones.items():
         cut, thin = _cut_areas(points, zone.inside)
