@@ -28,7 +28,8 @@ _CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.022}, 0.12, 0.25
 of that distance over the half-width of contact; the third at most, and under an object with edges."""
 
 _STICK_BORDER = {2: (0.2, 0.3), 3: (0.15, 0.35)}
-"""The same at the border of stick, in sections and solids: where the zone is three points wide, and elsewhere."""
+"""The same at the border of stick, in sections and solids: where the zone is three points wide and points slip beyond it, and
+elsewhere."""
 
 _STICK_ENDS, _THIN = {2: 0.27, 3: 0.2}, 0.35
 """Error of an end of stick on a line over the distance to the next point, and over the length before the end in which
@@ -132,7 +133,7 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_e
     at_ends = {"contact": (min(_AT_ENDS[points.dim] * edge, _CORNER), 0.0), "stick": (_STICK_ENDS[points.dim], _THIN)}
     found: dict[str, float] = {}
     for name, zone in zones.items():
-        cut, thin = _cut_areas(points, zone.inside)
+        cut, thin = _cut_areas(points, zone.inside, ~touching)
         if name == "contact":
             area = edge * cut
         else:
@@ -156,11 +157,14 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_e
     return found
 
 
-def _cut_areas(points: ContactPoints, inside: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the area (mm2) of the facets that the border of a zone cuts, and of those where the zone is thin."""
+def _cut_areas(points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the area (mm2) of the facets that the border of a zone cuts, and of those where it is not resolved.
+
+    There the zone is thin, or reaches open points, so that a strip of slip may hide between the points.
+    """
     among = inside[points.facets]
     cut = among.any(axis=1) & ~among.all(axis=1)
-    wide = (points.resolved(inside)[points.facets] & among).any(axis=1)
+    wide = (points.resolved(inside)[points.facets] & among).any(axis=1) & ~is_open[points.facets].any(axis=1)
     return float(points.facet_area[cut].sum()), float(points.facet_area[cut & ~wide].sum())
 
 
@@ -168,7 +172,10 @@ def _edge_error(points: ContactPoints, contact: Zone, has_edges: bool) -> float:
     """Return the error of the place of the edge of contact over the distance of the points."""
     if has_edges:
         return _CORNER
-    area, cut = zone_area(points.facets, points.facet_area, contact), _cut_areas(points, contact.inside)[0]
+    area, cut = (
+        zone_area(points.facets, points.facet_area, contact),
+        _cut_areas(points, contact.inside, ~contact.inside)[0],
+    )
     return min(_CONTACT_EDGE[points.dim] + _CURVED_EDGE * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
 
 
