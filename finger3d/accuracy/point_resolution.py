@@ -28,8 +28,8 @@ _CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.022}, 0.12, 0.25
 of that distance over the half-width of contact; the third at most, and under an object with edges."""
 
 _STICK_BORDER = {2: (0.2, 0.3), 3: (0.15, 0.35)}
-"""The same at the border of stick, in sections and solids: where the zone is three points wide and points slip beyond it, and
-elsewhere."""
+"""The same at the border of stick, in sections and solids: where the zone is three points wide and points slip beyond
+it, and elsewhere."""
 
 _STICK_ENDS, _THIN = {2: 0.27, 3: 0.2}, 0.35
 """Error of an end of stick on a line over the distance to the next point, and over the length before the end in which
