@@ -89,8 +89,8 @@ def test_an_area_is_uncertain_by_a_share_of_a_spacing_all_round() -> None:
     )
     bars, with_edges = least_bars(points, frame, 1.0), least_bars(points, frame, 1.0, has_edges=True)
     around = 2.0 * np.pi * 8.0
-    assert 0.15 * around <= bars["stick_area_mm2"] <= 1.4 * 0.15 * around
-    assert 0.03 * around <= bars["contact_area_mm2"] <= 0.06 * around
+    assert 0.35 * around <= bars["stick_area_mm2"] <= 1.4 * 0.35 * around  # no point slips around it
+    assert 0.02 * around <= bars["contact_area_mm2"] <= 0.06 * around
     assert 0.25 * around <= with_edges["contact_area_mm2"] <= 1.4 * 0.25 * around
     # both ends lie one spacing before the next point of the line
     # of the circle, the last points are alone
