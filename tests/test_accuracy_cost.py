@@ -114,7 +114,7 @@ def test_presses_took_what_is_foretold(root: Path, monkeypatch: pytest.MonkeyPat
         measured = list(csv.DictReader(file))
     assert {row["series"] for row in measured} == {"unknowns", "contact rows"}
     for row in measured:
-        sizes = [f"mesh.{key}={row[key]}" for key in ("size_mm", "base_size_mm")]
+        sizes = ["mesh.gauge_refinement=1", *(f"mesh.{key}={row[key]}" for key in ("size_mm", "base_size_mm"))]
         told = forecast(
             load(root / "geometries" / "fig9.toml", [*sizes, "mesh.mesher=swept", "press.steps=10"]).model()
         )

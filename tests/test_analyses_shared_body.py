@@ -100,7 +100,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) ->
     model = scene("friction.mu=0.0").model()
     wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
     said = Log()
-    first = [lambda m, report, margin=-0.8: build(m, report, margin)]
+    first = [lambda m, report, margin=-0.98: build(m, report, margin)]
     monkeypatch.setattr("finger3d.analyses.pressed_body.build", lambda m, report, *margin: first[0](m, report, *margin))
     narrow = SharedBody(model, [Variant.of(model)], said)
     again = narrow.press(Variant.of(model))
@@ -226,7 +226,7 @@ def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
     assert 0 in beyond_candidates(part).face
 
 
-NARROW = -0.8
+NARROW = -0.98
 """Margin of a body at first: its candidates reach to a fifth of the depth, where a shallow press ends."""
 
 
@@ -254,7 +254,12 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     together = list(body.presses(variants))
     assert sum("beyond" in text for text in said.lines) == 1
     for one, other in zip(alone, together, strict=True):
-        assert other.numbers == pytest.approx(one.numbers, rel=1e-9)
+        # the gap of the outermost candidate depends on neighbours that a narrow body lacks, and with it where contact
+        # ends between two points
+        zones = {name for name in one.numbers if "area" in name or "length" in name}
+        forces = {name: value for name, value in one.numbers.items() if name not in zones}
+        assert {name: other.numbers[name] for name in forces} == pytest.approx(forces, rel=1e-9)
+        assert other.numbers == pytest.approx(one.numbers, rel=1e-3)
         assert strains(other) == pytest.approx(strains(one), rel=1e-9)
     assert together[1].readings != together[3].readings
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]

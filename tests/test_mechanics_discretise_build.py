@@ -27,7 +27,8 @@ def test_quarter_and_whole_model_agree_on_a_mirrored_mesh(nu: float) -> None:
     a, b = measure(p.points, f[-1]), measure(q.points, g[-1])
     assert (p.axes, q.axes) == (("x", "z"), ())
     for key in ("normal_force_N", "friction_sum_N", "contact_area_mm2", "dissipation_mJ", "external_work_mJ"):
-        assert a[key] == pytest.approx(b[key], rel=1e-8)
+        # the dissipation of few points that slip is known as well as the work, of which it is a small share
+        assert a[key] == pytest.approx(b[key], rel=1e-8, abs=1e-9 * b["external_work_mJ"])
     assert abs(b["tangential_force_x_N"]) < 1e-10 * b["normal_force_N"]
     order_a, order_b = (np.lexsort(np.round(r.points.points, 9).T) for r in (p, q))
     assert np.abs(f[-1].state.force[order_a] - g[-1].state.force[order_b]).max() < 1e-9

@@ -52,3 +52,26 @@ def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> No
     tables["finger"]["width_mm"] = 20.0 if wide else 4.0
     # the overlap is found on a grid of a hundredth of the finger
     assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("height", "radius", "size", "base"),
+    [
+        # a ball of 6 mm that is 1.6 mm deep overlaps 8.16 mm of the pad, at 1.925 mm 8.8 mm
+        (4.0, 6.0, 8.16 / 600**0.5, 1.25 * 8.16 / 6.25),
+        (1.5, 6.0, 0.15, 0.6),  # a tenth and 0.4 of the height at most
+        (40.0, 6.0, 8.8 / 600**0.5, 6.4),  # no layer
+    ],
+)
+def test_edges_in_a_layer_follow_the_contact_and_the_thickness(height, radius, size, base) -> None:
+    mesh = parse(
+        {
+            "finger": {"geometry": "block", "half_length_mm": 8.0, "height_mm": height, "width_mm": 16.0},
+            "material": {"E_MPa": 0.1, "nu": 0.49},
+            "object": {"shape": "sphere", "radius_mm": radius},
+            "press": {"depth_mm": min(1.925, 0.4 * height)},
+        }
+    ).mesh
+    # the overlap is found on a grid that is a twentieth of its width
+    assert mesh.size_mm == pytest.approx(size, rel=0.09)
+    assert mesh.base_size_mm == pytest.approx(base, rel=0.09)

@@ -152,7 +152,7 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
     """The problem, as `build` makes it."""
     small = condense(parts.stiffness, parts.fixed_dofs, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
     delassus, reading_rows = contact_rows(small.compliance, parts.active_dofs, parts.surface, len(parts.model.gauges))
-    mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
+    mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes, parts.elastic)
     return Problem(
         model=parts.model,
         condensed_body=CondensedBody(

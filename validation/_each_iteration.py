@@ -56,7 +56,7 @@ class EachIteration:
         parts = self.parts
         c, d = parts.surface.points.shape
         legs = tuple(replace(leg, steps=count) for leg in parts.model.legs)
-        symmetry, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes)
+        symmetry, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes, parts.elastic)
         system = ContactSystem(  # for the gaps; nothing is condensed
             surface=parts.surface,
             points=points,

@@ -72,7 +72,8 @@ def _coarsened(problem: Problem, steps: Sequence[StepResult], first: int) -> Pro
         face=system.points.face[images],
         points=system.points.points[images],
         area=coarse_area[symmetric.image_of] * symmetric.multiplicity,
-        edges=np.zeros((0, 2), dtype=np.int64),
+        facets=np.zeros((0, problem.dim), dtype=np.int64),
+        compliance=system.points.compliance[images],
     )
     active = np.isin(np.arange(c * d), system.active_dofs).reshape(c, d)[kept]
     coarse = replace(

@@ -21,6 +21,7 @@ from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.meshing.structured.swept import mesh_section
 from finger3d.progress import QUIET, Progress
 
@@ -64,7 +65,14 @@ def coarser(model: Model, factor: float = FACTOR) -> Model:
     base = min(factor * options.base_size_mm, section)
     size = min(factor * options.size_mm, base, design.width_mm if model.domain == "solid" else math.inf)
     mesher = "swept" if design.section() is not None else options.mesher
-    return replace(model, mesh=replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1))
+    borders = _scaled(options, factor)
+    longer = replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1, borders=borders)
+    return replace(model, mesh=longer)
+
+
+def _scaled(options: MeshOptions, factor: float) -> SizedPlaces | None:
+    """Return the edge lengths at the border of stick times a factor, so that a companion differs there, too."""
+    return options.borders and replace(options.borders, size=factor * options.borders.size)
 
 
 def companion(problem: Problem, report: Progress = QUIET) -> Problem:
@@ -96,10 +104,7 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
     if model.domain == "solid" and own.mesher != longer.mesher:
         chosen.append(coarser(model, _GRADED_FACTOR).mesh)
         chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    finer = [
-        replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, layers=round(own.layers / f))
-        for f in (_FINER_FACTOR, _FINER_FACTOR**2)
-    ]
+    finer = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (_FINER_FACTOR, _FINER_FACTOR**2)]
     return chosen, finer
 
 
@@ -116,7 +121,11 @@ def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
         raise Finger3dError(
             "the mesh was given, and is too large to be halved everywhere; press a coarser mesh of the body to compare"
         )
-    return replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm)
+    return _bisected_by(own, factor)
+
+
+def _bisected_by(own: MeshOptions, f: float) -> MeshOptions:
+    return replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, borders=_scaled(own, f))
 
 
 def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], report: Progress) -> Problem | None:
@@ -149,7 +158,7 @@ def edge_ratio(problem: Problem, beside: Problem) -> float:
     Between swept meshes the ratio follows from the numbers of unknowns, since edges at the base are bounded by the
     finger; between unstructured meshes from the distance of contact points, since both grow alike away from the
     contact; between an unstructured and a swept mesh it is the geometric mean of the two.  Cells added
-    around gauges do not count: their number is nearly the same at all edge lengths.
+    around gauges and at the border of stick do not count: their number is nearly the same at all edge lengths.
     """
     by_unknowns = float((_unknowns(problem) / _unknowns(beside)) ** (1.0 / problem.dim))
     wild = sum(p.dim == 3 and p.model.mesh.mesher != "swept" for p in (problem, beside))
@@ -160,9 +169,9 @@ def edge_ratio(problem: Problem, beside: Problem) -> float:
 
 
 def _unknowns(problem: Problem) -> int:
-    """Return the number of unknowns of a mesh, of the displacements only if it was refined around gauges since."""
+    """Return the number of unknowns of a mesh, of the displacements only if cells were bisected since."""
     model = problem.model
-    if model.mesh.gauge_refinement == 1.0 or not model.gauges:
+    if (model.mesh.gauge_refinement == 1.0 or not model.gauges) and not model.mesh.borders:
         return int(problem.body.stiffness.upper.shape[0])
     made = mesh_solid if model.domain == "solid" else mesh_section
     return int(made(model.design, model.mesh, model.first_contact.contact_box, symmetry(model))[0].points.size)

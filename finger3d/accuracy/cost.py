@@ -26,7 +26,7 @@ from finger3d._cost import (
 )
 from finger3d._types import Tree
 from finger3d.mechanics.discretise.build import MARGIN, WHOLE_FACE, candidate_points, poses
-from finger3d.mechanics.discretise.gauge_refinement import refined_at_gauges
+from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.path import AUTO_START
@@ -144,7 +144,7 @@ def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
     zone = model.first_contact.contact_box
     if model.domain != "solid" or model.mesh.mesher == "swept" or isinstance(model.design, GivenMesh):
         make = mesh_solid if model.domain == "solid" else mesh_section
-        mesh, report = refined_at_gauges(model, *make(model.design, model.mesh, zone, axes), axes)
+        mesh, report = locally_refined(model, *make(model.design, model.mesh, zone, axes), axes)
         first = model.first_contact.first_contact_mm
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
         dofs = mesh.dim * report.points + (len(mesh.part_corners[0]) if model.mixed else 0)

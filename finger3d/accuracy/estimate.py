@@ -35,7 +35,7 @@ from finger3d.mechanics.march.step_halving import (
     step_error,
     with_increments_of,
 )
-from finger3d.mechanics.readings.columns import AREAS, MAIN, RESULTANTS, Column, by_key, in_space
+from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, Column, by_key, in_space
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.meshing.given.given import GivenMesh
@@ -152,10 +152,9 @@ def estimate(
     except _FAILURES as error:
         increment_errors, by = {}, f"no estimate: {_reason(error)}"
     if own.model.ends_at_force:  # the normal force is given
-        given = ("normal_force_N", "force_y_N")
-        mesh = {name: error for name, error in found.discretisation.items() if name not in given}
+        mesh = {name: error for name, error in found.discretisation.items() if name not in GIVEN_BY_FORCE}
         found = replace(found, discretisation=mesh)
-        increment_errors = {name: error for name, error in increment_errors.items() if name not in given}
+        increment_errors = {name: error for name, error in increment_errors.items() if name not in GIVEN_BY_FORCE}
     method, seconds = f"{found.method}; steps: {by}", time.perf_counter() - start
     return replace(found, steps=increment_errors, method=method, seconds=seconds)
 

@@ -12,6 +12,7 @@ Both call for short edges around the gauge only, hence for `mesh.gauge_refinemen
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,30 @@ def graded_sizes(problem: Problem, bars: AdjointBars, goal: str, allowed: float)
     grading = _grading(problem, np.abs(bars.body.shares[goal]), wanted)
     factor = _contact_factor(bars, goal, math.sqrt(1.0 - _BODY_SHARE**2) * allowed, contact)
     return _options(problem, bars, grading, factor)
+
+
+def finest(options: Sequence[MeshOptions]) -> MeshOptions:
+    """Return the options of a mesh that is everywhere as fine as the finest of several."""
+    if len(options) == 1:
+        return replace(options[0], borders=None)
+    gradings = [one.grading for one in options if one.grading]
+    points, sizes = ([getattr(grading, name) for grading in gradings] for name in ("points", "sizes"))
+    gauges = [one for one in options if one.gauge_refinement > 1.0]
+    size = min(one.size_mm for one in options)
+    return replace(
+        options[0],
+        size_mm=size,
+        base_size_mm=max(size, min(one.base_size_mm for one in options)),
+        grading=Grading(np.vstack(points), np.concatenate(sizes)) if gradings else None,
+        gauge_refinement=max(one.gauge_refinement * size / one.size_mm for one in options) if gauges else 1.0,
+        refined_gauges=() if any(not one.refined_gauges for one in gauges) else _union(gauges),
+        stick_refinement=max(1.0, *(one.stick_refinement * size / one.size_mm for one in options)),
+        borders=None,
+    )
+
+
+def _union(options: Sequence[MeshOptions]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for one in options for name in one.refined_gauges))
 
 
 def _for_gauge(problem: Problem, bars: AdjointBars, goal: str, allowed: float) -> MeshOptions:

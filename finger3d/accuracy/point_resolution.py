@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.friction import OPEN, STICK
+from finger3d.contact.friction import OPEN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.readings.columns import AREAS, MAIN
 from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
-from finger3d.mechanics.results.zones import ERROR_AT_ENDS
+from finger3d.mechanics.results.zones import Zone, zone_area
 
 _ALONG_Z = 0.5
 """Friction along z has a relative error of about this times (h/b)^2, h the spacing of points along z, b the half extent
@@ -23,8 +23,23 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
 lie within twice the bar, and 89 % with a factor of 0.1."""
 
-_AREA_SHARE = 0.375
-"""Error of an area over that of the points along its border; twice it suffices in 98 % of validation/error_bars.py."""
+_CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.022}, 0.12, 0.25
+"""Error of the place of the edge of contact over the distance of the points: the first, and the second times the square
+of that distance over the half-width of contact; the third at most, and under an object with edges."""
+
+_STICK_BORDER = {2: (0.2, 0.3), 3: (0.15, 0.35)}
+"""The same at the border of stick, in sections and solids: where the zone is three points wide and points slip beyond
+it, and elsewhere."""
+
+_STICK_ENDS, _THIN = {2: 0.27, 3: 0.2}, 0.35
+"""Error of an end of stick on a line over the distance to the next point, and over the length before the end in which
+the zone is not three points wide."""
+
+_AT_ENDS = {2: 1.0, 3: 5.0}
+"""Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others."""
+
+_ONE_POINT = 0.375
+"""Error of the area of a zone of one point, or of none that may hide between the points, over that of a point."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +76,7 @@ class PointResolution:
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             spacing = float(np.sqrt(np.median(points.area)))
             along_z = _edge_length(points, step.state.status != OPEN)
-            least = least_bars(points, step, along_z)
+            least = least_bars(points, step, along_z, problem.model.object.has_edges)
             share = _share(spacing, reach, spacing, half_width)
             return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
         at = np.round(points.points, 9)
@@ -72,7 +87,7 @@ class PointResolution:
         rows = np.diff(np.unique(at[:, 2]))
         along_z = float(np.median(rows)) if len(rows) else 0.0
         share = _share(spacing, reach, along_z, half_width)
-        least = least_bars(points, step, along_z)
+        least = least_bars(points, step, along_z, problem.model.object.has_edges)
         if points.dim == 2:
             friction = float(np.linalg.norm(points.with_basis_of(step.state).friction(step.state.force), axis=1).sum())
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
@@ -96,32 +111,41 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
     return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
 
 
-def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float) -> dict[str, float]:
+def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_edges: bool = False) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
-    An area is uncertain by a share of the area of the points along the border of its zone, the mean of those on either
-    side of it and of one point at least.  A half-length is uncertain by a share of the mean distance from its ends to
-    the next points of the line z = 0; in a solid by half of itself where the zone is nowhere three points wide, since a
-    zone that thin may be absent or longer.  Friction along z is uncertain by the spacing of the points along z.
+    An area is uncertain by a share of the area of the facets that the border of its zone cuts: the length of the border
+    times the error of its place.  A half-length is uncertain by a share of the mean distance from its ends to the next
+    points of the line z = 0.  In a solid a zone that is nowhere three points wide may be absent or longer, and its
+    half-length is uncertain by half of itself; that of stick by a share of what is that thin at its ends.  Friction
+    along z is uncertain by the spacing of the points along z.
 
     Parameters
     ----------
     along_z_mm : spacing of the points along z
+    has_edges : whether the object has edges, at which the pressure does not fall to zero
     """
-    touching = step.state.status != OPEN
-    line, nearest = points.middle_line()
+    zones = dict(zip(("contact", "stick"), points.zones(step.state), strict=True))
+    touching, line = step.state.status != OPEN, points.middle_line()
     reach = measure(points, step)["contact_half_length_mm"]
-    one = float(np.median(points.area[touching])) if touching.any() else 0.0
+    one = _ONE_POINT * float(np.median(points.area[touching])) if touching.any() else 0.0
+    edge = _edge_error(points, zones["contact"], has_edges)
+    at_ends = {"contact": (min(_AT_ENDS[points.dim] * edge, _CORNER), 0.0), "stick": (_STICK_ENDS[points.dim], _THIN)}
     found: dict[str, float] = {}
-    for name, zone in (("contact", touching), ("stick", step.state.status == STICK)):
-        border = [float(points.area[points.rim(side)].sum()) for side in (zone, ~zone)]
-        found[f"{name}_area_mm2"] = _AREA_SHARE * max(0.5 * sum(border), one)
-        found[f"{name}_half_length_mm"] = _half_length_bar(points, name, zone, (line, nearest), reach)
+    for name, zone in zones.items():
+        cut, thin = _cut_areas(points, zone.inside, ~touching)
+        if name == "contact":
+            area = edge * cut
+        else:
+            wide, narrow = _STICK_BORDER[points.dim]
+            area = wide * (cut - thin) + narrow * thin
+        found[f"{name}_area_mm2"] = area if np.count_nonzero(zone.inside) > 1 else max(area, one)
+        found[f"{name}_half_length_mm"] = _half_length_bar(points, at_ends[name], zone.inside, line, reach)
         found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
     if points.dim == 3:
         end = points.end_line()
         reach = 0.5 * float(np.ptp(end[0][touching[end[1]]])) if touching[end[1]].any() else 0.0
-        found["contact_half_length_end_mm"] = _half_length_bar(points, "contact", touching, end, reach)
+        found["contact_half_length_end_mm"] = _half_length_bar(points, at_ends["contact"], touching, end, reach)
     found["contact_length_end_mm"] = 2.0 * found.get("contact_half_length_end_mm", found["contact_half_length_mm"])
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
@@ -133,22 +157,51 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float) -> di
     return found
 
 
+def _cut_areas(points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the area (mm2) of the facets that the border of a zone cuts, and of those where it is not resolved.
+
+    There the zone is thin, or reaches open points, so that a strip of slip may hide between the points.
+    """
+    among = inside[points.facets]
+    cut = among.any(axis=1) & ~among.all(axis=1)
+    wide = (points.resolved(inside)[points.facets] & among).any(axis=1) & ~is_open[points.facets].any(axis=1)
+    return float(points.facet_area[cut].sum()), float(points.facet_area[cut & ~wide].sum())
+
+
+def _edge_error(points: ContactPoints, contact: Zone, has_edges: bool) -> float:
+    """Return the error of the place of the edge of contact over the distance of the points."""
+    if has_edges:
+        return _CORNER
+    area, cut = (
+        zone_area(points.facets, points.facet_area, contact),
+        _cut_areas(points, contact.inside, ~contact.inside)[0],
+    )
+    return min(_CONTACT_EDGE[points.dim] + _CURVED_EDGE * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
+
+
 def _half_length_bar(
     points: ContactPoints,
-    name: str,
+    errors: tuple[float, float],
     zone: NDArray[np.bool_],
     line: tuple[NDArray[np.float64], NDArray[np.int64]],
     reach: float,
 ) -> float:
-    """Return the error bar (mm) of the half-length of a zone on a line: x, and the number of the nearest point."""
+    """Return the error bar (mm) of the half-length of a zone on a line: x, and the number of the nearest point.
+
+    Parameters
+    ----------
+    errors : of an end over the distance to the next point, and over the length of what is thin before it
+    """
     at, nearest = line
     on = zone[nearest]
-    ends = ERROR_AT_ENDS[name] * _to_next_points(at, on)
+    ends = errors[0] * _to_next_points(at, on)
     if ends == 0.0 and np.count_nonzero(on) == 1:  # a single point, and no other on the line: what it stands for
         return 0.5 * float(points.area[nearest[on]].sum()) / (2.0 * points.half_width_mm)
-    if points.dim == 2 or not on.any() or points.resolved(zone)[nearest[on]].any():
+    if points.dim == 2 or not on.any():
         return ends
-    half = 0.5 * float(np.ptp(at[on]))
+    wide, half = on & points.resolved(zone)[nearest], 0.5 * float(np.ptp(at[on]))
+    if wide.any():
+        return max(errors[1] * (half - 0.5 * float(np.ptp(at[wide]))), ends)
     return max(0.5 * max(half, reach - half), ends)
 
 

@@ -17,9 +17,10 @@ from finger3d._cost import GROWTH, PRESS_TO_ROUND
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
+from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_borders
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
-from finger3d.accuracy.graded import cell_growth, graded_sizes
+from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
 from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, largest_readings
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
@@ -29,8 +30,8 @@ from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.progress import QUIET, Progress
 
 MAX_ROUNDS = 8
-GOAL = "normal_force_N"
-"""Number that a mesh is refined for unless a scene names another."""
+GOAL, ALL = "normal_force_N", "all"
+"""Number that a mesh is refined for unless a scene names another, and the name of all numbers together."""
 
 _MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
@@ -43,6 +44,15 @@ _WORTHWHILE = 0.7
 _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
+_AT_STICK = (1.5, 4.0)  # a round makes edges at the border of stick at least and at most so much shorter, by halving
+
+_IF_ZERO = {
+    Kind.AREA: "contact_area_mm2",
+    Kind.FRICTION_SUM: "normal_force_N",
+    Kind.DISSIPATION: "external_work_mJ",
+}
+_ROUND_OFF = 1e-9  # of the number in its place, below which a number is zero
+
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
 
 
@@ -52,7 +62,7 @@ class Round:
 
     Attributes
     ----------
-    gauge_refinement : edge length at the contact over that around gauges
+    gauge_refinement, stick_refinement : edge length at the contact over that around gauges and at the border of stick
     error, number : estimated error of the goal, relative (see `relative_error`), and its name
     seconds : of this round, estimate included
     """
@@ -64,10 +74,12 @@ class Round:
     number: str
     seconds: float
     gauge_refinement: float = 1.0
+    stick_refinement: float = 1.0
 
     def line(self, count: int) -> str:
         """Return the round as one line of text."""
-        finer = "" if self.gauge_refinement == 1.0 else f"{self.size_mm / self.gauge_refinement:.4g} mm at the gauge, "
+        places = (self.gauge_refinement, "the gauge"), (self.stick_refinement, "the border of stick")
+        finer = "".join(f"{self.size_mm / factor:.4g} mm at {where}, " for factor, where in places if factor > 1.0)
         return (
             f"round {count}: size {self.size_mm:.4g} mm, {finer}base {self.base_size_mm:.4g} mm, {self.dofs} dofs, "
             f"error {100 * self.error:.2g} % ({self.number}), {self.seconds:.1f} s"
@@ -142,8 +154,8 @@ def refine_mesh(
     tolerance : relative, see `relative_error`
     max_seconds : no round is begun that is forecast to end later, output included
     report : receives the messages
-    goal : name of a number of the press, as in `finger3d.accuracy.estimate.press_numbers`; for the normal force under
-        a prescribed one, the depth takes its place
+    goal : name of a number of the press, as in `finger3d.accuracy.estimate.press_numbers`, or "all": in every round
+        that with the largest relative error; for the normal force under a prescribed one, the depth takes its place
 
     Raises
     ------
@@ -199,19 +211,39 @@ def refine_mesh(
 
 
 def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
-    """Return the relative error; of a length relative to that of contact, of a reading to the largest of its kind."""
-    kind = kinds[name]
+    """Return the relative error of a number.
+
+    That of a reading is relative to the largest of its kind, of a length to that of contact, of a component of the
+    force to the normal force, and of a moment to the normal force at the end of contact at least, since those vanish in
+    symmetric presses.  Where nothing sticks or slips, areas, friction and dissipation are relative to the area of
+    contact, the normal force and the work.
+    """
+    kind, force = kinds[name], abs(numbers["normal_force_N"])
+    scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
     if kind.is_length:
         scale = numbers["contact_half_length_mm"]
-    else:
-        scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
+    elif kind is Kind.FORCE:
+        scale = force
+    elif kind is Kind.MOMENT:
+        scale = max(scale, force * numbers["contact_half_length_mm"])
+    elif kind in _IF_ZERO and scale <= _ROUND_OFF * abs(numbers[_IF_ZERO[kind]]):
+        scale = abs(numbers[_IF_ZERO[kind]])
     return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
+
+
+def _relative_errors(
+    numbers: Mapping[str, float], kinds: Mapping[str, Kind], errors: Mapping[str, float], goal: str
+) -> dict[str, float]:
+    """Return the relative errors of the goal, or of all numbers, the largest first."""
+    names = [name for name in errors if name in numbers] if goal == ALL else [goal]
+    found = {name: relative_error(numbers, kinds, name, errors[name]) for name in names}
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; return its problem, its round, and the mesh graded towards the goal to try next."""
     start = time.perf_counter()
-    problem = build(model)
+    problem = with_refined_borders(build(model))
     short, steps = short_press(problem)
     if not steps[-1].outcome.ok:
         raise Finger3dError(f"the press did not converge on this mesh: {steps[-1].outcome}")
@@ -220,12 +252,18 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     except NoAdjointBarsError:
         return _run_round(model, tolerance, goal)
     numbers = press_numbers(short, steps[-1])
-    error = relative_error(numbers, bars.kinds, goal, bars.bars[goal])
-    scale = bars.bars[goal] / error if error > 0.0 else 0.0
-    sizes = graded_sizes(short, bars, goal, _SAFETY * tolerance * scale) if scale > 0.0 else model.mesh
+    errors = _relative_errors(numbers, bars.kinds, bars.bars, goal)
+    worst, error = next(iter(errors.items()))
+    wanted = []
+    for name, its_error in errors.items():
+        if name not in bars.parts:  # of a zone, whose border alone counts
+            wanted.append(_at_borders(problem, name, bars.kinds[name], its_error, tolerance, numbers))
+        elif name == worst or its_error > _COARSEN * tolerance:
+            allowed = _SAFETY * tolerance * bars.bars[name] / its_error if its_error > 0.0 else 0.0
+            wanted.append(graded_sizes(short, bars, name, allowed) if allowed > 0.0 else model.mesh)
     dofs = int(problem.body.stiffness.upper.shape[0])
     seconds = time.perf_counter() - start
-    return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
+    return problem, _round(model.mesh, dofs, error, worst, seconds), finest(wanted)
 
 
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
@@ -237,7 +275,8 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     other = companion(problem)
     last = last_step(other)
     kinds = kinds_of(step.readings)
-    error = relative_error(numbers, kinds, goal, compared(problem, step, other, last, press_numbers)[goal])
+    errors = _relative_errors(numbers, kinds, compared(problem, step, other, last, press_numbers), goal)
+    goal, error = next(iter(errors.items()))
     # a finer companion changes both lengths, so that their effects cannot be separated
     coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
     sizes = _next_sizes(problem, (goal, kinds[goal]), error, tolerance, numbers, coarse)
@@ -248,7 +287,9 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
 
 def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
     """Return the record of a round on a mesh."""
-    return Round(mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement)
+    return Round(
+        mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement, mesh.stick_refinement
+    )
 
 
 def _next_sizes(
@@ -264,13 +305,25 @@ def _next_sizes(
     if error <= tolerance:
         return _longer(problem, fine["contact_half_length_mm"])
     number, kind = goal
-    is_length = kind.is_length
-    shares = (1.0, 0.0) if is_length else _error_shares(problem, number, fine, coarse)
-    power = 1.0 if is_length else ORDERS.get(kind, ORDER)
+    is_zone = kind.is_length or kind is Kind.AREA
+    shares = (1.0, 0.0) if is_zone else _error_shares(problem, number, fine, coarse)
+    power = 1.0 if is_zone else ORDERS.get(kind, ORDER)
     factor = min(max((_SAFETY * tolerance / error) ** (1.0 / power), _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
     size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
     base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)
     return replace(options, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))
+
+
+def _at_borders(
+    problem: Problem, goal: str, kind: Kind, error: float, tolerance: float, numbers: Mapping[str, float]
+) -> MeshOptions:
+    """Return shorter edges at the border of stick, or at the whole contact, for the length or area of a zone."""
+    own = problem.model.mesh
+    if error <= tolerance or not goal.startswith("stick") or own.stick_refinement >= MOST_STICK_REFINEMENT:
+        return replace(_next_sizes(problem, (goal, kind), error, tolerance, numbers, None), borders=None)
+    least, most = _AT_STICK
+    finer = own.stick_refinement * min(max(error / (_SAFETY * tolerance), least), most)
+    return replace(own, stick_refinement=four_digits(min(finer, MOST_STICK_REFINEMENT)), borders=None)
 
 
 def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:

@@ -242,6 +242,14 @@ class PressedBody:
         depths = iter(checks)
         return [replace(end, penetration_mm=next(depths).penetration_mm) if end.outcome.ok else end for end in ends]
 
+    def refine_borders(self) -> None:
+        """Shorten the edges at the border of stick, which presses on coarser meshes find."""
+        from finger3d.accuracy.borders import with_refined_borders  # most bodies need none of it
+
+        start = time.perf_counter()
+        self.problem = with_refined_borders(self.problem, self._report)
+        self.seconds += time.perf_counter() - start
+
     def widen(self) -> None:
         """Condense the body to all points of its free faces."""
         self._report.say("contact reached beyond the candidate points; once more with all points of the free faces")

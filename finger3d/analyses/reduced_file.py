@@ -34,7 +34,7 @@ from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
 Made = TypeVar("Made", RigidObject, FrictionLaw)
 
-FORMAT, VERSION = "finger3d condensed body", 5
+FORMAT, VERSION = "finger3d condensed body", 6
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 """Mesh options that a file stores; the grading is omitted, as a reduced model has no mesh."""
@@ -182,7 +182,8 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
         "points": problem.points.points,
         "area": problem.points.area,
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
-        "edges": problem.points.edges,
+        "facets": problem.points.facets,
+        "contact_compliance": problem.points.compliance,
         **_face_arrays("face", bare(problem.surface)),
     }
     if problem.system.object_share is not None:
@@ -210,7 +211,8 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
             basis=vertical_frame(d),
             half_width_mm=float(half_width),
             band_mm=float(band),
-            edges=arrays["edges"],
+            facets=arrays["facets"],
+            compliance=arrays["contact_compliance"],
         ),
         delassus=arrays["compliance"].reshape(c, d, c, d),
         reading_rows=arrays["reading_rows"].reshape(len(model.columns), c * d),
@@ -311,6 +313,7 @@ def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:
         "face": (p,),
         "points": (p, 3),
         "area": (p,),
+        "contact_compliance": (p,),
         "band": (2,),
     }
     if "object_share" in arrays:
@@ -350,9 +353,11 @@ def _check_arrays(arrays: TreeView, d: int, readings: int) -> None:
         raise ValueError("parent is out of range")
     if not all(((arrays[name] >= 0) & (arrays[name] < len(FREE_FACES))).all() for name in ("face", "face_face")):
         raise ValueError("face is out of range")
-    edges = arrays["edges"]
-    if edges.ndim != 2 or edges.shape[1] != 2 or edges.dtype.kind not in "iu" or not ((edges >= 0) & (edges < p)).all():
-        raise ValueError("edges do not fit")
+    facets = arrays["facets"]
+    if facets.shape[1:] != (d,) or facets.dtype.kind not in "iu" or not ((facets >= 0) & (facets < p)).all():
+        raise ValueError("facets do not fit")
+    if not (arrays["contact_compliance"] > 0.0).all():
+        raise ValueError("contact_compliance is not positive")
     faces = arrays.get("object_faces", np.zeros(0))
     if faces.size and not 0 <= faces.min() <= faces.max() < len(arrays["object_points"]):
         raise ValueError("object_faces is out of range")

@@ -18,7 +18,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Reading, Taxel
 from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.meshing.options import Mesher
-from finger3d.meshing.refinement.grading import Grading
+from finger3d.meshing.refinement.grading import Grading, SizedPlaces
 from finger3d.objects import (
     ContactPath,
     InitialContact,
@@ -74,6 +74,8 @@ class MeshOptions:
     free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
     `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face close to them;
     at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
+    `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
+    lengths there, once a press has found it.
     """
 
     size_mm: float
@@ -83,11 +85,14 @@ class MeshOptions:
     grading: Grading | None = None
     gauge_refinement: float = 1.0
     refined_gauges: tuple[str, ...] = ()
+    stick_refinement: float = 1.0
+    borders: SizedPlaces | None = None
 
     def as_table(self) -> dict[str, float | str]:
         """The keys of ``[mesh]`` in a scene."""
         sizes: dict[str, float | str] = {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm}
         finer = {} if self.gauge_refinement == 1.0 else {"gauge_refinement": self.gauge_refinement}
+        finer |= {} if self.stick_refinement == 1.0 else {"stick_refinement": self.stick_refinement}
         return sizes | finer | {"mesher": self.mesher}
 
 

@@ -31,7 +31,7 @@ class PressStep:
     force_x_N, force_y_N, force_z_N : the whole contact force on the finger, pressure and friction
     moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : its moment about the middle of the base
     outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
-    contact_area_mm2, stick_area_mm2 : area at rest of the points in contact, and of those that stick
+    contact_area_mm2, stick_area_mm2 : area at rest of the zones of contact and of stick, which end between the points
     largest_penetration_mm : how deep any place of the finger's free surface is inside the object; of its contact points
         where the object is elastic, and while the press runs
     contact_half_length_mm, stick_half_length_mm : half the extent along x, at rest, of contact and stick zone at z = 0

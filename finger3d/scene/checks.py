@@ -10,7 +10,15 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design, lacks_section
-from finger3d.mechanics.readings.columns import displacement_columns, pressure_column, strain_columns
+from finger3d.mechanics.readings.columns import (
+    AREAS,
+    GIVEN_BY_FORCE,
+    MAIN,
+    RESULTANTS,
+    displacement_columns,
+    pressure_column,
+    strain_columns,
+)
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.scene.derived import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
@@ -54,10 +62,14 @@ def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[s
         return []
     if tables.mesh.tolerance is None:
         return [f"mesh.goal = {shown(goal)}: only with mesh.tolerance, for which the mesh is refined"]
-    first = "normal_force_N" if legs[-1].force_N is None else "depth_mm"  # under a force the depth is unknown
-    names = [first, "friction_sum_N", "external_work_mJ", "dissipation_mJ"]
+    dim = 3 if solid else 2
+    # under a force the depth is unknown, and the force is not
+    under_force = legs[-1].force_N is not None
+    names = [*MAIN, *AREAS, *RESULTANTS[dim], "external_work_mJ", "dissipation_mJ"]
+    names += ["contact_half_length_end_mm"] if solid else []
+    names = ["depth_mm", *(n for n in names if n not in GIVEN_BY_FORCE)] if under_force else names
     names += [strain_columns(g.name)[0].key for g in tables.gauge] + [pressure_column(t.name).key for t in tables.taxel]
-    names += [c.key for m in tables.marker for c in displacement_columns(m.name, 3 if solid else 2)]
+    names += [c.key for m in tables.marker for c in displacement_columns(m.name, dim)] + ["all"]
     if goal in names:
         return []
     return [f"mesh.goal = {shown(goal)}: no number of this press; must be one of {', '.join(names)}"]

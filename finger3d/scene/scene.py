@@ -206,7 +206,10 @@ class _Parts:
         domain = self.tables.model.domain
         legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
         way = contact_path(self.design, self.object, legs, domain)
-        return mesh_options(self.tables.mesh, self.design, domain, self.object, initial_contact(way).contact_box)
+        box, linear = initial_contact(way).contact_box, not set(self.settings) - {"kinetic_friction"}
+        # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
+        quick = linear and self.tables.friction.mu > 0.0 and all(leg.force_N is None for leg in self.legs)
+        return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
         """Return the tables with every default."""

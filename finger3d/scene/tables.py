@@ -168,16 +168,19 @@ class MeshTable(TomlTable):
     base_size_mm : edge length far from it
     gauge_refinement : edge length at the contact over that around gauges and on the contact face close to them; 1:
         gauges do not change the mesh
+    stick_refinement : in a press, edge length at the contact over that at the border of stick, which a press on the
+        coarser mesh finds; absent: 3 in a solid without sizes, with friction, in small strain at given depths, else 1
     mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
-    goal : with tolerance: the number that the mesh is refined for, such as gauge_g36; unless given the normal force,
-        or the depth under one
+    goal : with tolerance: the number that the mesh is refined for, such as gauge_g36 or stick_area_mm2, or "all";
+        unless given the normal force, or the depth under one
     max_seconds : with tolerance: stop refining then, with the best so far
     """
 
     size_mm: Edge | None = None
     base_size_mm: Edge | None = None
     gauge_refinement: Annotated[float, Ge(1), Le(100)] = 1.0
+    stick_refinement: Annotated[float, Ge(1), Le(16)] | None = None
     mesher: Mesher = "ftetwild"
     tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
     goal: Name | None = None

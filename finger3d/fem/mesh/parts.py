@@ -37,6 +37,20 @@ def moduli_of(elastic: LinearElasticity) -> tuple[float, ...]:
     return tuple(law.shear_modulus for law in laws)
 
 
+def contact_compliance(elastic: LinearElasticity, mesh: Mesh) -> Float:
+    """Return the contact compliance ``1 / E*``, 1/MPa, at the nodes (n,) of a mesh, the mean over the cells around it.
+
+    With Lame's constants l and G it is ``(l + 2 G) / (4 G (l + G))``: ``(1 - nu^2) / E``, or ``1 / E`` in plane stress.
+    """
+    shear = np.array(moduli_of(elastic))[elastic.part if isinstance(elastic, ElasticityByPart) else 0]
+    lame = elastic.pressure_modulus
+    of_cell = np.broadcast_to((lame + 2.0 * shear) / (4.0 * shear * (lame + shear)), len(mesh.cells))
+    nodes, each = mesh.cells.ravel(), mesh.cells.shape[1]
+    count = np.bincount(nodes, minlength=len(mesh.points))
+    total = np.bincount(nodes, np.repeat(of_cell, each), len(mesh.points))
+    return np.asarray(total / np.maximum(count, 1))
+
+
 @dataclass(frozen=True)
 class ElasticityByPart:
     """Linear elastic laws of a body of several parts; see `finger3d.fem.solids.material.LinearElasticity`.

@@ -19,7 +19,7 @@ from finger3d.fem.mesh.simplex import CONTACT, Mesh
 from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
-from finger3d.mechanics.discretise.gauge_refinement import refined_at_gauges
+from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import (
     AddedStiffness,
     CondensedBody,
@@ -93,7 +93,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     fixed = held_dofs(mesh, axes, model.held_ends)
     condensed = condense(matrix, fixed, rows)
     delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
-    mirrored, points = unfold_points(model, mesh, candidates, axes)
+    mirrored, points = unfold_points(model, mesh, candidates, axes, elastic)
     problem = Problem(
         model=model,
         condensed_body=CondensedBody(
@@ -164,14 +164,17 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
 def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
     """Return the problem with the compliance of an elastic object added to that of the contact points."""
     body = problem.without_inclusions
+    share, points = object_share(problem.surface, problem.system.delassus, response.compliance), problem.points
+    both = points.compliance / (1.0 - share[problem.symmetry.image_of])
     return replace(
         problem,
         system=replace(
             problem.system,
+            points=replace(points, compliance=both),
             delassus=problem.system.delassus + response.compliance,
             object_factorizations=response.factorizations,
             object_compliance=response.compliance,
-            object_share=object_share(problem.surface, problem.system.delassus, response.compliance),
+            object_share=share,
         ),
         seconds=problem.seconds | response.seconds,
         without_inclusions=with_object_compliance(body, response) if body else None,
@@ -192,7 +195,7 @@ def mesh_part(
         mesh, mesh_report = mesh_solid(model.design, model.mesh, zone, axes, report)
     else:
         mesh, mesh_report = mesh_section(model.design, model.mesh, zone, axes)
-    return refined_at_gauges(model, mesh, mesh_report, axes)
+    return locally_refined(model, mesh, mesh_report, axes)
 
 
 def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, report: Progress) -> list[sp.csr_matrix]:
@@ -223,6 +226,7 @@ def candidate_points(model: Model, free: BoundarySurface, first_contact_mm: floa
     """Return the points of the free faces that come near the object on its path, the nearest first.
 
     At finite strain points that do not face the object at rest may turn towards it: those near others are included.
+    So are the neighbours of all.
 
     Parameters
     ----------
@@ -250,6 +254,7 @@ def candidate_points(model: Model, free: BoundarySurface, first_contact_mm: floa
         apart = cKDTree(free.points[chosen]).query(free.points[turning])[0]
         chosen[turning[apart <= folding + model.mesh.size_mm]] = True
         nearest = np.minimum(nearest, later)
+    chosen |= np.asarray(free.hats @ (free.hats.T @ chosen)) > 0.0  # the edge of contact lies between two points
     if np.count_nonzero(chosen & on_contact) >= WHOLE_FACE * np.count_nonzero(on_contact):
         chosen |= on_contact
     order = np.argsort(nearest, kind="stable")  # so that points which touch come before those which do not

@@ -1,4 +1,4 @@
-"""Refinement of a mesh around the gauges of a model.
+"""Refinement of a mesh around the gauges of a model, and at the border of stick.
 
 The strain at a gauge close to the edge of the contact varies over its distance from that edge.  Edges as long as those
 at the contact do not resolve it, and its derivative by mu then depends on the mesh
@@ -42,10 +42,8 @@ _RATE = 0.7
 """Growth of the edge length per distance beyond."""
 
 
-def refined_at_gauges(
-    model: Model, mesh: Mesh, made: MeshReport, axes: tuple[str, ...] = ()
-) -> tuple[Mesh, MeshReport]:
-    """Return mesh and report with edges of ``mesh.size_mm / mesh.gauge_refinement`` around the gauges.
+def locally_refined(model: Model, mesh: Mesh, made: MeshReport, axes: tuple[str, ...] = ()) -> tuple[Mesh, MeshReport]:
+    """Return mesh and report with shorter edges around the gauges, and at the border of stick if it is known.
 
     Raises
     ------
@@ -53,9 +51,14 @@ def refined_at_gauges(
         If the refined mesh is estimated to need too much memory.
     """
     options = model.mesh
-    if options.gauge_refinement == 1.0 or not model.gauges:
+    sizes = [] if options.gauge_refinement == 1.0 or not model.gauges else [edge_lengths_at_gauges(model, mesh, axes)]
+    sizes += [options.borders.at] if options.borders else []
+    if not sizes:
         return mesh, made
-    size = edge_lengths_at_gauges(model, mesh, axes)
+
+    def size(points: Float) -> Float:
+        return np.asarray(np.min([wanted(points) for wanted in sizes], axis=0))
+
     finer = refined(mesh, size, lambda cells: check_count(cells, mesh.dim, options))
     whole = mesh_report(finer, made.volume_mm3 / curved_volume(mesh), made.cad_volume_mm3, made.seconds)
     return finer, replace(whole, from_cache=made.from_cache, cache_path=made.cache_path)

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
+from finger3d.fem.mesh.parts import contact_compliance
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, reflect_into_part, unfold
+from finger3d.fem.solids.material import LinearElasticity
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import ContactPoints
@@ -126,7 +128,7 @@ def active_dofs(face: BoundarySurface, axes: tuple[str, ...]) -> NDArray[np.int6
 
 
 def unfold_points(
-    model: Model, mesh: Mesh, face: BoundarySurface, axes: tuple[str, ...]
+    model: Model, mesh: Mesh, face: BoundarySurface, axes: tuple[str, ...], elastic: LinearElasticity
 ) -> tuple[Symmetry, ContactPoints]:
     """Return the symmetry of a part's contact points, and the contact points of the whole finger."""
     d = mesh.dim
@@ -158,7 +160,8 @@ def unfold_points(
         basis=vertical_frame(d),
         half_width_mm=model.design.width_mm / 2.0,
         band_mm=_BAND * model.mesh.size_mm,
-        edges=np.vstack([image[2] + first for image, first in zip(images, before, strict=False)]),
+        facets=np.vstack([image[2] + first for image, first in zip(images, before, strict=False)]),
+        compliance=contact_compliance(elastic, mesh)[face.nodes[parent]],
     )
     return symmetric, points
 
@@ -177,7 +180,7 @@ def _images(
     -------
     nodes : (k,) of the whole finger, ascending
     parent : (k,) number of the part's contact point
-    edges : (e, 2) pairs of positions in `nodes`
+    facets : (f, d) positions in `nodes` of the vertices of facets
     """
     corners = whole.facets[label][:, :dim]
     number = np.full(image_of.max() + 1, -1)
@@ -185,12 +188,5 @@ def _images(
     number[face.nodes[rows]] = rows
     on_face = np.unique(corners)
     nodes = on_face[number[image_of[on_face]] >= 0]
-    return nodes, number[image_of[nodes]], _edges(corners, nodes)
-
-
-def _edges(corners: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Edges (e, 2) of facets with vertices (f, d), as positions in the ascending `nodes` (m,) that hold both ends."""
-    pairs = np.vstack([corners[:, [i, j]] for i in range(corners.shape[1]) for j in range(i)])
-    ends = np.minimum(np.searchsorted(nodes, pairs), len(nodes) - 1)
-    ends = np.sort(ends[(nodes[ends] == pairs).all(axis=1)], axis=1)
-    return np.unique(ends, axis=0)
+    position = np.minimum(np.searchsorted(nodes, corners), len(nodes) - 1)
+    return nodes, number[image_of[nodes]], position[(nodes[position] == corners).all(axis=1)]

@@ -21,6 +21,9 @@ RESULTANTS = {
 }
 """Components of force, moment and friction by dimension; they get an error bar, too."""
 
+GIVEN_BY_FORCE = ("normal_force_N", "force_y_N")
+"""Numbers that are given, and have no error, under a prescribed normal force."""
+
 QUANTITIES = {"gauge": "strain", "marker": "displacement", "taxel": "pressure"}
 """What a sensor of each kind reads, in the order of their columns; those of other kinds follow."""
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Tree, freeze_arrays
-from finger3d.contact.friction import OPEN, STATUS_NAMES, STICK
+from finger3d.contact.friction import STATUS_NAMES
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.mechanics.readings.columns import QUANTITIES, Column, by_key, in_space, of_kind
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.results.zones import half_extents
+from finger3d.mechanics.results.zones import Zone, zone_area, zone_ends, zones
 from finger3d.objects import ObjectPose
 
 _READINGS = ("gauges", "markers", "taxels", "other_readings")
@@ -39,8 +40,10 @@ class ContactPoints:
     basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents
     half_width_mm, band_mm : float
         Where no point lies on the line z = 0, figures show the points within `band_mm` of it.
-    edges : (e, 2)
-        Pairs of points that an edge of the surface mesh joins.
+    facets : (f, d)
+        Points at the vertices of the facets of the surface mesh, where all of these are contact points.
+    compliance : (m,) 1/MPa
+        ``1 / E*`` of finger and object: ``(1 - nu^2) / E``, and ``1 / E`` in plane stress.
     """
 
     nodes: NDArray[np.int64]
@@ -50,7 +53,8 @@ class ContactPoints:
     basis: Float
     half_width_mm: float
     band_mm: float
-    edges: NDArray[np.int64]
+    facets: NDArray[np.int64]
+    compliance: Float
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -59,6 +63,26 @@ class ContactPoints:
     def dim(self) -> int:
         """2 for a section, 3 for a solid."""
         return int(self.basis.shape[-1])
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Pairs of points (e, 2) that an edge of the surface mesh joins."""
+        corners = range(self.facets.shape[1])
+        pairs = np.vstack([self.facets[:, [i, j]] for i in corners for j in range(i)])
+        return np.unique(np.sort(pairs, axis=1), axis=0)
+
+    @cached_property
+    def facet_area(self) -> Float:
+        """Areas (f,) mm2 of the facets, which are taken as flat."""
+        places = self.points[self.facets]
+        arms = places[:, 1:] - places[:, :1]
+        if self.dim == 2:
+            return np.asarray(2.0 * self.half_width_mm * np.linalg.norm(arms[:, 0], axis=1))
+        return np.asarray(0.5 * np.linalg.norm(np.cross(arms[:, 0], arms[:, 1]), axis=1))
+
+    def zones(self, state: ContactState) -> tuple[Zone, Zone]:
+        """Return the zones of contact and of stick in a state."""
+        return zones(state, self.points, self.area, self.compliance, self.edges)
 
     def with_basis_of(self, state: ContactState) -> ContactPoints:
         """Return the points with the bases of a state, if these change during the motion."""
@@ -193,12 +217,14 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     rest.  Readings are sorted by the kind of their sensors, and displacements have three components.
     """
     state, target = step.state, step.target
-    points = points.with_basis_of(state)
+    contact, stick, middle = *points.zones(state), points.middle_line()
+    facets, area = points.facets, points.facet_area
+    half_contact, half_stick = _half_extent(middle, contact), _half_extent(middle, stick)
+    at_end = {"contact_half_length_end_mm": _half_extent(points.end_line(), contact)} if points.dim == 3 else {}
+    points = points.with_basis_of(state)  # below, what depends on directions
     world = points.to_global(state.force)
     friction = points.friction(state.force)
-    touching, sticking = state.status != OPEN, state.status == STICK
     x, z = points.points[:, 0], points.points[:, 2]
-    contact, stick = half_extents(*points.middle_line(), state, points.area)
     outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
     outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
     numbers: Tree = {
@@ -215,13 +241,12 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
         "outward_friction_x_N": float(outward_x.sum()),
         "outward_friction_z_N": float(outward_z.sum()),
-        "contact_area_mm2": float(points.area[touching].sum()),
-        "stick_area_mm2": float(points.area[sticking].sum()),
-        "contact_half_length_mm": contact,
-        "stick_half_length_mm": stick,
+        "contact_area_mm2": zone_area(facets, area, contact),
+        "stick_area_mm2": zone_area(facets, area, stick),
+        "contact_half_length_mm": half_contact,
+        "stick_half_length_mm": half_stick,
+        **at_end,
     }
-    if points.dim == 3:
-        numbers["contact_half_length_end_mm"] = half_extents(*points.end_line(), state, points.area)[0]
     others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
     return numbers | {
         "largest_penetration_mm": step.penetration_mm,
@@ -236,6 +261,11 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         "method": step.method,
         "outcome": str(step.outcome),
     }
+
+
+def _half_extent(line: tuple[Float, NDArray[np.int64]], zone: Zone) -> float:
+    low, high = zone_ends(*line, zone)
+    return 0.5 * (high - low)
 
 
 def table_row(points: ContactPoints, step: StepResult) -> Tree:
