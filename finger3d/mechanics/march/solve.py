@@ -258,7 +258,7 @@ class Press:
     def _along_path(self, move: Move, load: Load | None) -> _Advanced:
         """Advance on the exact path, to a pose or to a prescribed normal force."""
         force = None if load is None else NormalForce(*self._wanted(load), self._deepest)
-        solution, pose, energies = solve_path(self.problem, self.state, move, force)
+        solution, pose, energies, _ = solve_path(self.problem, self.state, move, force)
         return _Advanced(solution, [_Substep(self.state, solution.state, Move(self.pose, pose))], pose, energies)
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:

@@ -46,11 +46,13 @@ class PathSolution(NamedTuple):
     solution : at its end, or why it cannot be followed
     pose : at its end, with the depth that was found under a prescribed force
     energies : work of the object and dissipation (mJ) on the way
+    events : number of events on the way
     """
 
     solution: ContactSolution[State[Float]]
     pose: ObjectPose
     energies: tuple[float, float]
+    events: int
 
 
 def has_exact_path(model: Model) -> bool:
@@ -118,10 +120,11 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
         detail = (
             _shortfall(force, move, events) if force and found.outcome is Outcome.FORCE_NOT_REACHED else found.detail
         )
-        return PathSolution(replace(found.with_state(state), detail=detail), move.start, (0.0, 0.0))
+        return PathSolution(replace(found.with_state(state), detail=detail), move.start, (0.0, 0.0), len(events))
     after = State(replace(found.state, bases=bases), body.displacement(found.state.force, bases))
     pose = replace(move.end, depth_mm=move.end.depth_mm + events[-1].amplitude)
-    return PathSolution(found.with_state(after), pose, _energies(problem, count, start, bases, move, events))
+    energies = _energies(problem, count, start, bases, move, events)
+    return PathSolution(found.with_state(after), pose, energies, len(events))
 
 
 def _shortfall(force: NormalForce, move: Move, events: list[Event]) -> str:
