@@ -142,6 +142,7 @@ def test_a_prescribed_resultant_determines_the_amplitude() -> None:
 
 
 def test_events_that_accumulate_are_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(path, "_LEAST_EVENTS", 3)
     monkeypatch.setattr(path, "_EVENTS_A_POINT", 0)
     start, motion = pressed()
     found, _ = follow(problem_of(half_plane(12, 2, 0.3, spacing=0.2), start, motion, 0.3))

@@ -48,8 +48,8 @@ _TOGETHER, _ONE_BY_ONE = 12, 60
 _LARGEST_TABLEAU = 1200
 """Largest number of rows of the tableau of Lemke's method."""
 
-_EVENTS_A_POINT = 40
-"""Largest number of events, for each contact point."""
+_LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
+"""Largest number of events: a constant, and one for each contact point."""
 
 _JUMP = 1e-9
 """Share of the path that an increment over a jump begins with."""
@@ -121,7 +121,7 @@ def follow(
     path = _Path(problem, resultant)
     outcome = path.followed()
     state = path.state if outcome.ok else problem.previous
-    return ContactSolution(state, outcome, path.residual, path.systems, "events", path.place), path.events
+    return ContactSolution(state, outcome, path.residual, path.systems, "events"), path.events
 
 
 class _Path:
@@ -137,7 +137,7 @@ class _Path:
     def __init__(self, problem: ContactProblem, resultant: Resultant | None) -> None:
         self.problem, self.resultant, self.state = problem, resultant, problem.previous
         self.share = self.amplitude = self.residual = 0.0
-        self.systems, self.place, self.events = 0, "", list[Event]()
+        self.systems, self.events = 0, list[Event]()
         self.force = self.state.force.copy()
         self.displacement = np.column_stack([self.state.gap, np.zeros(len(self.force))])
         self._start = self.displacement - self._through_body(self.force)
@@ -148,7 +148,7 @@ class _Path:
 
     def followed(self) -> Outcome:
         """Go on to the end of the path, or to where it cannot be continued."""
-        most = _EVENTS_A_POINT * (len(self.force) + 10)
+        most = _LEAST_EVENTS + _EVENTS_A_POINT * len(self.force)
         if self.resultant and not self.force.any() and not self._touches(self.resultant):
             return Outcome.FORCE_NOT_REACHED
         for _ in range(most):

@@ -117,14 +117,23 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
         )
     found, events = follow(contact, resultant)
     if not found.outcome.ok:
-        detail = (
-            _shortfall(force, move, events) if force and found.outcome is Outcome.FORCE_NOT_REACHED else found.detail
-        )
+        detail = found.detail
+        if found.outcome is Outcome.EVENTS:
+            detail = _place_of_change(problem, events)
+        elif force and found.outcome is Outcome.FORCE_NOT_REACHED:
+            detail = _shortfall(force, move, events)
         return PathSolution(replace(found.with_state(state), detail=detail), move.start, (0.0, 0.0), len(events))
     after = State(replace(found.state, bases=bases), body.displacement(found.state.force, bases))
     pose = replace(move.end, depth_mm=move.end.depth_mm + events[-1].amplitude)
     energies = _energies(problem, count, start, bases, move, events)
     return PathSolution(found.with_state(after), pose, energies, len(events))
+
+
+def _place_of_change(problem: Problem, events: list[Event]) -> str:
+    """Return where the status of a point changed last."""
+    last, before = (event.state.status for event in (events[-1], events[-2]))
+    points = problem.surface.points[np.flatnonzero(last != before)]
+    return ", ".join(f"x = {x:.4g} mm" for x in points[:1, 0])
 
 
 def _shortfall(force: NormalForce, move: Move, events: list[Event]) -> str:
