@@ -17,7 +17,7 @@ def test_a_press_that_fails_gives_a_reason_and_no_reading() -> None:
     good, bad = press(problem, 0.1), press(problem, 0.5)
     bad = replace(bad, frame=replace(bad.frame, outcome=Outcome.NO_CONVERGENCE))
     legs = problem.model.legs
-    curve = CurvePoints(problem, (0.1, 0.5), Increments(legs, legs, False, 0.0), (good, bad), {}, 3)
+    curve = CurvePoints(problem, (0.1, 0.5), Increments(legs, False, 0.0), (good, bad), {}, 3)
     assert list(curve.frames) == [0.1]
     assert list(curve.failed) == [0.5]
     assert curve.failed[0.5].startswith("at depth ")

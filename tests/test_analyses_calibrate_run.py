@@ -49,8 +49,8 @@ def test_a_fast_viscous_press_reads_the_instantaneous_body_and_a_slow_one_the_re
     bulk: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # elastic presses are solved in the increments of viscous ones, and not cut where contact begins
-    for place in ("mechanics.march.solve", "analyses.pressed_body"):
-        monkeypatch.setattr(f"finger3d.{place}.has_exact_path", lambda model: False)
+    for place in ("march.solve", "small_strain.exact_path"):
+        monkeypatch.setattr(f"finger3d.mechanics.{place}.has_exact_path", lambda model: False)
     monkeypatch.setattr(Press, "moves_to", lambda press, pose: (Move(press.pose, pose),))
 
     def viscous(duration_s: float) -> Calibration:

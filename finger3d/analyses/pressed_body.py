@@ -32,7 +32,7 @@ from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
+from finger3d.mechanics.small_strain.exact_path import ends_only
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
@@ -90,14 +90,6 @@ def under(
         system = problem.system
         check(model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
     return replace(problem, model=model)
-
-
-def ends_only(problem: Problem) -> Problem:
-    """Return the problem with one station a leg where its path is exact, as only the ends are wanted; else as it is."""
-    if not has_exact_path(problem.model):
-        return problem
-    legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
-    return replace(problem, model=replace(problem.model, legs=legs))
 
 
 def _poses(legs: tuple[Leg, ...]) -> list[Leg]:

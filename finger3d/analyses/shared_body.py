@@ -17,7 +17,7 @@ from itertools import dropwhile
 from pathlib import Path
 from threading import Event
 
-from finger3d.analyses.pressed_body import PressedBody, ends_only, under
+from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
@@ -31,6 +31,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.marker_grid import grid_readings
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.results.penetration import check_surface
+from finger3d.mechanics.small_strain.exact_path import ends_only
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 

@@ -72,6 +72,14 @@ def has_exact_path(model: Model) -> bool:
     )
 
 
+def ends_only(problem: Problem) -> Problem:
+    """Return the problem with one station a leg where its path is exact, as only the ends are wanted; else as it is."""
+    if not has_exact_path(problem.model):
+        return problem
+    legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
+    return replace(problem, model=replace(problem.model, legs=legs))
+
+
 def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalForce | None = None) -> PathSolution:
     """Advance a state as the object moves straight from one pose to another.
 
