@@ -35,6 +35,8 @@ from finger3d.meshing.report import MeshReport
 from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import vertical_frame
 
+from ._increments import PlainCoulomb
+
 Float = NDArray[np.float64]
 
 MU = 0.25
@@ -55,7 +57,8 @@ class Case:
     element : mixed, quadratic or linear
     counts : increments; the one condensed body is pressed once for each
     nu : another Poisson's ratio
-    way : condensed; or "each iteration": one factorisation of the whole body in every iteration, as in the paper
+    way : condensed; or "each iteration": one factorisation of the whole body in every iteration, as in the paper;
+        or "plain increments": condensed, in the increments of that way
     """
 
     body: str
@@ -75,17 +78,18 @@ def model_of(case: Case) -> Model:
     mesh = MeshOptions(case.size, case.base, mesher)
     usual = 0.3 if case.body == HALF else 0.49
     nu = usual if case.nu is None else case.nu
+    law = Coulomb(MU) if case.way == "condensed" else PlainCoulomb(MU)
     if case.body == HALF:
         design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
         gauge = Gauge("g", 1.5, 4.2, angle=math.pi / 4)
         return Model(
-            design, Isotropic(1.0, nu), mesh, (Leg(1.0),), friction=Coulomb(MU), gauges=(gauge,), domain="plane-stress"
+            design, Isotropic(1.0, nu), mesh, (Leg(1.0),), friction=law, gauges=(gauge,), domain="plane-stress"
         )
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     # at large deformation the strain of the section along 30 degrees is near zero there, a twentieth of that along 60
     gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 3 if case.body == LARGE[SECTION] else math.pi / 6)
     domain: Any = "solid" if case.body in (SOLID, LARGE[SOLID]) else "plane-strain"
-    model = Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=Coulomb(MU), gauges=(gauge,), domain=domain)
+    model = Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=law, gauges=(gauge,), domain=domain)
     return LargeDeformation().apply(model) if case.body in LARGE.values() else model
 
 

@@ -73,11 +73,11 @@ def _limit(sizes: Sequence[float], found: Sequence[float]) -> tuple[float, float
 
 
 def step_errors(run: Mapping[str, Any], quantity: str, counts: Sequence[int]) -> dict[int, float]:
-    """Relative error by increments on one mesh; the limit is extrapolated in 1/N from the two finest, lengths apart."""
+    """Relative error by increments on one mesh; the limit is in 1/N^2 from the two finest, lengths apart."""
     fine, finest = counts[-2], counts[-1]
     last = value(run, quantity, finest)
     if quantity not in LENGTHS:
-        last += (last - value(run, quantity, fine)) * fine / (finest - fine)
+        last += (last - value(run, quantity, fine)) * fine**2 / (finest**2 - fine**2)
     return {n: abs(value(run, quantity, n) / last - 1.0) for n in counts}
 
 

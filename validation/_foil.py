@@ -85,8 +85,9 @@ def _axis(inner: float, first: float, far: float) -> Float:
 
 def _model(length: float, E: float, nu: float, dim: int) -> Any:
     """As much of a model as foils ask for."""
+    material = Isotropic(E, nu)
     return SimpleNamespace(
-        gauges=(Gauge("g", 0.0, 0.0, 0.0, 0.0, length),), material=Isotropic(E, nu),
+        gauges=(Gauge("g", 0.0, 0.0, 0.0, 0.0, length),), material=material, materials=lambda labels: (material,),
         domain="solid" if dim == 3 else "plane-strain", design=SimpleNamespace(width_mm=1.0),
     )  # fmt: skip
 

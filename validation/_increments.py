@@ -1,4 +1,4 @@
-"""Plain increments, in which a point that closes is held where it was at their start: what they leave is first order."""
+"""Plain increments, in which a point that closes is held where it was at their start, with errors of first order."""
 
 from __future__ import annotations
 

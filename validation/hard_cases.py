@@ -7,8 +7,9 @@ mu times the depth, so that the whole surface slips; for larger mu that would te
 
 A section goes from event to event; a solid in increments.  Every state on the way, at an event or the end of a part of
 an increment, is checked again here, from the compliance and the forces alone: gap, tension, Coulomb's limit, stick, and
-friction against slip; for points that have just closed the slip is the one reported.  The paper's literal swap runs through the same histories up to its first cycle.  A state in
-which friction helps slip satisfies the paper's own conditions; it is counted as wrong_way, and the history goes on.
+friction against slip; for points that have just closed the slip is the one reported.  The paper's literal swap runs
+through the same histories up to its first cycle.  A state in which friction helps slip satisfies the paper's own
+conditions; it is counted as wrong_way, and the history goes on.
 
 The same at large deformation: `hard_large_deformation.py`.
 """
@@ -45,8 +46,8 @@ STEPS = (1, 10, 200)
 SIZES = {2: (4.0, 0.6), 3: (6.0, 4.0)}
 LEGS = ("press", "slide", "release")
 COLUMNS = (
-    "dim nu mu increments contact_points leg settled parts residual violation iterations_median iterations_max fallback "
-    "cut_back slipping paper_settled paper_wrong_way paper_cycled"
+    "dim nu mu increments contact_points leg settled parts residual violation iterations_median iterations_max "
+    "fallback cut_back slipping paper_settled paper_wrong_way paper_cycled"
 ).split()
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
@@ -147,9 +148,11 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
         slipping = float((last == SLIP).sum() / max((last != OPEN).sum(), 1))
         yield (
             problem.dim, model.material.nu, mu, steps, len(problem.points.nodes), name,  # type: ignore[attr-defined]
-            sum(f.outcome.ok for f in frames), sum(len(f.parts) for f in frames), max((f.residual for f in frames), default=np.inf),
+            sum(f.outcome.ok for f in frames), sum(len(f.parts) for f in frames),
+            max((f.residual for f in frames), default=np.inf),
             max((v for _, v in here), default=np.inf), float(np.median(counts)), max(counts),
-            sum(f.method not in ("newton", "events") for f in frames), sum(f.method == "cut back" for f in frames), slipping,
+            sum(f.method not in ("newton", "events") for f in frames), sum(f.method == "cut back" for f in frames),
+            slipping,
             *(sum(o is kind for o in theirs) for kind in (Outcome.CONVERGED, Outcome.WRONG_WAY, Outcome.CYCLED)),
             counts,
         )  # fmt: skip

@@ -172,7 +172,7 @@ def _apart(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> float:
 
 
 def _jumps(frames: Sequence[StepResult]) -> int:
-    """Return how often the forces change by more than 1e-4 of the largest while the object moves by less than 1e-5 mm."""
+    """Return how often forces change by more than 1e-4 of the largest while the object moves by less than 1e-5 mm."""
     parts = [part for frame in frames for part in frame.parts]
     count = 0
     for (before, one), (after, other) in pairwise(parts):

@@ -200,7 +200,8 @@ def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int,
     errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS[0.3][2] for n in (1, 10)]
     rows.append(
         Row(
-            "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments", "1/N; REFERENCES.md, 2.4",
+            "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
+            "1/N; REFERENCES.md, 2.4",
             1.0,
             float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
         )
