@@ -59,7 +59,7 @@ def test_a_calibration_is_estimated_from(tmp_path: Path) -> None:
     for source in (calibration, tmp_path / "cal" / "calibration.json"):
         (found,) = finger3d.estimate(source, strain, tolerances=False)
         assert found.readings == {"<g>": strain}
-        assert found.mu == pytest.approx(0.2, abs=1e-3)
+        assert abs(found.mu - 0.2) <= 0.2 * found.std  # between four values of mu, the curve itself has an error
 
 
 def test_a_comparison_has_its_cases(tmp_path: Path) -> None:
