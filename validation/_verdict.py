@@ -209,7 +209,7 @@ CLAIMS = (
         {column: ("speed_of_a_press", f"^error of mu = .25 read in 100 s.*{column}$") for column in (STRAIN, WIDE)},
     ),
     Claim(
-        "The method is applicable to smaller sensors", "Sec. V", "standard deviation of mu = 0.25, R = 5 mm, 6 mm wide: "
+        "The method is applicable to smaller sensors", "Sec. V", "standard deviation of mu = 0.25, R = 5, width 6 mm: "
         "at most 0.1",
         {
             WIDE: ("small_fingers", "^standard deviation of mu = 0.25,.*small strain, R = 5 mm"),
