@@ -111,7 +111,7 @@ def _judged(
         legs = tuple(replace(leg, depth_mm=depth) for leg in body.model.legs)
         *_, last = march(replace(body, model=replace(body.model, legs=legs, friction=body.model.friction.with_mu(mu))))
         assert last.outcome.ok, str(last.outcome)
-        true = dict(last.readings)
+        true = last.named_readings
         true["t"] *= modulus  # strains under a prescribed depth do not depend on the modulus
         for i in random.choice(len(calibrations), min(JUDGES[domain], len(calibrations)), replace=False):
             steps, joint = calibrations[i]
