@@ -90,20 +90,20 @@ def run(quick: bool) -> Result:
         problem = build(press.model)
         exact = numbers(problem, press.mu, press.finest)
 
-        def error(count: int, is_plain: bool = False, exact: np.ndarray = exact, at: Any = (problem, press.mu)) -> Any:
-            found = numbers(*at, count, is_plain)
-            off = np.abs(found - exact) / np.abs(exact)
-            off[-1] = abs(found[-1])
-            return off
-
-        own[press.name] = np.array([error(count) for count in counts])
-        plain[press.name] = error(PLAIN, is_plain=True)
+        own[press.name] = np.array([_errors(numbers(problem, press.mu, count), exact) for count in counts])
+        plain[press.name] = _errors(numbers(problem, press.mu, PLAIN, plain=True), exact)
         for count, errors in (*zip(counts, own[press.name], strict=True), (-PLAIN, plain[press.name])):
             lines.append((press.name, abs(count), int(count < 0), *map(float, errors)))
     names = "press increments plain " + " ".join(name.replace(" ", "_") for name in NAMES)
-    return Result(
-        tuple(_rows(counts, own, plain)), columns(names, lines), lambda figure: _draw(figure, counts, own, plain)
-    )
+    rows = tuple(_rows(counts, own, plain))
+    return Result(rows, columns(names, lines), lambda figure: _draw(figure, counts, own, plain))
+
+
+def _errors(found: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """Relative errors of `NAMES`; that of the energy balance is its value."""
+    off = np.abs(found - exact) / np.where(exact, np.abs(exact), 1.0)
+    off[-1] = abs(found[-1])
+    return off
 
 
 def _fall(errors: np.ndarray) -> np.ndarray:

@@ -52,16 +52,13 @@ COST = "processor time of this machine"
 def run(quick: bool) -> Result:
     """Quick: coarse sections, 640 increments and 16 presses of a sweep."""
     counts = (10, 40, 160, 640) if quick else (10, 40, 160, 640, 2560, 10240)
-    sections = {"Fig. 9, 1 mm": lambda: fig9(0.49, STRAIN, 4.0 if quick else 1.0)}
-    if quick:
-        sections = {"Fig. 9, 4 mm": sections["Fig. 9, 1 mm"]}
-    else:
-        sections["Fig. 9, 0.5 mm"] = lambda: fig9(0.49, STRAIN, 0.5)
-        sections["half cylinder"] = lambda: half_cylinder(0.3, STRESS, 0.1)
+    sizes = (4.0,) if quick else (1.0, 0.5)
+    sections = {f"Fig. 9, {size:g} mm": fig9(0.49, STRAIN, size) for size in sizes}
+    if not quick:
+        sections["half cylinder"] = half_cylinder(0.3, STRESS, 0.1)
     found: dict[tuple[str, float, int], np.ndarray] = {}
     costs, rows = [], []
-    for name, section in sections.items():
-        problem = section()
+    for name, problem in sections.items():
         for mu in MUS[::2] if quick else MUS:
             costs.append(_cost(name, problem, mu))
             for count in (0, *counts):  # 0: the path
@@ -78,7 +75,7 @@ def run(quick: bool) -> Result:
 
 
 def _numbers(problem: Problem, mu: float, count: int) -> np.ndarray:
-    """Normal force, friction sum, work and dissipation at the end, by plain increments or by the path if `count` is 0."""
+    """Normal force, friction sum, work and dissipation at the end, in plain increments or, for none, on the path."""
     law, steps = (PlainCoulomb(mu), count) if count else (Coulomb(mu), 1)
     numbers = measure(problem.points, pressed(problem, law, steps)[-1])
     return np.array([numbers[key] for key in (FORCES[0], FORCES[2], *ENERGIES)])
@@ -86,8 +83,8 @@ def _numbers(problem: Problem, mu: float, count: int) -> np.ndarray:
 
 def _against_increments(here: str, found: dict[Any, np.ndarray], key: tuple[str, float], counts: Any) -> list[Row]:
     exact = found[(*key, 0)]
-    few, most = (np.abs(found[(*key, n)] / exact - 1.0) for n in (counts[-3], counts[-1]))
-    rate = float(np.log(few.max() / most.max()) / np.log(counts[-1] / counts[-3]))
+    few, most = (np.abs(found[(*key, n)] / exact - 1.0) for n in (counts[0], counts[-1]))
+    rate = float(np.log(few.max() / most.max()) / np.log(counts[-1] / counts[0]))
     why = "what is left of an error of first order, 1/N"
     rows = [
         Row(f"{quantity}, {here}: path against {counts[-1]} increments, relative", MANY, 0.0, float(error),

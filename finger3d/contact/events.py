@@ -145,6 +145,7 @@ class _Path:
         self._set = _ActiveSet(self.state.status, np.sign(self.force[:, 1]))
         self._limit = 1.0 + problem.friction
         self._first = STICK if problem.friction.any() else SLIP  # status of a point that touches
+        self._landed, self._stride = -1.0, _JUMP  # end and length of the last increment over a jump
 
     def followed(self) -> Outcome:
         """Go on to the end of the path, or to where it cannot be continued."""
@@ -377,7 +378,8 @@ class _Path:
         """Solve a short increment where there are no rates, with a longer one where it has no solution."""
         if self.resultant is not None:
             return Outcome.FORCE_JUMPS
-        stride = _JUMP
+        # one that follows at once is longer, else jumps in a row would go on in the smallest increments
+        stride = 10.0 * self._stride if self.share - self._landed <= self._stride else _JUMP
         while True:
             share = min(self.share + stride, 1.0)
             free = self._start + share * self._rate
@@ -392,6 +394,7 @@ class _Path:
         moved = self._through_body(found.state.force) + self._start + share * self._rate
         self._record(found.state.force, moved, found.state.status, 0.0, share)
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
+        self._landed, self._stride = share, stride
         return Outcome.CONVERGED if share >= 1.0 else None
 
     def _touches(self, more: Resultant) -> bool:
