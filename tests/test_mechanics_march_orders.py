@@ -9,6 +9,8 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -68,3 +70,15 @@ def test_errors_fall_at_second_order(name: str) -> None:
     assert (errors[-1] <= errors[0] / 10.0).all()
     assert errors[1, 0] <= 1e-3
     assert errors[1, 1] <= 1e-2
+
+
+def test_a_touch_so_light_that_gaps_are_at_the_round_off_of_coordinates_converges() -> None:
+    # the first part of the increment is 7e-7 mm deep on a block 200 mm high, whose coordinates are exact to 3e-14 mm
+    block = designs()["block"](half_length_mm=200.0, height_mm=200.0, width_mm=1.0)
+    bar = Cylinder(radius_mm=1000.0)
+    model = Model(
+        block, Isotropic(1.0, 0.3), MeshOptions(0.05, 25.0, "swept"), (Leg(1.1e-5, steps=1),), object=bar,
+        friction=Coulomb(0.25), domain="plane-strain",
+    )  # fmt: skip
+    (end,) = march(build(model, margin=-0.5))
+    assert end.outcome.ok

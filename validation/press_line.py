@@ -43,7 +43,7 @@ ONE = "0.14 % or less measured at 40 points to a; coarser meshes must pass too"
 COLUMNS = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a".split()
 COLUMNS += ["reported_D_over_AP2", "plain"]
 FEW = 5
-"""Increments that already give Spence's constants."""
+"""Increments of which a second-order error is left; twice as many give the stick zone to the point."""
 HEIGHTS = (100.0, 200.0)
 STUCK = 1e6
 
@@ -171,8 +171,8 @@ def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], f
 def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], finest: int, most: int) -> list[Row]:
     """Rows of what few increments leave."""
     here = f"nu = {nu:g}, mu = .25"
-    change = c_own[HEIGHTS[1], FEW] - c_own[HEIGHTS[1], most]
-    what = f"c/a at the end, {here}: change from {FEW} to {most} increments"
+    change = c_own[HEIGHTS[1], 2 * FEW] - c_own[HEIGHTS[1], most]
+    what = f"c/a at the end, {here}: change from {2 * FEW} to {most} increments"
     why = f"half a point spacing, a/{finest}"
     lost = {n: at[HEIGHTS[1], finest, 0.25, n][4] for n in (FEW, 2 * FEW, most)}
     rate = float(np.log2((lost[FEW] - lost[most]) / (lost[2 * FEW] - lost[most])))

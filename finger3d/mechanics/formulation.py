@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.state import ContactSolution
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.discretise.problem import Problem
@@ -17,6 +18,9 @@ from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 W = TypeVar("W", bound="Workspace")
+
+_ROUND_OFF = 20.0 * np.finfo(float).eps
+"""Round-off of coordinates, over the height of the finger."""
 
 
 @dataclass
@@ -110,7 +114,9 @@ def length_scale(problem: Problem, move: Move) -> float:
     """Return the length (mm) that gaps are divided by: the depth, or that of the deepest leg during release.
 
     It is that of the deepest leg, too, while the object is turned: the depth is that of the point which was lowest.
+    It is never so small that the round-off of coordinates would count as a violation of the contact conditions.
     """
     poses = move.start, move.end
     depth = 0.0 if any(pose.is_turned for pose in poses) else max(pose.depth_mm for pose in poses)
-    return depth if depth > 0.0 else problem.model.largest_depth_mm
+    resolved = _ROUND_OFF * problem.model.design.height_mm / TOLERANCE
+    return max(depth, resolved) if depth > 0.0 else problem.model.largest_depth_mm
