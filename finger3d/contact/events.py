@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
-from finger3d.contact.lemke import lemke
+from finger3d.contact.lemke import rates_start
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
@@ -44,9 +44,6 @@ _CONTINUOUS = 1e-8
 
 _TOGETHER, _ONE_BY_ONE = 12, 60
 """Changes of the active set: first of all points that violate a condition, then of the worst only."""
-
-_LARGEST_TABLEAU = 1200
-"""Largest number of rows of the tableau of Lemke's method."""
 
 _LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
 """Largest number of events: a constant, and one for each contact point."""
@@ -271,50 +268,11 @@ class _Path:
 
     def _by_pivots(self, at_apex: NDArray[np.bool_], at_limit: NDArray[np.bool_], sign: Float) -> _Line | None:
         """Return the line by Lemke's method; None if there is none."""
-        problem, more = self.problem, self.resultant
-        c, mu = len(sign), problem.friction
+        more = self.resultant
+        bordered = None if more is None else (more.weights, more.end - more.start, more.motion)
         stick = (self._set.status != OPEN) & ~at_apex & ~at_limit
-        apex, limit = np.flatnonzero(at_apex), np.flatnonzero(at_limit)
-        unit = np.eye(2 * c).reshape(c, 2, 2 * c)  # [point, direction] -> force of size 1
-        n, t = unit[:, 0], unit[:, 1]
-        bilateral = np.concatenate([n[stick], t[stick], (n + (sign * mu)[:, None] * t)[limit]])
-        zero = np.concatenate([n[stick], t[stick], n[limit]])  # displacements that vanish
-        forces = np.concatenate([-sign[limit, None] * t[limit], n[apex], t[apex], -t[apex]])
-        m, k = len(forces) + len(apex), len(apex)
-        if m > _LARGEST_TABLEAU:
-            return None
-        w, q = problem.delassus, self._rate.ravel()
-        equations, right = zero @ w @ bilateral.T, zero @ np.column_stack([w @ forces.T, q])
-        into = forces @ np.column_stack([w @ bilateral.T, w @ forces.T, q])
-        b = len(bilateral)
-        if more is not None:
-            weights, motion = more.weights.ravel(), more.motion.ravel()
-            equations = np.block([[equations, (zero @ motion)[:, None]], [weights @ bilateral.T, np.zeros(1)]])
-            right = np.vstack([right, [*(weights @ forces.T), more.start - more.end]])
-            into = np.column_stack([into[:, :b], forces @ motion, into[:, b:]])
-            b += 1
-        try:
-            reduced = into[:, b:] - into[:, :b] @ np.linalg.solve(equations, right)
-        except np.linalg.LinAlgError:
-            return None
-        matrix, load = np.zeros((m, m)), np.zeros(m)
-        f = len(forces)
-        matrix[:f, :f], load[:f] = reduced[:, :-1], reduced[:, -1]
-        normals, towards, away = (slice(f - (3 - i) * k, f - (2 - i) * k) for i in range(3))
-        matrix[towards, f:] = matrix[away, f:] = np.eye(k)
-        matrix[f:, normals], matrix[f:, towards], matrix[f:, away] = np.diag(mu[apex]), -np.eye(k), -np.eye(k)
-        size = np.abs(matrix[:f, :f]).max(initial=0.0) or 1.0
-        matrix[:f, :f] /= size
-        load /= np.abs(load).max(initial=0.0) or 1.0
-        z = lemke(matrix, load, 20 * m)
-        if z is None:
-            return None
-        status, direction = self._set.status.copy(), sign.copy()
-        status[stick] = STICK
-        status[limit] = np.where(z[: len(limit)] > 0.0, STICK, SLIP)
-        status[apex] = np.where(z[normals] > 0.0, np.where(z[f:] > 0.0, SLIP, STICK), OPEN)
-        direction[apex] = np.sign(z[towards] - z[away])
-        return self._improved(_ActiveSet(status, direction), at_apex, at_limit, (False,))
+        found = rates_start(self.problem, self._rate, (stick, at_limit, at_apex), sign, bordered)
+        return None if found is None else self._improved(_ActiveSet(*found), at_apex, at_limit, (False,))
 
     # --- from event to event --------------------------------------------------------------------------------------
 

@@ -29,8 +29,10 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Fill the friction slot."""
+        if self.ratio == 1.0:  # Coulomb's law, in whichever branch
+            return fill(model, "friction", model.friction, "kinetic_friction")
         model = fill(model, "friction", TwoCoefficients(model.friction.mu, self.ratio, self.branch), "kinetic_friction")
-        if self.branch == "paper" and self.ratio < 1.0:
+        if self.branch == "paper":
             model = warn(
                 model,
                 "kinetic_friction: branch 'paper' starts every step all stuck; its stick zone and friction depend on "

@@ -61,12 +61,13 @@ def new_mesh(
     start = time.perf_counter()
     low, high = box(design, symmetry)
     field = sizing(design, options, zone, low, high)
-    cells = checked_tets(design, field, options)
+    if not design.part_labels:
+        checked_tets(design, field, options)  # before CAD, which takes seconds
     report.say("building the CAD solid")
     body, epsilon = _body(design, symmetry, field)
     if body.part_labels:
         field = finer_in_layers(field, body)
-        cells = checked_tets(design, field, options)
+    cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.surface)
     check_volume(design, body, symmetry)
