@@ -89,7 +89,7 @@ def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
 def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> None:
     """The corners of a block fold under friction; at its end the force falls, and the base carries what is left."""
     design = designs()["block"](half_length_mm=8.76, height_mm=10.0, width_mm=10.36)
-    mesh, leg = MeshOptions(1.2, 1.79, "swept"), Leg(3.42, steps=20)
+    mesh, leg = MeshOptions(1.2, 1.79, "swept"), Leg(3.8, steps=20)
     model = Model(design, Isotropic(1.0, 0.5), mesh, (leg,), friction=Coulomb(1.0), domain="plane-strain")
     problem = build(Effect().apply(model))
     frames = list(march(problem))
@@ -97,8 +97,7 @@ def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> Non
     force = [measure(problem.points, frame)["normal_force_N"] for frame in frames]
     (line,) = snap_warnings(frames)
     number = int(re.findall(r"in step (\d+)", line)[0])
-    parts = [problem.world_force(state.contact)[:, 1].sum() for _, state in frames[number - 1].parts]
-    assert -parts[0] < force[number - 2]
+    assert min(np.diff(force[number - 2 :])) < 0.0
     assert min(np.diff(force[: number - 1])) > 0.0
     assert snap_warnings(frames[: number - 1]) == []
     state = frames[-1].meshed_state

@@ -81,7 +81,8 @@ class StandIn:
         material = Isotropic(1.0, self.nu)
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
-            materials=lambda labels: (material,), object=Plane(), is_defined_by_increments=False, design=SimpleNamespace(height_mm=1.0), contact_law=ContactLaw(Coulomb(0.0)),
+            materials=lambda labels: (material,), object=Plane(), contact_law=ContactLaw(Coulomb(0.0)),
+            is_defined_by_increments=False, design=SimpleNamespace(height_mm=1.0),
         )  # fmt: skip
 
     @property
