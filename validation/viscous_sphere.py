@@ -83,7 +83,7 @@ class StandIn:
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
             materials=lambda labels: (material,), object=Plane(), contact_law=ContactLaw(Coulomb(0.0)),
-            design=SimpleNamespace(height_mm=HEIGHT_MM),
+            design=SimpleNamespace(height_mm=HEIGHT_MM), is_defined_by_increments=False,
         )  # fmt: skip
 
     @property
