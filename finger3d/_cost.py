@@ -68,7 +68,7 @@ class Budget:
 
 
 INCREMENT_ERRORS, CHANGES = Budget(0.15, 0.2), Budget(0.3, 1.0)
-"""Of the errors due to the increments, and of the changes by a better model or by more increments."""
+"""Of the errors due to the increments, and of the changes by a better model."""
 
 
 _LEAST_TETS = 1600.0

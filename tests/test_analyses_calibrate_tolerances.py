@@ -28,7 +28,7 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     """Each slope against two presses of changed scenes, made from scratch."""
     found = calibrate(scene(), "g36", mus=FEW)
     slopes = {t.name: t.slope for t in found.readings[0].tolerances}
-    assert set(slopes) == set(TOLERANCES)
+    assert set(slopes) == set(TOLERANCES) - {"increments"}  # the path is exact
 
     def strain(mu: float, **changes: Any) -> float:
         *_, frame = march(build(replace(scene(**changes).model(), friction=Coulomb(mu))))

@@ -12,11 +12,14 @@ from tests.scenes import HALF_CYLINDER, changed, written
 
 SECTION = changed(HALF_CYLINDER, steps=5, size_mm=0.2)
 
+BAR = ["--set", "object.shape=cylinder", "--set", "object.radius_mm=20.0"]
+"""Under a bar the increments of a section leave an error."""
+
 
 def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
     out = tmp_path / "out"
     scene = written(tmp_path, changed(SECTION, steps="auto"))
-    assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
+    assert main(["press", str(scene), "--out", str(out), "--no-figures", *BAR]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     estimate = summary["step_estimate"]
     assert estimate["met"]
@@ -33,10 +36,20 @@ def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
 
 def test_a_scene_without_steps_is_automatic(tmp_path: Path) -> None:
     scene = written(tmp_path, "".join(t for t in SECTION.splitlines(True) if not t.startswith("steps")))
-    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]) == 0
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures", "--no-error", *BAR]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert summary["scene"]["press"]["steps"] == "auto"
     assert len(summary["steps"]) == summary["step_estimate"]["steps"] >= 20
+
+
+def test_a_section_along_its_exact_path_writes_ten_results_and_has_no_error_of_increments(tmp_path: Path) -> None:
+    scene = written(tmp_path, changed(SECTION, steps="auto"))
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert len(summary["steps"]) == 10
+    assert summary["step_estimate"] is None
+    assert set(summary["error_estimate"]["steps"].values()) == {0.0}
+    assert summary["error_estimate"]["method"].endswith("steps: exact")
 
 
 def test_the_papers_rule_takes_a_fixed_number_of_increments(tmp_path: Path) -> None:

@@ -53,13 +53,13 @@ def test_every_analysis_takes_a_scene_and_overrides(name: str) -> None:
 
 def test_a_calibration_is_estimated_from(tmp_path: Path) -> None:
     calibration = finger3d.calibrate(
-        written(tmp_path, SECTION), "<g>", tmp_path / "cal", mus=(0.05, 0.2, 0.4, 0.8), noise=1e-9
+        written(tmp_path, SECTION), "<g>", tmp_path / "cal", mus=(0.05, 0.15, 0.2, 0.25, 0.4, 0.8), noise=1e-9
     )
     strain = float(np.interp(0.2, calibration.mu, calibration["<g>"].reading))
     for source in (calibration, tmp_path / "cal" / "calibration.json"):
         (found,) = finger3d.estimate(source, strain, tolerances=False)
         assert found.readings == {"<g>": strain}
-        assert found.mu == pytest.approx(0.2, abs=1e-3)
+        assert abs(found.mu - 0.2) <= 0.2 * found.std  # between four values of mu, the curve itself has an error
 
 
 def test_a_comparison_has_its_cases(tmp_path: Path) -> None:

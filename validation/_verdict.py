@@ -192,7 +192,7 @@ CLAIMS = (
         "It measures mu up to 0.5 with 0.1", "Sec. IV", "error of mu = 0.5 by a noise of 1.5e-4, free strain and foil: "
         "at most 0.1",
         {
-            STRAIN: ("fig14_measured", "^error of mu at .5.*plane strain"),
+            STRAIN: ("fig14_measured", "^error of mu at .5.*plane strain$"),
             **_wide("error of mu at .5", "fig14_measured"),
         },
     ),
@@ -200,18 +200,21 @@ CLAIMS = (
         "A second-order equation approximates the strain", "Fig. 14", "largest distance from it over the change of "
         "the strain: at most 0.05",
         {
-            STRAIN: ("fig14_measured", "^a second-order equation.*plane strain"),
+            STRAIN: ("fig14_measured", "^a second-order equation.*plane strain$"),
             **_wide("a second-order equation", "fig14_measured"),
         },
     ),
     Claim(
         "A slow press avoids the effect of viscosity", "Sec. IV", "error of mu = 0.25 by a press of 100 s: at most 0.1",
-        {STRAIN: ("speed_of_a_press", "^error of mu.*in 100 s")},
+        {column: ("speed_of_a_press", f"^error of mu = .25 read in 100 s.*{column}$") for column in (STRAIN, WIDE)},
     ),
     Claim(
-        "The method is applicable to smaller sensors", "Sec. V", "standard deviation of mu = 0.25, R = 5 mm: at "
-        "most 0.1",
-        {WIDE: ("small_fingers", "^standard deviation.*R = 5 mm")},
+        "The method is applicable to smaller sensors", "Sec. V", "standard deviation of mu = 0.25, R = 5, width 6 mm: "
+        "at most 0.1",
+        {
+            WIDE: ("small_fingers", "^standard deviation of mu = 0.25,.*small strain, R = 5 mm"),
+            LARGE: ("small_fingers", "^standard deviation of mu = 0.25,.*large deformation, R = 5 mm"),
+        },
     ),
 )  # fmt: skip
 

@@ -42,7 +42,6 @@ mu = 0.25
 
 [press]
 depth_mm = 10.0
-steps = 40
 
 [model]
 domain = "plane-strain"
@@ -59,8 +58,8 @@ angle_deg = 30.0     # from +x towards +y
 """)
 
 # %% [markdown]
-# The body is condensed once to its contact points. After that, a press with another coefficient of friction costs its
-# increments only. Depth, modulus, tilt and the place of the gauge are not known exactly; each is a tolerance with a
+# The body is condensed once to its contact points. After that, a press with another coefficient of friction costs the
+# solution of contact only. Depth, modulus, tilt and the place of the gauge are not known exactly; each is a tolerance with a
 # standard deviation. Here the gauge has been measured after it was laid, and the finger is well aligned.
 
 # %%
@@ -95,7 +94,7 @@ for true in (0.2, 0.3, 0.4):
     print(found.verdict)
 
 # %% [markdown]
-# The tolerances, the mesh and the increments widen it, since one gauge cannot tell them apart from friction:
+# The tolerances and the mesh widen it, since one gauge cannot tell them apart from friction:
 
 # %%
 for true in (0.2, 0.3, 0.4):

@@ -188,7 +188,7 @@ def _error_bars(bars: ErrorBars) -> PageSection:
 
 
 def _changes(summary: TreeView) -> list[PageSection]:
-    """Return what large deformation and more increments would change, if it was estimated."""
+    """Return what large deformation would change, if it was estimated."""
     out = []
     for key, title in _CHANGES.items():
         found = summary.get(key)

@@ -110,7 +110,7 @@ class LegTable(TomlTable):
     force_N : normal force, in place of the depth, which follows
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
     turn_x_deg, turn_y_deg, turn_z_deg : how it then is turned about its lowest point, about x, then y, then z
-    steps : equal increments; "auto": as many as their estimated error asks for, 1 % of forces and strains
+    steps : equal parts of the leg; "auto": 10 along the exact path of a section, else as errors of 1 % ask for
     duration_s : read only with viscosity
     """
 
