@@ -101,7 +101,8 @@ def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> li
     i, j = int(np.argmin(np.abs(near.y - 40.5))), int(np.argmin(np.abs(near.x - 36.5)))
     at = replace(problem.model.gauges[0], x_mm=36.5, y_mm=40.5)
     other = build(replace(problem.model, gauges=(at,)))
-    row = np.array([other.read(points.frames[mu].meshed_state.contact.force)["g"] for mu in (first, last)])
+    reads = [other.read(points.frames[mu].meshed_state.contact.force) for mu in (first, last)]
+    row = np.array([next(value for column, value in read.items() if column.sensor == "g") for read in reads])
     reduced = ReducedModel.of(problem).press(last).steps[-1].gauges["g"]
     random = np.random.default_rng(20261121)
     count = 4000

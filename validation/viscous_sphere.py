@@ -47,6 +47,7 @@ from ._rows import Result, Row
 Float = NDArray[np.float64]
 
 RADIUS = 100.0
+HEIGHT_MM = 50.0
 DEPTH = 1.0 / RADIUS  # a = 1 mm
 PRONY = ((0.5, 1.0),)
 TABLE = {0.1: 0.0310080, 0.25: 0.1191727, 0.5: 0.3227350, 1.0: 0.8464404, 1.5: 0.7101267, 4.0: 0.5172483}
@@ -82,7 +83,7 @@ class StandIn:
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
             materials=lambda labels: (material,), object=Plane(), contact_law=ContactLaw(Coulomb(0.0)),
-            is_defined_by_increments=False, design=SimpleNamespace(height_mm=1.0),
+            design=SimpleNamespace(height_mm=HEIGHT_MM), is_defined_by_increments=False,
         )  # fmt: skip
 
     @property
@@ -139,7 +140,7 @@ def on_rings(nu: float, count: int) -> StandIn:
 
 def on_tets(nu: float, points: int) -> StandIn:
     """A quarter of a block 100 x 50 x 100 mm, `points` to a."""
-    zone, growth, height = 1.15, 2.0, 50.0
+    zone, growth, height = 1.15, 2.0, HEIGHT_MM
     far = zone + graded(height - zone, growth / points, growth)
     side = np.concatenate([np.linspace(0.0, zone, round(zone * points) + 1), far[1:]])
     mesh = quadratic(box([side, -graded(height, 1.0 / points, growth)[::-1], side]))
