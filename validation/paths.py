@@ -211,12 +211,12 @@ def _draw(figure: Any, found: dict[Any, np.ndarray], costs: Sequence[tuple[Any, 
     for axes, name in ((left, "normal force"), (middle, "friction sum")):
         axes.loglog([10, 10240], [1e-2, 0.1 / 10240], "k:", lw=1)
         axes.set(xlabel="plain increments", ylabel="change from the path", title=f"{name}; dotted: slope -1")
-    left.legend(fontsize=6)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=7)
     places = np.arange(len(costs))
     names = [f"{name}, mu = {mu:g}\n{events} events, {systems} systems" for name, mu, events, systems, *_ in costs]
     for shift, of, label in ((-0.2, 4, "the path alone"), (0.2, 5, "with ten results")):
         right.barh(places + shift, [cost[of] / cost[6] for cost in costs], 0.4, label=label)
     right.axvline(1.0, color="k", lw=0.8, ls=":")
     right.set_yticks(places, names, fontsize=6)
-    right.set(xlabel="time over that of ten plain increments", title="cost")
-    right.legend(fontsize=7)
+    right.set(xlabel="time over ten increments'", title="cost")
+    right.legend(fontsize=7, loc="lower right")
