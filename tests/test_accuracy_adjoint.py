@@ -38,7 +38,7 @@ def sliding(model: Model) -> Model:
 
 
 PLAIN = TwoCoefficients(0.25, 1.0, "keep")
-"""Coulomb's law by a law that is defined by its increments, so that sections have them, too."""
+"""Coulomb's law by one with two equal coefficients, under which sections keep increments."""
 
 MODELS = {
     "section": with_readings(replace(half_cylinder(0.5, steps=4), friction=PLAIN)),

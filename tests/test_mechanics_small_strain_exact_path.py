@@ -72,8 +72,8 @@ def test_a_prescribed_force_is_reached_and_its_depth_gives_it_back() -> None:
     assert by_depth.meshed_state.contact.force == pytest.approx(by_force.meshed_state.contact.force, abs=1e-9)
 
 
-def test_increments_of_a_law_that_is_defined_by_them_converge_to_the_path() -> None:
-    # the same law of friction, solved in plain increments, which are of first order
+def test_increments_of_the_same_law_converge_to_the_path() -> None:
+    # two equal coefficients keep increments
     model = section(friction=Coulomb(0.15), material=Isotropic(1.0, 0.3), legs=(Leg(8.0, steps=1),))
     problem = build(model)
     exact = measure(problem.points, list(march(problem))[-1])["friction_sum_N"]
