@@ -302,7 +302,8 @@ class _Path:
     def _next(self, line: _Line) -> tuple[float, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
         """Return the share up to the next event, and which points touch, reach their limit, and leave there."""
         status, mu = self._set.status, self.problem.friction
-        border = _ZERO * float(np.abs(line.force).max(initial=0.0))
+        # half of what is on the border, so that round-off leaves no point between both
+        border = 0.5 * _ZERO * float(np.abs(line.force).max(initial=0.0))
         (n, t), (dn, dt) = line.force.T, line.force_rate.T
 
         def time(points: NDArray[np.bool_], margin: Float, rate: Float, least: Float | float) -> Float:
@@ -312,7 +313,7 @@ class _Path:
             return out
 
         gap = self.displacement[:, 0]
-        touch = time(status == OPEN, gap, line.displacement_rate[:, 0], _ZERO * self.problem.length_scale)
+        touch = time(status == OPEN, gap, line.displacement_rate[:, 0], 0.5 * _ZERO * self.problem.length_scale)
         leave = time(status != OPEN, n, dn, border)
         stick = status == STICK
         limit = np.minimum(
