@@ -27,6 +27,7 @@ from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Leg
 
+from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, Float, columns, fig9, said
 from ._rows import Result, Row
 
@@ -73,7 +74,7 @@ def run(quick: bool) -> Result:
         problem = fig9(nu, "solid" if model == WIDE else model, size)
         for mu in MUS[1:4:2] if quick else MUS:
             for path, legs in PATHS.items():
-                case = replace(problem, model=replace(problem.model, friction=Coulomb(mu), legs=legs))
+                case = replace(problem, model=replace(problem.model, friction=PlainCoulomb(mu), legs=legs))
                 start = Searched(model, nu, mu, path, case.coupling())
                 found.append(_search(case, start, 5 if quick else STARTS[model], random))
     rows = [*_rows(found), *_one_point(random, 10 if quick else 100)]
