@@ -35,7 +35,7 @@ def test_points_that_close_move_until_they_touch() -> None:
     same, half = Move(last.end, ObjectPose(2.0)), Move(last.end, ObjectPose(1.5))
     assert state.share_until_touch(same) == pytest.approx([0.5, 0.25, 1.0, 1.0, 0.0])
     assert state.share_until_touch(half) == pytest.approx([0.5, 0.25, 0.5, 0.5, 0.0])
-    wanted = np.array([[0.03, 0.0], [-0.015, 0.0], [0.06, 0.0], [0.06, 0.0], [0.0, 0.0]])
+    wanted = np.array([[0.03, 0.2], [-0.015, 0.1], [0.06, 0.4], [0.06, -0.1], [0.0, 0.0]])
     assert state.motion_until_touch(same) == pytest.approx(wanted)
     assert not state.motion_until_touch(Move(last.end, ObjectPose(1.0, slide_x_mm=0.5))).any()
     assert not State(contact, None).motion_until_touch(same).any()

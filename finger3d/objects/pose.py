@@ -14,6 +14,10 @@ _TIME = 3
 """Place of the time among the coordinates of a pose."""
 
 
+_SAME = 0.1
+"""Largest change of direction (rad) between two moves along one path."""
+
+
 @dataclass(frozen=True)
 class ObjectPose:
     """Pose of the object: depth, slides along x and z, and turns (rad) about its reference point, at a time (s).
@@ -84,7 +88,7 @@ class Move:
     def length_ratio(self, before: Move) -> float | None:
         """Return its length over that of the move before; None if the direction changes, or nothing moved before.
 
-        Time is compared only where the object rested before.
+        Time is compared only where the object rested before.  The direction of a slide along an arc counts as the same.
         """
         last, now = before.change, self.change
         in_space = np.arange(len(last)) != _TIME
@@ -93,4 +97,4 @@ class Move:
         if not last.any():
             return None
         ratio = float(now @ last) / float(last @ last)
-        return None if ratio <= 0.0 or not np.allclose(now, ratio * last) else ratio
+        return None if ratio <= 0.0 or np.linalg.norm(now - ratio * last) > _SAME * np.linalg.norm(now) else ratio

@@ -49,8 +49,11 @@ class State(Generic[B]):
         return np.where(self.contact.status == OPEN, np.minimum(share, ratio), 0.0)
 
     def motion_until_touch(self, move: Move) -> Float:
-        """Return the tangential motion (c, d) mm, in x, y, z, of open points over the object until they touch."""
+        """Return the motion (c, d) mm, in x, y, z, of open points relative to the object until they touch.
+
+        Its normal part counts, too, since normals turn as a gap closes.
+        """
         if self.last is None:
             return np.zeros_like(self.contact.force)
-        motion = self.share_until_touch(move)[:, None] * self.last[1][:, 1:]
-        return np.asarray(np.einsum("ct,ctk->ck", motion, self.contact.own_bases[:, 1:]))
+        motion = self.share_until_touch(move)[:, None] * self.last[1]
+        return np.asarray(np.einsum("ca,cak->ck", motion, self.contact.own_bases))
