@@ -153,6 +153,7 @@ class _Path:
         self._set = _ActiveSet(self.state.status, np.sign(self.force[:, 1]))
         self._limit = 1.0 + problem.friction
         self._first = STICK if problem.friction.any() else SLIP  # status of a point that touches
+        self._touched = np.zeros(len(self.force), dtype=bool)  # points that touched last; the next do what these do
         self._landed, self._stride = -1.0, _JUMP  # end and length of the last increment over a jump
 
     def followed(self) -> Outcome:
@@ -306,10 +307,14 @@ class _Path:
         if too_far:
             return Outcome.FORCE_NOT_REACHED
         into = status.copy()
-        into[touch] = self._first
+        into[touch] = self._set.status[self._touched].max(initial=self._first)
         into[limit] = SLIP
         into[leave] = OPEN
-        self._set = _ActiveSet(into, np.where(limit, np.sign(force[:, 1]), sign))
+        towards = np.where(limit, np.sign(force[:, 1]), sign)
+        towards[touch] = -np.sign(line.displacement_rate[touch, 1])
+        self._set = _ActiveSet(into, towards)
+        if touch.any():
+            self._touched = touch
         return Outcome.CONVERGED if ends else None
 
     def _next(self, line: _Line) -> tuple[float, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
