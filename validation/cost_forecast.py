@@ -67,7 +67,8 @@ def run(quick: bool) -> Result:
                     lines += [(name, mesh, *line) for line in _pressed(model, row, forecasts.main)]
         except Finger3dError:
             failed += 1
-    return Result(tuple(_rows(lines, failed, SHARE_IF_QUICK if quick else SHARE)), columns(COLUMNS, lines), lambda figure: _draw(figure, lines))
+    rows = tuple(_rows(lines, failed, SHARE_IF_QUICK if quick else SHARE))
+    return Result(rows, columns(COLUMNS, lines), lambda figure: _draw(figure, lines))
 
 
 def _pressed(model: Model, row: CostRow, names: tuple[str, ...]) -> Iterator[tuple[str, float, float]]:
