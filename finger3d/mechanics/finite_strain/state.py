@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from finger3d.fem.tensors import bases_of
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.relaxation import InternalVariables
 from finger3d.objects import Move, ObjectPose
 
