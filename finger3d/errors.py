@@ -80,8 +80,8 @@ class Outcome(Enum):
         "rule = 'projection' and a constant friction coefficient"
     )
     SLIPS = (
-        "the whole contact slips: the prescribed tangential force is more than friction holds; prescribe a smaller one, "
-        "or a larger normal force"
+        "the whole contact slips: the prescribed tangential force is more than friction holds; prescribe a smaller "
+        "one, or a larger normal force"
     )
     EVENTS = (
         "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"

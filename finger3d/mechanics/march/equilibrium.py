@@ -89,7 +89,8 @@ class PoseSearch:
         while best.ok and (error := self._error(best)) > self.target and self.iterations < _TRIALS:
             fresh = self.stiffness is None
             stiffness = self._differenced(best) if self.stiffness is None else self.stiffness
-            trial = self._step(best, np.linalg.lstsq(stiffness, self.wanted - best.forces, rcond=1e-12)[0])
+            step = np.asarray(np.linalg.lstsq(stiffness, self.wanted - best.forces, rcond=1e-12)[0], dtype=np.float64)
+            trial = self._step(best, step)
             if self._cannot_hold(trial):
                 return self._ended(trial, Outcome.SLIPS)
             lowered = trial.ok and self._error(trial) < error
