@@ -114,8 +114,8 @@ def _check(model: Model) -> None:
         raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{filled}]; take it out")
     if model.is_under_force:
         raise Finger3dError(
-            "--solver calculix: force_N: a deck moves the object by depths and slides; give depth_mm, for instance that "
-            "which `finger3d press` finds, and slides in place of force_x_N and force_z_N"
+            "--solver calculix: force_N: a deck moves the object by depths and slides; give depth_mm, for instance "
+            "what `finger3d press` finds, and slides in place of force_x_N and force_z_N"
         )
     if model.held_ends:
         raise Finger3dError("--solver calculix: ends that are held cannot be written")
