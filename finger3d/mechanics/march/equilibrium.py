@@ -14,11 +14,14 @@ from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.results.state import State
 
-_TRIALS, _HALVINGS = 200, 12
-"""Largest number of trials, and of halvings of a step that does not lower the error."""
+_ITERATIONS, _HALVINGS, _REFUSED = 1000, 6, 12
+"""Largest number of the contact's iterations, of halvings of a step that does not lower the error, and of such steps."""
 
 _LAST_DIGITS = 100.0
 """Largest error that is accepted where round-off keeps it above the target, over the target."""
+
+_STRIDES, _CONSTANT = (1.0, 8.0, 64.0, 512.0, 4096.0), 1e-7
+"""Steps of the differences over the shortest, and change of a force over the scale in that step that counts as none."""
 
 _SLOW = 0.2
 """Ratio of successive errors above which the stiffness is differenced anew."""
@@ -85,8 +88,8 @@ class PoseSearch:
 
     def run(self, start: Float) -> PoseTrial:
         """Return the trial in equilibrium, or the best one with an outcome that says why there is none."""
-        best = self._tried(start, None)
-        while best.ok and (error := self._error(best)) > self.target and self.iterations < _TRIALS:
+        best, refused = self._tried(start, None), 0
+        while best.ok and (error := self._error(best)) > self.target and self.iterations < _ITERATIONS:
             fresh = self.stiffness is None
             stiffness = self._differenced(best) if self.stiffness is None else self.stiffness
             step = np.asarray(np.linalg.lstsq(stiffness, self.wanted - best.forces, rcond=1e-12)[0], dtype=np.float64)
@@ -95,10 +98,13 @@ class PoseSearch:
                 return self._ended(trial, Outcome.SLIPS)
             lowered = trial.ok and self._error(trial) < error
             quick = lowered and self._error(trial) < _SLOW * error
-            self.stiffness = self._updated(stiffness, best, trial) if lowered and (quick or fresh) else None
+            kept = trial.ok and (quick or fresh or refused > 0)
+            self.stiffness = self._updated(stiffness, best, trial) if kept else None
+            # at a kink of the forces the stiffness in the direction of the step is that of the refused trial
+            refused = 0 if lowered else refused + (fresh or refused > 0)
             if lowered:
                 best = trial
-            elif fresh:
+            elif refused > _REFUSED:
                 break
         if not best.ok or self._error(best) <= _LAST_DIGITS * self.target:
             return best
@@ -118,14 +124,21 @@ class PoseSearch:
     def _differenced(self, best: PoseTrial) -> Float:
         """Return the stiffness by differences towards larger or smaller forces, as they are wanted.
 
-        Points that slip may stick if the object moves back, so that the two differ.
+        Points that slip may stick if the object moves back, so that the two differ.  Where all points slip, some one
+        way and some the other, the force along a slide does not change until one of them turns: steps are then longer.
         """
         columns = []
         for k, missing in enumerate(self.wanted - best.forces):
-            step = np.zeros(len(best.place))
-            step[k] = np.copysign(self.stride_mm, missing)
-            trial = self._tried(best.place + step, best)
-            columns.append((trial.forces - best.forces) / step[k] if trial.ok else np.zeros(len(step)))
+            step, column = np.zeros(len(best.place)), np.zeros(len(best.place))
+            for longer in _STRIDES:
+                step[k] = np.copysign(longer * self.stride_mm, missing)
+                trial = self._tried(best.place + step, best)
+                if not trial.ok:
+                    break
+                column = (trial.forces - best.forces) / step[k]
+                if abs(column[k]) * self.stride_mm > _CONSTANT * self.scale_N:
+                    break
+            columns.append(column)
         return np.stack(columns, axis=1)
 
     def _step(self, best: PoseTrial, step: Float) -> PoseTrial:
