@@ -157,7 +157,7 @@ def check_kind(model: Model) -> None:
         raise Finger3dError(f"it was not compared with presses under {names}")
     if not model.object.has_section:  # on coarse meshes its details may keep an increment from settling for minutes
         raise Finger3dError("it was not compared with presses on triangulated objects")
-    if any(leg.force_N is not None for leg in model.legs):
+    if model.is_under_force:
         raise Finger3dError("it was not compared with presses to a force")
     if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
         raise Finger3dError("the result depends on the number of increments")

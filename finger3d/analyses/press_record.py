@@ -15,6 +15,7 @@ from finger3d.contact.friction import OPEN
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import History, StepResult, measure
+from finger3d.mechanics.results.slip_limit import slip_limit
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
@@ -123,6 +124,12 @@ class PressRecord:
         detail = failed.detail and f" ({failed.detail})"
         return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}{detail}"
 
+    def _slip_limit(self) -> Tree | None:
+        """Return what the contact of the last converged increment holds before it slips as a whole."""
+        good = self.converged_steps
+        limit = slip_limit(self.problem.points, good[-1].state, self.problem.model.friction) if good else None
+        return limit.as_dict() if limit else None
+
     def summary(self, outcome: str) -> Tree:
         """Return the content of summary.json."""
         return {
@@ -132,6 +139,7 @@ class PressRecord:
             "warnings": self.warnings,
             "advice": self.advice,
             "steps": [measure(self.problem.points, step) for step in self.steps],
+            "slip_limit": self._slip_limit(),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
             "model_error": {name: found.as_dict() for name, found in self.model_error.items()},

@@ -115,6 +115,7 @@ def press_page(folder: str | Path) -> Path:
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
+        *([_slip_limit(limit)] if (limit := summary.get("slip_limit")) else []),
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
@@ -203,6 +204,23 @@ def _changes(summary: TreeView) -> list[PageSection]:
             title = f"Model error: what {name.replace('_', ' ')} would change"
             out.append(PageSection(title, [text, Table(head, rows)], folded=True))
     return out
+
+
+def _slip_limit(limit: TreeView) -> PageSection:
+    """Return the largest tangential forces and torque that the last contact holds, and the share that it transmits."""
+    names = {
+        "tangential_force_x_N": "net friction along x (N)",
+        "tangential_force_z_N": "net friction along z (N)",
+        "moment_y_Nmm": "moment of friction about the press axis (N mm)",
+    }
+    rows = [(text, limit[key]) for key, text in names.items() if limit[key] is not None]
+    said = (
+        "The largest net friction along x and along z, and the largest moment about the press axis through the centre "
+        "of pressure, each alone, that the last contact transmits before it slips as a whole: every point at its "
+        "friction limit, with its normal force as it is. Together they bound an ellipsoid (Howe and Cutkosky 1996), on "
+        f"which {100.0 * limit['used']:.3g} % of the friction available is used."
+    )
+    return PageSection("How near to slipping", [said, Table(("resultant", "largest"), rows)])
 
 
 def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[PressStep]) -> PageSection:

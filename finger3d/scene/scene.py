@@ -241,7 +241,7 @@ class _Parts:
         way = contact_path(self.design, self.object, legs, domain)
         box, linear = initial_contact(way).contact_box, not set(self.settings) - {"kinetic_friction"}
         # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
-        quick = linear and self.tables.friction.mu > 0.0 and all(leg.force_N is None for leg in self.legs)
+        quick = linear and self.tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in legs)
         return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
