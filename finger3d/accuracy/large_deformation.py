@@ -20,18 +20,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
-from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, built_like, coarser, edge_ratio
-from finger3d.accuracy.cost import forecast
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
-
-_FACTORS = (2.0, 2.83, 4.0)
-"""Edge lengths of the coarse mesh over those of the press; the first that is cheap enough is taken."""
 
 _COARSER_STILL = 2.0
 """Edge lengths of the coarser of both meshes over those of the other."""
@@ -47,7 +43,8 @@ _SAFETY, _LEAST_ERROR = 1.5, 0.15
 def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
     """Estimate what large deformation would change in the last increment of a press in small strain."""
     check_kind(problem.model)
-    factor = _affordable_factor(problem, increments)
+    budget = min(CHANGES.seconds(problem.size.press_s(increments)), LARGE_DEFORMATION_S)
+    factor = affordable_factor(lambda f: _at_large_deformation(_coarse(problem.model, f, _STEPS[0])), budget)
     coarse, change, other = _on_both_meshes(problem, factor)
     numbers = changing_numbers(problem, last)
     errors = {
@@ -61,19 +58,6 @@ def large_deformation(problem: Problem, last: StepResult, increments: int) -> Ch
         f"increments a leg; error: with {_COARSER_STILL:g} times these edges in {_STEPS[1]} increments, and from how "
         "far the coarse press in small strain is from the press",
     )
-
-
-def _affordable_factor(problem: Problem, increments: int) -> float:
-    """Return the edge lengths of the coarse mesh over those of the press.
-
-    The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
-    """
-    budget = min(CHANGES.seconds(problem.size.press_s(increments)), LARGE_DEFORMATION_S)
-    for factor in _FACTORS:
-        cost = forecast(_at_large_deformation(_coarse(problem.model, factor, _STEPS[0])))
-        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget:
-            return factor
-    raise Finger3dError(f"it would take more than {budget:.2g} s")
 
 
 def _on_both_meshes(problem: Problem, factor: float) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
