@@ -98,10 +98,10 @@ def test_elsewhere_they_are_changes_on_a_coarser_mesh(changed_model: Callable[[M
     assert not reason
     changes = {name: abs(x - told[name]) for name, x in press_numbers(*_last(stiff)).items()}
     assert changes
-    for name in ("normal_force_N", "depth_mm", "g", "gauge_g", "external_work_mJ", "taxel_t_MPa"):
-        if changes.get(name, 0.0) > 0.01 * abs(told.get(name, 0.0)):
-            # the change is not linear in E, by up to the spread; edges of 0.4 mm leave errors of some 5 %
-            assert found[name] == pytest.approx(changes[name], rel=SPREAD + 0.05), name
+    for name in set(told) & {"normal_force_N", "depth_mm", "gauge_g", "external_work_mJ", "taxel_t"}:
+        # the change is not linear in E, by up to the spread; edges of 0.4 mm leave errors of some 5 % of it, and more
+        # where it is small, as that of a strain at a given depth
+        assert found.get(name, 0.0) == pytest.approx(changes[name], rel=SPREAD + 0.05, abs=0.02 * abs(told[name])), name
 
 
 @pytest.mark.parametrize("viscous", [False, True])
