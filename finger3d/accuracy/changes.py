@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Tree
+from finger3d.accuracy.cost import forecast
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -26,6 +27,9 @@ _SURE = 1.0 / 3.0
 
 _LEAST_CHANGE = 0.01
 """Least significant change, see `scales`."""
+
+_FACTORS = (2.0, 2.83, 4.0)
+"""Edge lengths of a coarse mesh over those of the press; the first that is cheap enough is taken."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,25 @@ class ChangeEstimate:
     def as_dict(self) -> Tree:
         """Return the entry of summary.json: change, and the ends of its interval, by number."""
         return {name: {"change": c.change, "low": c.low, "high": c.high} for name, c in self.changes.items()}
+
+
+def affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> float:
+    """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget.
+
+    Parameters
+    ----------
+    coarse : function of this factor that returns the model of the coarse press
+
+    Raises
+    ------
+    Finger3dError
+        If all coarse presses cost more.
+    """
+    for factor in _FACTORS:
+        cost = forecast(coarse(factor))
+        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget_s:
+            return factor
+    raise Finger3dError(f"it would take more than {budget_s:.2g} s")
 
 
 def attempted(

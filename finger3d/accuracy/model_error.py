@@ -20,9 +20,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
-from finger3d.accuracy.changes import ChangeEstimate, attempted, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
-from finger3d.accuracy.cost import forecast
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
@@ -30,9 +29,6 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
-
-_FACTORS = (2.0, 2.83, 4.0)
-"""Edge lengths of the coarse mesh over those of the press; the first that is cheap enough is taken."""
 
 _COARSER_STILL = 2.0
 """Edge lengths of the coarser of both meshes over those of the other."""
@@ -123,24 +119,20 @@ class CoarsePresses:
 def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
     """Estimate what large deformation would change in the last increment of a press in small strain."""
     check_kind(problem.model)
-    factor = affordable_factor(problem.model, problem.size.press_s(increments))
+    factor = cheap_factor(problem.model, problem.size.press_s(increments))
     presses = CoarsePresses(problem.model, factor)
     presses.numbers({})
     on = {"large_deformation": at_large_deformation}
     return presses.changes(on, "large_deformation", changing_numbers(problem, last))
 
 
-def affordable_factor(model: Model, press_s: float) -> float:
+def cheap_factor(model: Model, press_s: float) -> float:
     """Return the edge lengths of the coarse mesh over those of a press that takes some seconds.
 
     The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
     """
     budget = min(CHANGES.seconds(press_s), LARGE_DEFORMATION_S)
-    for factor in _FACTORS:
-        cost = forecast(at_large_deformation(coarse_model(model, factor, _STEPS[0])))
-        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget:
-            return factor
-    raise Finger3dError(f"it would take more than {budget:.2g} s")
+    return affordable_factor(lambda factor: at_large_deformation(coarse_model(model, factor, _STEPS[0])), budget)
 
 
 def coarse_model(model: Model, factor: float, steps: int) -> Model:

@@ -16,7 +16,7 @@ import numpy as np
 from finger3d._types import Tree
 from finger3d.accuracy.changes import Change, ChangeEstimate, scales, two_digits
 from finger3d.accuracy.cost import forecast
-from finger3d.accuracy.model_error import CoarsePresses, Enriched, affordable_factor
+from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
 from finger3d.effects import effect_names
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
@@ -167,7 +167,7 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
 def _factor(model: Model) -> float:
     """Return the edge lengths of the coarse presses over those of the scene."""
     expected = forecast(model)
-    return affordable_factor(model, expected["total_s"] - expected["start_s"] - expected["output_s"])
+    return cheap_factor(model, expected["total_s"] - expected["start_s"] - expected["output_s"])
 
 
 def _largest(changes: Mapping[str, Change]) -> tuple[str, float]:

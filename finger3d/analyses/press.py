@@ -252,15 +252,14 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
-    from finger3d.accuracy.modulus import modulus_errors, why_unknown
+    from finger3d.accuracy.modulus import modulus_errors
     from finger3d.accuracy.price import price_of_a_third
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
     found = estimate(record.problem, record.steps, report, press_numbers, runs)
     spread = record.scene.tables.material.constants.spread
-    by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
-    why = why_unknown(record.problem.model) if spread else ""
+    by_modulus, why = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
     third = ""
     if found.discretisation:
