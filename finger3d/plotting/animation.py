@@ -15,9 +15,9 @@ import numpy as np
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.plotting.camera import WINDOW
 from finger3d.plotting.deformed import DeformedFinger, draw_fingers
 from finger3d.plotting.gauges import marks_of
+from finger3d.plotting.renderer import WINDOW
 from finger3d.results.states import States
 
 if TYPE_CHECKING:
