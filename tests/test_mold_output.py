@@ -46,7 +46,7 @@ def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.Monkey
     """With the parts that are in the mold then: the lid of that pour, and all that was cast so far."""
     drawn = {}
     monkeypatch.setattr(
-        "finger3d.mold.output.step_pictures", lambda pictures: drawn.update((p.path.stem, set(p.parts)) for p in pictures)
+        "finger3d.mold.output.step_pictures", lambda shown: drawn.update((p.path.stem, set(p.parts)) for p in shown)
     )
     made = molds["pours"]
     text = write(made, tmp_path)

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.plotting.outlines import middle_section
+from finger3d.plotting.panels import middle_section
 from finger3d.sensor.curve import NOISE
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.geometry.design import Design
 from finger3d.plotting.layout import finish, sheet
-from finger3d.plotting.outlines import middle_section
+from finger3d.plotting.panels import middle_section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
