@@ -2,7 +2,8 @@
 
 The contact is CalculiX's surface to surface penalty.  The object is made of elements behind its surface, all of whose
 nodes are moved.  Sources: CalculiX CrunchiX user's manual 2.20, sec. 6.2 (elements), 6.7.8 (contact), 7 (cards).
-Its hyperelastic energies are those of the isochoric invariants, with the volumetric part (J - 1)^2 / D1, thus D1 = 2 / K.
+Its hyperelastic energies are those of the isochoric invariants, with the volumetric part (J - 1)^2 / D1; hence
+D1 = 2 / K.
 """
 
 from __future__ import annotations
