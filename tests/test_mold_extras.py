@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from finger3d.cli import main
+from finger3d.mold.body import shell, write_step
 from finger3d.mold.export import export
 from finger3d.mold.extras import (
     SIZES,
@@ -24,7 +25,6 @@ from finger3d.mold.extras import (
 )
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.printing import check_print
-from finger3d.mold.shell import shell, write_step
 from finger3d.scene import load, parse, tree
 from tests.mold_cases import scene_of
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from finger3d.mold.body import shell
 from finger3d.mold.fasteners import (
     THIN,
     band_grooves,
@@ -24,7 +25,6 @@ from finger3d.mold.fasteners import (
 from finger3d.mold.layout import layout_of
 from finger3d.mold.options import TONGUE_HEIGHT_MM, MoldOptions
 from finger3d.mold.printing import check_print
-from finger3d.mold.shell import shell
 from finger3d.mold.solids import LEAD_IN
 from tests.bodies import box
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from finger3d.mold.body import Shell, shell
 from finger3d.mold.output import mold_page, write_mold
 from finger3d.mold.parts import Mold
 from finger3d.mold.printing import as_printed, beds
 from finger3d.mold.sheet import pour_lines
-from finger3d.mold.shell import Shell, shell
 from finger3d.progress import Progress
 from tests.bodies import box
 
@@ -61,7 +61,7 @@ def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.Monkey
 def test_parts_and_plate_load_again_in_mm(paper_mold, tmp_path: Path) -> None:
     from lib3mf import Lib3MF
 
-    from finger3d.mold.shell import write_3mf, write_stl
+    from finger3d.mold.body import write_3mf, write_stl
 
     shells = {name: shell(part, 0.05, name) for name, part in paper_mold.parts.items()}
     printed = as_printed(shells)

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
+from finger3d.mold.body import Shell
 from finger3d.mold.parts import Mold
 from finger3d.mold.printing import GAP_MM, as_printed, beds, check_print, islands, thickness
-from finger3d.mold.shell import Shell
 from tests.bodies import box
 from tests.mold_cases import BODIES, FEW, made
 
@@ -71,7 +71,7 @@ def test_what_begins_in_the_air_is_found() -> None:
     """A table upside down is sound, a table with its top first is sound, a hook that hangs down is not."""
     from build123d import Box, Pos
 
-    from finger3d.mold.shell import shell
+    from finger3d.mold.body import shell
 
     hook = Pos(0, 0, 5) * Box(4, 4, 10) + Pos(4, 0, 9) * Box(8, 4, 2) + Pos(7, 0, 6) * Box(2, 4, 6)
     found = islands(shell(hook.solids()[0], 0.1, "hook").surface, 0.5)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from finger3d.materials.silicones import silicone_named
+from finger3d.mold.body import shell
 from finger3d.mold.printing import as_printed
 from finger3d.mold.sheet import close_lines, open_lines, oversize, pour_lines, prepare_lines, sheet, thread_lines
-from finger3d.mold.shell import shell
 
 
 def test_the_steps_name_what_the_mold_has(molds) -> None:

@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING
 
 from finger3d._types import Tree, TreeView
 from finger3d.io import atomic
-from finger3d.mold.carrier import LABEL as CARRIER
-from finger3d.mold.carrier import finger_on_carrier, key_solids
+from finger3d.mold.body import Shell, shell, write_step
+from finger3d.mold.cover import LABEL as CARRIER
+from finger3d.mold.cover import finger_on_carrier, key_solids, openings
 from finger3d.mold.fasteners import coupon, coupon_clearances
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.parts import Mold
-from finger3d.mold.ports import openings
-from finger3d.mold.shell import Shell, shell, write_step
 from finger3d.mold.solids import cylinder, one
 from finger3d.scene import tree
 

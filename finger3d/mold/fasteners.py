@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from finger3d.geometry.surface import Triangles
+from finger3d.mold.cover import base_region
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import BAND_DEPTH_MM, TONGUE_HEIGHT_MM, TONGUE_MM, MoldOptions, standard_length
-from finger3d.mold.ports import base_region
 from finger3d.mold.regions import prisms, rectangle, section, widened
 from finger3d.mold.solids import Feature, between, cylinder, hexagon, one, peg
 

@@ -12,11 +12,11 @@ import numpy as np
 from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
 from finger3d.materials.silicones import Silicone
+from finger3d.mold.body import ANGLE, Shell, shell, write_3mf, write_step, write_stl
 from finger3d.mold.foils import strips
 from finger3d.mold.parts import HALVES, Mold, Pour
 from finger3d.mold.printing import Bed, as_printed, beds, check_print
 from finger3d.mold.sheet import close_lines, open_lines, oversize, pour_lines, prepare_lines, sheet, thread_lines
-from finger3d.mold.shell import ANGLE, Shell, shell, write_3mf, write_step, write_stl
 from finger3d.plotting.mold import StepPicture, kind, picture, separations, standing, step_pictures
 from finger3d.progress import Progress
 from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page

@@ -25,8 +25,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
-from finger3d.mold.body import Body
-from finger3d.mold.carrier import Keys, key_solids, keys
+from finger3d.mold.body import Body, Shell, shell
+from finger3d.mold.cover import Keys, Ports, base_region, key_solids, keys, openings, ports, riser_cup
 from finger3d.mold.demould import Draft, check_opening, undercut_depth
 from finger3d.mold.fasteners import (
     Bolts,
@@ -43,8 +43,6 @@ from finger3d.mold.fasteners import (
 from finger3d.mold.foils import FoilSlot, check_foils, plugs, slot
 from finger3d.mold.layout import Layout, layout_of
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.ports import Ports, base_region, openings, ports, riser_cup
-from finger3d.mold.shell import Shell, shell
 from finger3d.mold.solids import Feature, added, between, common, cuts, one
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.body import Body
+from finger3d.mold.cover import Ports, base_region, openings, ports, riser_cup
 from finger3d.mold.demould import check_opening, undercut_depth
 from finger3d.mold.fasteners import lid_pegs
 from finger3d.mold.foils import FoilSlot, check_foils, slot
@@ -37,7 +38,6 @@ from finger3d.mold.parts import (
     halves_and_features,
     part,
 )
-from finger3d.mold.ports import Ports, base_region, openings, ports, riser_cup
 from finger3d.mold.solids import Feature, common, cylinder, one, peg
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
+from finger3d.mold.body import Shell
 from finger3d.mold.regions import manifold
-from finger3d.mold.shell import Shell
 
 _OPPOSED = -0.9  # cosine between the normals of the two sides of a wall; sharp edges are no walls
 _RAYS = 1500  # of a part

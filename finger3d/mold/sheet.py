@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from finger3d.materials.silicones import Silicone
 from finger3d.mold import casting
+from finger3d.mold.body import Shell
 from finger3d.mold.parts import Mold, Pour
-from finger3d.mold.shell import Shell
 
 
 def prepare_lines(mold: Mold) -> list[str]:
