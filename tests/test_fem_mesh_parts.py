@@ -15,7 +15,8 @@ from finger3d.fem.laws import MooneyRivlin, NeoHooke
 from finger3d.fem.mesh.parts import ElasticityByPart, elasticity_of
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.recovery.patch_recovery import PatchRecovery
-from finger3d.fem.recovery.recover import nodal_fields, strain_and_stress
+from finger3d.fem.recovery.recover import strain_and_stress
+from finger3d.fem.solids.deformed import nodal_fields
 from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian
 from finger3d.fem.solids.material import Elasticity, Isotropic
 from tests.meshes import full, grid

@@ -1,4 +1,4 @@
-"""Fields at the nodes, and the stretch along a direction in a deformed body."""
+"""Fields at the nodes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import quadratic
-from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress, stretch
+from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
 from finger3d.fem.solids.material import Isotropic
 from tests.meshes import grid
 
@@ -51,13 +51,3 @@ def test_the_pressure_of_the_mixed_form_is_added_to_the_normal_stresses() -> Non
     unknowns = np.concatenate([np.zeros(mesh.points.size), pressures])
     _, sigma = strain_and_stress(mesh, unknowns, [law], 0.25)
     np.testing.assert_array_equal(sigma[mesh.vertices], 0.25 * pressures[:, None, None] * np.eye(3))
-
-
-def test_a_uniform_deformation_stretches_every_direction_by_its_gradient() -> None:
-    mesh = quadratic(grid((2, 2)))
-    slope = np.array([[0.3, 0.1], [-0.2, -0.1]])
-    u = mesh.points @ slope.T
-    for angle in (0.0, 0.7, 2.0):
-        direction = np.array([np.cos(angle), np.sin(angle)])
-        expected = np.linalg.norm(direction + slope @ direction) - 1.0
-        assert stretch(mesh, u, np.array([0.4, 0.6]), direction) == pytest.approx(expected, rel=1e-12)

@@ -12,7 +12,8 @@ from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.recovery.recover import displacement, extrapolated, nodal_fields
+from finger3d.fem.recovery.recover import displacement, extrapolated
+from finger3d.fem.solids.deformed import nodal_fields
 from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.fem.tensors import determinant

@@ -77,7 +77,7 @@ class Gauge:
 
     def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
         """Return the relative elongation of the line under displacements u (n, d), mm, of a meshed part."""
-        from finger3d.fem.recovery.recover import stretch
+        from finger3d.fem.solids.deformed import stretch
 
         if self.is_point:
             return stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))
