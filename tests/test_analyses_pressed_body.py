@@ -13,7 +13,6 @@ from finger3d.contact import acceleration
 from finger3d.contact.conditions import ContactProblem
 from finger3d.errors import UnresolvedError
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 from tests.logs import Log
 from tests.sensor_cases import scene
@@ -44,18 +43,6 @@ def test_presses_started_from_their_neighbours_end_where_cold_ones_do(monkeypatc
     assert [p.frame.iterations for p in again] == [1] * len(again)
     far = list(pressing.presses(problem, (0.06, 0.5, 1.0)))  # forces at half the friction would be no help
     assert [p.frame.iterations for p in far] == [pressing.press(problem, p.mu).frame.iterations for p in far]
-
-
-@pytest.mark.parametrize("leg", [{"depth_mm": 6.0, "slide_x_mm": 1.0}, {"force_N": 30.0}], ids=["slide", "force"])
-def test_a_section_under_a_plane_is_pressed_to_its_end_at_once(leg: dict[str, float]) -> None:
-    """Events determine the path, so that stations between its ends change no reading."""
-    legs = [{"depth_mm": 5.0, "steps": 7}, {**leg, "steps": 5}]
-    problem = build(scene(press={"leg": legs}).model())
-    found = pressing.press(problem, 0.3)
-    assert len(found.forces) == 2
-    last = list(march(pressing.under(problem, problem.model.friction.with_mu(0.3))))[-1]
-    assert found.frame.gauges == pytest.approx(last.gauges, rel=1e-9)
-    assert found.frame.dissipation_mJ == pytest.approx(last.dissipation_mJ, rel=1e-9)
 
 
 NARROW = -0.8

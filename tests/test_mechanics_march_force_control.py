@@ -223,6 +223,6 @@ def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.Capture
     assert "0.5 N" in capsys.readouterr().out
     assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
     error = capsys.readouterr().err
-    assert "5000 N asked; the largest force is" in error
+    assert "10000 N asked; the largest force is" in error
     summary = json.loads((tmp_path / "far" / "summary.json").read_text())
     assert "prescribed force is not reached" in summary["outcome"]

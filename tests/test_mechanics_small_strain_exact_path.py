@@ -107,6 +107,28 @@ def test_foils_and_mirrored_sections_follow_it_too() -> None:
     assert ends[0] == pytest.approx(ends[1], rel=1e-8, abs=1e-9)
 
 
+def test_results_between_events_are_those_of_paths_that_end_there() -> None:
+    slides = (0.0, 0.5)
+    problem = build(section(legs=tuple(Leg(8.0, slide_x_mm=slide, steps=5) for slide in slides)))
+    together = list(march(problem))
+    depths = [8.0 * k / 5 for k in range(1, 6)]
+    legs = [*(Leg(depth, steps=1) for depth in depths), *(Leg(8.0, slide_x_mm=0.1 * k, steps=1) for k in range(1, 6))]
+    alone = list(march(replace(problem, model=replace(problem.model, legs=tuple(legs)))))
+    for one, other in zip(together, alone, strict=True):
+        assert press_numbers(problem, one) == pytest.approx(press_numbers(problem, other), rel=1e-9, abs=1e-9)
+        assert one.meshed_state.contact.status.tolist() == other.meshed_state.contact.status.tolist()
+
+
+def test_a_path_that_ends_early_keeps_the_results_before() -> None:
+    problem = build(section(legs=(Leg(8.0, force_N=1e4, steps=100),)))
+    *kept, failed = march(problem)
+    assert failed.outcome is Outcome.FORCE_NOT_REACHED
+    assert "10000 N asked; the largest force is" in failed.detail
+    forces = [measure(problem.points, frame)["normal_force_N"] for frame in kept]
+    assert len(forces) > 2
+    assert forces == pytest.approx([100.0 * k for k in range(1, len(forces) + 1)], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "changes",
     [

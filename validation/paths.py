@@ -111,7 +111,7 @@ def _cost(name: str, problem: Problem, mu: float) -> tuple[Any, ...]:
     found = solve_path(own, start, Move(own.origin, own.model.legs[-1].end(own.origin)))
     runs = ((Coulomb(mu), 1), (Coulomb(mu), 10), (PlainCoulomb(mu), 10))
     spent = [_seconds(lambda law=law, steps=steps: pressed(problem, law, steps)) for law, steps in runs]  # type: ignore[misc]
-    return name, mu, found.events, found.solution.iterations, *spent
+    return name, mu, len(found.events), found.events[-1].systems, *spent
 
 
 def _cost_rows(cost: tuple[Any, ...]) -> list[Row]:

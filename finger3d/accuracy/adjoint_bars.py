@@ -30,7 +30,6 @@ from finger3d.mechanics.march.step_halving import Run
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import RESULTANTS, by_key, pressure_column
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.small_strain.exact_path import ends_only
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
         raise NoAdjointBarsError(f"the contact forces are not unique: {error}") from error
     presses = list(with_coarse_multipliers(short, few))
     changes: dict[str, list[float]] = {name: [] for name in numbers}
-    ends = [(press, list(march(ends_only(press)))[-1]) for press in presses]
+    ends = [(press, list(march(press))[-1]) for press in presses]
     if not any(end.outcome.ok for _, end in ends):
         raise NoAdjointBarsError(f"no press with fewer multipliers converges: {ends[0][1].outcome}")
     for press, end in ends:

@@ -246,6 +246,7 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
     from finger3d.accuracy.modulus import modulus_errors, why_unknown
+    from finger3d.accuracy.price import price_of_a_third
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
@@ -254,7 +255,11 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
     why = why_unknown(record.problem.model) if spread else ""
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
-    record.error_estimate = replace(found, modulus=by_modulus, method=method)
+    third = ""
+    if found.discretisation:
+        solving = sum(record.seconds[stage] for stage in ("assembly", "condensation", "contact"))
+        third = price_of_a_third(record.problem, len(record.steps), solving + found.seconds)
+    record.error_estimate = replace(found, modulus=by_modulus, method=method, third=third)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

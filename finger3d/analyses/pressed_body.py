@@ -32,7 +32,6 @@ from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
-from finger3d.mechanics.small_strain.exact_path import ends_only
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
@@ -105,7 +104,7 @@ def press(
     cancel: Event | None = None,
 ) -> PressAtMu:
     """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
-    problem = ends_only(under(problem, problem.model.friction.with_mu(mu)))
+    problem = under(problem, problem.model.friction.with_mu(mu))
     workspace = workspace or formulation_of(problem.model).workspace()
     before = workspace.factorizations
     if automatic(problem.model):

@@ -31,7 +31,6 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.marker_grid import grid_readings
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.results.penetration import check_surface
-from finger3d.mechanics.small_strain.exact_path import ends_only
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 
@@ -209,7 +208,7 @@ class SharedBody(PressedBody):
         start = time.perf_counter()
         frames: tuple[StepResult, ...] | Exception
         try:
-            problem = ends_only(under(self.problem, variant.friction, variant.legs, variant.rule))
+            problem = under(self.problem, variant.friction, variant.legs, variant.rule)
             frames = march_automatic(problem, workspace, cancel)[0]
         except TROUBLE as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames

@@ -72,11 +72,22 @@ class Resultant:
 
 
 class Event(NamedTuple):
-    """Event on a path: the share of the path, the amplitude under a prescribed resultant, and the state."""
+    """Event on a path.
+
+    Attributes
+    ----------
+    share : of the path
+    amplitude : of the motion under a prescribed resultant
+    state : at the event; the status of a point is the one on the way from the event before
+    residual : largest violation of the contact conditions since the event before, dimensionless
+    systems : number of systems of equations that were solved on the path so far
+    """
 
     share: float
     amplitude: float
     state: ContactState
+    residual: float
+    systems: int
 
 
 class _ActiveSet(NamedTuple):
@@ -111,7 +122,7 @@ def follow(
     Returns
     -------
     solution : at the end of the path; CONVERGED only if the contact conditions hold at every event
-    events : in order; the last one is the end of the path
+    events : in order; the last one is the end of the path, or the place up to which it was followed
     """
     if problem.refusal:
         return ContactSolution(problem.previous, problem.refusal, np.inf, 0, "none"), []
@@ -142,6 +153,7 @@ class _Path:
         self._set = _ActiveSet(self.state.status, np.sign(self.force[:, 1]))
         self._limit = 1.0 + problem.friction
         self._first = STICK if problem.friction.any() else SLIP  # status of a point that touches
+        self._touched = np.zeros(len(self.force), dtype=bool)  # points that touched last; the next do what these do
         self._landed, self._stride = -1.0, _JUMP  # end and length of the last increment over a jump
 
     def followed(self) -> Outcome:
@@ -280,23 +292,29 @@ class _Path:
         """Go along a line up to the next event; return the outcome if the path ends there."""
         status, sign = self._set
         step, touch, limit, leave = self._next(line)
-        ends = self.share + step >= 1.0
-        more = self.resultant
+        ends, more = self.share + step >= 1.0, self.resultant
+        too_far = more is not None and line.amplitude + step * line.amplitude_rate > more.largest
+        if more is not None and too_far:
+            step = max((more.largest - line.amplitude) / line.amplitude_rate, 0.0)
+            touch, limit, leave = (np.zeros_like(touch) for _ in range(3))
         force = line.force + step * line.force_rate
         force[leave] = 0.0
         moved = self.displacement + step * line.displacement_rate
         moved[(status != OPEN) | touch, 0] = 0.0
-        share = 1.0 if ends else self.share + step
-        self._record(force, moved, status, line.amplitude + step * line.amplitude_rate, share)
-        if more is not None and self.amplitude > more.largest:
-            return Outcome.FORCE_NOT_REACHED
-        if self.residual > TOLERANCE:
+        share = 1.0 if ends and not too_far else self.share + step
+        if not self._record(force, moved, status, line.amplitude + step * line.amplitude_rate, share):
             return Outcome.NO_CONVERGENCE
+        if too_far:
+            return Outcome.FORCE_NOT_REACHED
         into = status.copy()
-        into[touch] = self._first
+        into[touch] = self._set.status[self._touched].max(initial=self._first)
         into[limit] = SLIP
         into[leave] = OPEN
-        self._set = _ActiveSet(into, np.where(limit, np.sign(force[:, 1]), sign))
+        towards = np.where(limit, np.sign(force[:, 1]), sign)
+        towards[touch] = -np.sign(line.displacement_rate[touch, 1])
+        self._set = _ActiveSet(into, towards)
+        if touch.any():
+            self._touched = touch
         return Outcome.CONVERGED if ends else None
 
     def _next(self, line: _Line) -> tuple[float, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
@@ -324,14 +342,17 @@ class _Path:
         until = step * (1.0 + 1e-12)
         return step, touch <= until, (limit <= until) & (leave > until), leave <= until
 
-    def _record(self, force: Float, moved: Float, status: Status, amplitude: float, share: float) -> None:
-        """Keep a state, with the residual of the conditions over the way to it."""
+    def _record(self, force: Float, moved: Float, status: Status, amplitude: float, share: float) -> bool:
+        """Keep a state if the contact conditions hold on the way to it; return whether they do."""
         part = np.column_stack([moved[:, 0], moved[:, 1] - self.displacement[:, 1]])
         error = residual(force, part, status, self.problem.friction, self.problem.length_scale)
         self.residual = max(self.residual, error)
+        if error > TOLERANCE:
+            return False
         self.force, self.displacement, self.share, self.amplitude = force, moved, share, amplitude
         self.state = next_state(self.state, force, part, status)
-        self.events.append(Event(share, amplitude, self.state))
+        self.events.append(Event(share, amplitude, self.state, error, self.systems))
+        return True
 
     def _jump(self) -> Outcome | None:
         """Solve a short increment where there are no rates, with a longer one where it has no solution."""
@@ -351,7 +372,8 @@ class _Path:
         if not found.outcome.ok:
             return found.outcome
         moved = self._through_body(found.state.force) + self._start + share * self._rate
-        self._record(found.state.force, moved, found.state.status, 0.0, share)
+        if not self._record(found.state.force, moved, found.state.status, 0.0, share):
+            return Outcome.NO_CONVERGENCE
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
         self._landed, self._stride = share, stride
         return Outcome.CONVERGED if share >= 1.0 else None

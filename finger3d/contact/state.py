@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -74,6 +74,20 @@ class ContactState:
         if self.bases is None:
             raise ValueError("the directions of the points are not known")
         return self.bases
+
+    def towards(self, other: ContactState, t: float) -> ContactState:
+        """Return the state at the share t of a straight way to another state, which has its status."""
+
+        def mean(one: Float, two: Float) -> Float:
+            return one + t * (two - one)
+
+        return replace(
+            other,
+            force=mean(self.force, other.force),
+            gap=mean(self.gap, other.gap),
+            tangential_displacement=mean(self.tangential_displacement, other.tangential_displacement),
+            accumulated_slip=mean(self.accumulated_slip, other.accumulated_slip),
+        )
 
     def of_points(self, points: NDArray[np.intp]) -> ContactState:
         """Return the state of some points (k,)."""

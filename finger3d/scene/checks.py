@@ -62,17 +62,20 @@ def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[s
         return []
     if tables.mesh.tolerance is None:
         return [f"mesh.goal = {shown(goal)}: only with mesh.tolerance, for which the mesh is refined"]
+    names = [*headline_numbers(tables, solid, legs[-1].force_N is not None), "all"]
+    if goal in names:
+        return []
+    return [f"mesh.goal = {shown(goal)}: no number of this press; must be one of {', '.join(names)}"]
+
+
+def headline_numbers(tables: SceneTable, solid: bool, under_force: bool) -> list[str]:
+    """Return the names of the numbers of a press that have error bars; under a force the depth is one of them."""
     dim = 3 if solid else 2
-    # under a force the depth is unknown, and the force is not
-    under_force = legs[-1].force_N is not None
     names = [*MAIN, *AREAS, *RESULTANTS[dim], "external_work_mJ", "dissipation_mJ"]
     names += ["contact_half_length_end_mm"] if solid else []
     names = ["depth_mm", *(n for n in names if n not in GIVEN_BY_FORCE)] if under_force else names
     names += [strain_columns(g.name)[0].key for g in tables.gauge] + [pressure_column(t.name).key for t in tables.taxel]
-    names += [c.key for m in tables.marker for c in displacement_columns(m.name, dim)] + ["all"]
-    if goal in names:
-        return []
-    return [f"mesh.goal = {shown(goal)}: no number of this press; must be one of {', '.join(names)}"]
+    return names + [c.key for m in tables.marker for c in displacement_columns(m.name, dim)]
 
 
 def _names(tables: SceneTable) -> list[str]:

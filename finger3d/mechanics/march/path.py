@@ -29,10 +29,20 @@ class Load:
 
 @dataclass(frozen=True)
 class Station:
-    """End of an increment: the pose of the object, and the force to which the depth is found, if one is prescribed."""
+    """End of an increment.
+
+    Attributes
+    ----------
+    pose : of the object
+    load : the force to which the depth is found, if one is prescribed
+    leg_end : pose at the end of the leg, by default that of the station
+    share : of the leg that ends here
+    """
 
     pose: ObjectPose
     load: Load | None = None
+    leg_end: ObjectPose | None = None
+    share: float = 1.0
 
 
 def stations(legs: tuple[Leg, ...]) -> list[Station]:
@@ -45,7 +55,7 @@ def stations(legs: tuple[Leg, ...]) -> list[Station]:
         poses = [Move(start, end).at(k / count) for k in range(1, count)] + [end]
         for k, pose in enumerate(poses, 1):
             load = None if leg.force_N is None else Load(leg.force_N, k / count, k == 1)
-            out.append(Station(pose, load))
+            out.append(Station(pose, load, end, k / count))
         start = end
     return out
 

@@ -23,7 +23,7 @@ from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.exact_path import NormalForce, has_exact_path, solve_path
+from finger3d.mechanics.small_strain.exact_path import ExactPath, NormalForce, has_exact_path, solve_path
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 
@@ -124,6 +124,9 @@ class Press:
         model = problem.model
         self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
         self._previous: tuple[Move, Float] | None = None
+        self._path: ExactPath | None = None  # of the leg, and the share of it that is reached
+        self._leg: tuple[ObjectPose, float | None] | None = None
+        self._share = 1.0
         self._work = self._dissipation = self._leg_start_N = 0.0
         self._before: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
@@ -154,7 +157,7 @@ class Press:
             parts = [_Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
             end = _Advanced(solutions[-1], parts, station.pose)
         elif self._is_exact:
-            end = self._along_path(move, station.load)
+            end = self._along_path(station)
         elif station.load is None:
             start = self.expected_force(station.pose) if guess is None else guess
             end = self._to_pose(station.pose, start)
@@ -255,11 +258,18 @@ class Press:
         model = self.problem.model
         return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
 
-    def _along_path(self, move: Move, load: Load | None) -> _Advanced:
-        """Advance on the exact path, to a pose or to a prescribed normal force."""
-        force = None if load is None else NormalForce(*self._wanted(load), self._deepest)
-        solution, pose, energies, _ = solve_path(self.problem, self.state, move, force)
-        return _Advanced(solution, [_Substep(self.state, solution.state, Move(self.pose, pose))], pose, energies)
+    def _along_path(self, station: Station) -> _Advanced:
+        """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
+        end, load = station.leg_end or station.pose, station.load
+        path, leg = self._path, (end, None if load is None else load.force_N)
+        if path is None or self._leg != leg or self._share == 1.0:
+            force = NormalForce(self._normal_force(self.state), load.force_N, self._deepest) if load else None
+            path = solve_path(self.problem, self.state, Move(self.pose, end), force)
+            self._path, self._leg, self._share = path, leg, 0.0
+        there = path.between(self._share, station.share)
+        self._share = station.share
+        part = _Substep(self.state, there.solution.state, Move(self.pose, there.pose))
+        return _Advanced(there.solution, [part], there.pose, there.energies)
 
     def _to_force(self, move: Move, load: Load) -> _Advanced:
         """Advance to the depth where the normal force is the prescribed one.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,21 +39,97 @@ class NormalForce:
     largest_depth_mm: float
 
 
-class PathSolution(NamedTuple):
-    """Solution of a path between two poses.
+@dataclass(frozen=True)
+class PathPoint:
+    """Place on a path, and what led there from an earlier one.
 
     Attributes
     ----------
-    solution : at its end, or why it cannot be followed
-    pose : at its end, with the depth that was found under a prescribed force
+    solution : state, and the largest residual on the way; or why the path does not lead there
+    pose : with the depth that was found under a prescribed force
     energies : work of the object and dissipation (mJ) on the way
-    events : number of events on the way
     """
 
     solution: ContactSolution[State[Float]]
     pose: ObjectPose
     energies: tuple[float, float]
-    events: int
+
+
+@dataclass(frozen=True)
+class ExactPath:
+    """Path between two poses, followed from event to event.
+
+    Attributes
+    ----------
+    problem : Problem
+    move : from its start to its end; under a prescribed force without the change of depth
+    start : Event
+    events : in order, up to the end or to where the path could not be continued
+    bases : (c, d, d), directions of the points
+    count : (c,), number of points of the whole finger that each stands for
+    outcome, detail : of the whole path
+    """
+
+    problem: Problem
+    move: Move
+    start: Event
+    events: list[Event]
+    bases: Float
+    count: Float
+    outcome: Outcome
+    detail: str
+
+    def between(self, first: float, last: float) -> PathPoint:
+        """Return the place at the share `last` of the path, reached from that at `first`."""
+        begin, passed = self._at(first)
+        if last > (self.events[-1].share if self.events else -1.0):
+            state = self._state(begin.state)
+            unsolved = self.events[-1].residual if self.outcome.ok else np.inf
+            solution = ContactSolution(state, self.outcome, unsolved, 0, "none", self.detail)
+            return PathPoint(solution, self._pose(begin), (0.0, 0.0))
+        end, done = self._at(last)
+        way = [begin, *self.events[passed:done], end]
+        crossed = self.events[passed : done + 1]
+        residual = max((event.residual for event in crossed), default=0.0)
+        systems = end.systems - begin.systems
+        solution = ContactSolution(self._state(end.state), Outcome.CONVERGED, residual, systems, "events")
+        return PathPoint(solution, self._pose(end), self._energies(way))
+
+    def _at(self, share: float) -> tuple[Event, int]:
+        """Return the state at a share as an event, and the number of events up to there."""
+        done = bisect_right(self.events, share, key=lambda event: event.share)
+        before = self.events[done - 1] if done else self.start
+        if done == len(self.events) or before.share == share:
+            return before, done
+        after = self.events[done]
+        t = (share - before.share) / (after.share - before.share)
+        amplitude = before.amplitude + t * (after.amplitude - before.amplitude)
+        return Event(share, amplitude, before.state.towards(after.state, t), after.residual, after.systems), done
+
+    def _state(self, contact: ContactState) -> State[Float]:
+        body = LinearBody(self.problem.delassus, np.zeros(self.bases.shape[:2]))
+        return State(replace(contact, bases=self.bases), body.displacement(contact.force, self.bases))
+
+    def _pose(self, event: Event) -> ObjectPose:
+        pose = self.move.end if event.share == 1.0 else self.move.at(event.share)
+        return replace(pose, depth_mm=pose.depth_mm + event.amplitude)
+
+    def _energies(self, events: Sequence[Event]) -> tuple[float, float]:
+        """Return work and dissipation (mJ) from first to last event, exact since forces are linear between events.
+
+        What forces on points lose that move relative to the object is dissipated, in slip and where forces jump.
+        """
+        states = [event.state for event in events]
+        forces = np.stack([state.force for state in states])
+        mean = 0.5 * (forces[1:] + forces[:-1]) * self.count[:, None]
+        relative = np.stack([np.column_stack([state.gap, state.tangential_displacement]) for state in states])
+        resultants = np.einsum("eca,cak->ek", mean, self.bases)
+        if "x" in self.problem.axes:  # the halves of a mirrored finger cancel
+            resultants[:, 0] = 0.0
+        shares, depths = (np.diff([getattr(event, name) for event in events]) for name in ("share", "amplitude"))
+        way = shares[:, None] * (self.move.end.displacement - self.move.start.displacement)[: forces.shape[2]]
+        way[:, 1] -= depths
+        return float(np.sum(resultants * way)), -float(np.sum(mean * np.diff(relative, axis=0)))
 
 
 def has_exact_path(model: Model) -> bool:
@@ -72,22 +149,13 @@ def has_exact_path(model: Model) -> bool:
     )
 
 
-def ends_only(problem: Problem) -> Problem:
-    """Return the problem with one station a leg where its path is exact, as only the ends are wanted; else as it is."""
-    if not has_exact_path(problem.model):
-        return problem
-    legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
-    return replace(problem, model=replace(problem.model, legs=legs))
-
-
-def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalForce | None = None) -> PathSolution:
-    """Advance a state as the object moves straight from one pose to another.
+def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalForce | None = None) -> ExactPath:
+    """Follow the path on which the object moves straight from one pose to another.
 
     Under a prescribed force the depth at the end of the move is not used.
     """
     if force is not None:
         move = Move(move.start, replace(move.end, depth_mm=move.start.depth_mm))
-    body = LinearBody(problem.delassus, np.zeros_like(state.body))
     d = state.body.shape[1]
 
     def free_displacement(pose: ObjectPose) -> tuple[Float, Float]:
@@ -124,17 +192,13 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
             largest=force.largest_depth_mm - move.start.depth_mm,
         )
     found, events = follow(contact, resultant)
-    if not found.outcome.ok:
-        detail = found.detail
-        if found.outcome is Outcome.EVENTS:
-            detail = _place_of_change(problem, events)
-        elif force and found.outcome is Outcome.FORCE_NOT_REACHED:
-            detail = _shortfall(force, move, events)
-        return PathSolution(replace(found.with_state(state), detail=detail), move.start, (0.0, 0.0), len(events))
-    after = State(replace(found.state, bases=bases), body.displacement(found.state.force, bases))
-    pose = replace(move.end, depth_mm=move.end.depth_mm + events[-1].amplitude)
-    energies = _energies(problem, count, start, bases, move, events)
-    return PathSolution(found.with_state(after), pose, energies, len(events))
+    detail = found.detail
+    if found.outcome is Outcome.EVENTS:
+        detail = _place_of_change(problem, events)
+    elif force and found.outcome is Outcome.FORCE_NOT_REACHED:
+        detail = _shortfall(force, move, events)
+    begin = Event(0.0, 0.0, start, 0.0, 0)
+    return ExactPath(problem, move, begin, events, bases, count, found.outcome, detail)
 
 
 def _place_of_change(problem: Problem, events: list[Event]) -> str:
@@ -156,24 +220,3 @@ def _shortfall(force: NormalForce, move: Move, events: list[Event]) -> str:
 def _along(bases: Float, displacement: Float) -> Float:
     """Return the tangential components (c, d - 1) of displacements (c, d)."""
     return np.asarray(np.einsum("ctk,ck->ct", bases[:, 1:], displacement))
-
-
-def _energies(
-    problem: Problem, count: Float, start: ContactState, bases: Float, move: Move, events: list[Event]
-) -> tuple[float, float]:
-    """Return work and dissipation (mJ), exact since forces are linear between events.
-
-    What forces on points lose that move relative to the object is dissipated, in slip and where forces jump.
-    """
-    states = [start, *(event.state for event in events)]
-    forces = np.stack([state.force for state in states])
-    mean = 0.5 * (forces[1:] + forces[:-1]) * count[:, None]
-    relative = np.stack([np.column_stack([state.gap, state.tangential_displacement]) for state in states])
-    resultants = np.einsum("eca,cak->ek", mean, bases)
-    if "x" in problem.axes:  # the halves of a mirrored finger cancel
-        resultants[:, 0] = 0.0
-    shares = np.diff([0.0, *(event.share for event in events)])
-    depths = np.diff([0.0, *(event.amplitude for event in events)])
-    way = shares[:, None] * (move.end.displacement - move.start.displacement)[: forces.shape[2]]
-    way[:, 1] -= depths
-    return float(np.sum(resultants * way)), -float(np.sum(mean * np.diff(relative, axis=0)))
