@@ -1,12 +1,11 @@
 """Does the speed of a press change the friction coefficient that a gauge reads, in a rubber that relaxes?
 
 Source: Maeno 2004, Sec. IV: "this experiment is performed by increasing the indentation slowly to avoid the effect of
-viscosity of the sensor". The relaxation of rubbers is given as a share of the stress per decade of time, a few per cent
-(Lindley 1978); a Prony series with 2, 5 or 10 % in each decade from 1 ms to 1000 s stands for it, since no series of a
-silicone was found with its numbers. The finger of Fig. 9 (nu = 0.49 at once) is calibrated by presses of 10 s and read
-in presses of 0.1 to 1000 s: at the same depth and at the same force; with all moduli relaxing, and in the section with
-the shear modulus alone, where Poisson's ratio grows. The section has the paper's gauge, the finger 20 mm wide the gauge
-that design_search.py finds best, at x = 6 mm and 85 degrees.
+viscosity of the sensor". No relaxation of a silicone was found with its numbers, so that the stress is assumed to relax
+by 2, 5 or 10 % in each decade of time, by a Prony series from 1 ms to 1000 s. The finger of Fig. 9 (nu = 0.49 at once)
+is calibrated by presses of 10 s and read in presses of 0.1 to 1000 s: at the same depth and at the same force; with all
+moduli relaxing, and in the section with the shear modulus alone, where Poisson's ratio grows. The section has the
+paper's gauge, the finger 20 mm wide the gauge that design_search.py finds best, at x = 6 mm and 85 degrees.
 """
 
 from __future__ import annotations
