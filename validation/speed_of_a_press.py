@@ -159,10 +159,13 @@ def _draw(figure: Any, found: Found) -> None:
                               color="#2166ac" if control == DEPTH else "#b2182b", lw=0.5 + 12.0 * rate)  # fmt: skip
         axes.axhspan(-0.1, 0.1, color="#eeeeee", lw=0)
         axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
-        axes.legend(frameon=False, fontsize=8)
+        shares = sorted({100.0 * key[3] for key in found if key[0] == model})
+        title = f"{', '.join(f'{share:g}' for share in shares)} % per decade{', thin to thick' if shares[1:] else ''}"
+        axes.legend(title=title, title_fontsize=8, frameon=False, fontsize=8)
     for (name, control, bulk, rate), reads in found.items():
         if name == models[0] and control == DEPTH and bulk:
             panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
                                 label=f"{100.0 * rate:g} % per decade")  # fmt: skip
-    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s")
+    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s",
+                   title=f"{models[0]}, all moduli")  # fmt: skip
     panels[-1].legend(frameon=False, fontsize=8)
