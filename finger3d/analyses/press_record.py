@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
+    from finger3d.analyses.effects_by_need import Need
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate
@@ -53,7 +54,8 @@ class PressRecord:
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
     largest_strain : principal strain at the end, without singular corners
-    large_deformation : what it would change, where it may matter
+    need : which effects are on because the scene calls for them, if it leaves that open
+    model_error : what the effects that are off would change, by name
     warnings, advice : lines for the user
     seconds : time by stage, s
     workspace : factors that increments leave for the next, those of the error estimate not among them
@@ -69,7 +71,8 @@ class PressRecord:
     step_estimate: StepEstimate | None = None
     error_estimate: ErrorEstimate | None = None
     largest_strain: float = 0.0
-    large_deformation: ChangeEstimate | None = None
+    need: Need | None = None
+    model_error: Mapping[str, ChangeEstimate] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -139,7 +142,9 @@ class PressRecord:
             "slip_limit": self._slip_limit(),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
-            "large_deformation_estimate": self.large_deformation.as_dict() if self.large_deformation else None,
+            "model_error": {name: found.as_dict() for name, found in self.model_error.items()},
+            "model_error_methods": {name: found.method for name, found in self.model_error.items()},
+            "effects_auto": self.need.as_dict() if self.need else None,
             "refinement": self.refinement.as_dict() if self.refinement else None,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": _mesh(self.problem),

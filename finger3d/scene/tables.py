@@ -289,6 +289,19 @@ class SceneTable(TomlTable):
     effects: Tree = {}
 
 
+class AutoTable(TomlTable):
+    """[effects] itself: whether the effects that it names are used only where they are needed.
+
+    Attributes
+    ----------
+    auto : use large deformation and each effect named below only if it changes a number by more than the tolerance
+    auto_tolerance : relative; mesh.tolerance unless given, else 0.02
+    """
+
+    auto: bool = False
+    auto_tolerance: Annotated[float, Gt(0), Lt(1)] | None = None
+
+
 class FileTable(TomlTable):
     """[finger] with a STEP or STL file as its geometry: all dimensions are the file's.
 
