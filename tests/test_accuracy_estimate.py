@@ -32,8 +32,9 @@ from tests.scenes import HALF_CYLINDER, changed, solid
 
 SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 
-UNRESOLVED = 0.005
-"""Relative error below which one comparison of two runs may agree by chance, as points close one by one."""
+UNRESOLVED = 0.002
+"""Relative error below which one comparison of two runs may agree by chance, as points close one by one: with five
+increments the error is 0.19 %, and twice its estimate 0.18 %."""
 
 
 def barred(size: float, **changes: int) -> Model:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, DeckStep
-from finger3d.analyses.calculix.laws import law_cards
+from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, DeckStep, law_cards
 from finger3d.analyses.calculix.objects import object_elements
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError

@@ -18,7 +18,7 @@ from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
-from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
+from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space

@@ -15,7 +15,7 @@ from finger3d.errors import Outcome
 from finger3d.mechanics.results.state import State
 
 _ITERATIONS, _HALVINGS, _REFUSED = 1000, 6, 12
-"""Most iterations of the contact, halvings of a step that does not lower the error, and steps of that kind."""
+"""Most iterations of the contact, halvings of a step that does not lower the error, and such steps."""
 
 _LAST_DIGITS = 100.0
 """Largest error that is accepted where round-off keeps it above the target, over the target."""
