@@ -13,6 +13,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
+from finger3d.mechanics.results.zones import Zone
 from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
 from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
 
@@ -30,11 +31,15 @@ _ARROW_LENGTH = 0.045  # of the longest arrow, relative to the largest extent of
 _ARROW_SPACINGS = 1.6  # largest length of an arrow, in multiples of the distance between arrows
 _ARROW_COUNT = 100.0  # approximate number of arrows
 
-# A quadratic facet is split into six triangles: one at each corner, with its status, and three around the centre (node
-# 6), which have the status that most corners have. A boundary of a status is thus straight across a facet.
+# A quadratic facet is split into six triangles by a point of each side, where the status changes: one at each corner,
+# with its status, and three around their centre (node 6), which have the status that most corners have. A boundary of a
+# status is thus straight across a facet.
 _SIX = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 6], [4, 5, 6], [5, 3, 6]])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
+
+_SHARES = 0.02, 0.98
+"""Least and largest share of a side in a status: all triangles have an area."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ def skin_of(
     nodes: Int,
     faces: Int,
     thing: Float | None = None,
+    zones: tuple[Zone, Zone] | None = None,
 ) -> Skin:
     """Return the skin of a deformed solid.
 
@@ -126,6 +132,7 @@ def skin_of(
         Nodes of the contact points, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces.
     thing : (t, 3, 3) array, mm
         Corners of the object's triangles, or None.
+    zones : of contact and of stick, which say where the status changes between two contact points; None: midway
     """
     moved = mesh.points + u
     touched = [FREE_FACES[k] for k in np.union1d(faces, CONTACT) if len(mesh.facets.get(FREE_FACES[k], ()))]
@@ -133,7 +140,9 @@ def skin_of(
     parts = []
     for label in touched:
         own = faces == FREE_FACES.index(label)
-        parts.append(_coloured(mesh.facets[label], moved, nodes[own], pressure[own], status[own]))
+        point = np.full(len(moved), -1)
+        point[nodes[own]] = np.flatnonzero(own)
+        parts.append(_coloured(mesh.facets[label], moved, point, pressure, status, zones))
     contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
     rims = [_rim(mesh.facets[label]) for label in touched]
@@ -156,23 +165,49 @@ def skin_of(
 
 
 def _coloured(
-    facets: Int, moved: Float, nodes: Int, pressure: Float, status: Int
+    facets: Int, moved: Float, point: Int, pressure: Float, status: Int, zones: tuple[Zone, Zone] | None
 ) -> tuple[Float, Float, NDArray[np.int64]]:
-    """Return the triangles (t, 3, 3) of a face, and pressure (t, 3) and status (t,) on them."""
-    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
-    value[nodes], state[nodes] = pressure, status
-    corner = value[facets[:, :3]]
-    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
-    seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
-    rings = _six_nodes(facets, moved)
-    # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
-    centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
-    points = np.concatenate([rings, centre[:, None]], axis=1)
+    """Return the triangles (t, 3, 3) of a face, and pressure (t, 3) and status (t,) on them.
+
+    `point` is the number (n,) of the contact point at each node, -1 where there is none.
+    """
+    at = point[facets[:, :3]]
+    corner = np.where(at >= 0, pressure[at], 0.0)
+    place = np.zeros((len(facets), len(_RING) + 1, 3))  # of the corners, of a point of each side, of their centre
+    place[:, :3] = np.eye(3)
+    for side, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+        share = border_shares(at[:, [i, j]], status, zones)
+        place[:, 3 + side, i], place[:, 3 + side, j] = 1.0 - share, share
+    place[:, 6] = place[:, 3:6].mean(axis=1)
+    shapes = np.concatenate([place * (2.0 * place - 1.0), 4.0 * place * np.roll(place, -1, axis=2)], axis=2)
     return (
-        points[:, _SIX].reshape(-1, 3, 3),
-        seven[:, _SIX].reshape(-1, 3),
-        _status_on_six(state[facets[:, :3]]).ravel(),
+        (shapes @ _six_nodes(facets, moved))[:, _SIX].reshape(-1, 3, 3),
+        np.einsum("fpc,fc->fp", place, corner)[:, _SIX].reshape(-1, 3),
+        _status_on_six(np.where(at >= 0, status[at], OPEN)).ravel(),
     )
+
+
+def border_shares(pairs: Int, status: Int, zones: tuple[Zone, Zone] | None) -> Float:
+    """Return where the status changes on the way from one contact point to another, (k,) shares of it.
+
+    Parameters
+    ----------
+    pairs : (k, 2) contact points; -1: none, an open place whose gap is not known
+    zones : of contact and of stick; None: midway
+    """
+    shares = np.full(len(pairs), 0.5)
+    if zones is None:
+        return shares
+    state = np.where(pairs >= 0, status[pairs], OPEN)
+    known = (pairs >= 0).all(axis=1) & (state[:, 0] != state[:, 1])
+    contact, stick = zones
+    for zone in (contact, stick):  # a border of stick counts, where it is that of contact, too
+        for inner, outer in ((0, 1), (1, 0)):
+            on = np.flatnonzero(known)
+            on = on[zone.inside[pairs[on, inner]] & ~zone.inside[pairs[on, outer]]]
+            share = np.clip(zone.share(pairs[on, inner], pairs[on, outer]), *_SHARES)
+            shares[on] = share if inner == 0 else 1.0 - share
+    return shares
 
 
 def _status_on_six(corner: Int) -> Int:
