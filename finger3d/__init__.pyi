@@ -2,6 +2,7 @@
 
 from finger3d.analyses.calibrate.run import calibrate as calibrate
 from finger3d.analyses.compare.run import compare as compare
+from finger3d.analyses.cost import cost as cost
 from finger3d.analyses.identify.run import identify as identify
 from finger3d.analyses.optimise.gauge_run import place_gauges as place_gauges
 from finger3d.analyses.optimise.run import optimise as optimise

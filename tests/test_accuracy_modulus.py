@@ -18,7 +18,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.geometry.registry import designs
-from finger3d.materials.shore import SPREAD_A
+from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Taxel
 from tests.models import half_cylinder, run

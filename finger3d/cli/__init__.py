@@ -17,6 +17,7 @@ from finger3d._machine import enough_address_space
 from finger3d.cli import (  # noqa: F401
     calibrate,
     compare,
+    cost,
     estimate,
     export,
     identify,

@@ -1,0 +1,50 @@
+"""Price of smaller error bars: time and memory of the same press with a third of them."""
+
+from __future__ import annotations
+
+from finger3d._cost import BASE_MB, FIGURES_S, START_S, PressSize, meshing_s, rows_gb
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.limits import check_memory
+
+ORDER = 1.1
+"""Usual order at which error bars fall with the edge length; bodies have bonded corners."""
+
+_FACTOR = (1.0 / 3.0) ** (1.0 / ORDER)
+
+
+def price_of_a_third(problem: Problem, increments: int, seconds: float) -> str:
+    """Return seconds, memory and edge lengths of the press with a third of its error bars, in one line.
+
+    Parameters
+    ----------
+    increments : of the press
+    seconds : that it took without meshing and output, its error bars included
+
+    Returns
+    -------
+    str
+        Empty where the mesh has no edge lengths to choose: it is given, or graded towards a number.
+    """
+    model, own = problem.model, problem.size
+    if isinstance(model.design, GivenMesh) or model.mesh.grading:
+        return ""
+    finer = PressSize(own.dim, own.dofs * _FACTOR**-own.dim, own.contact_points * _FACTOR ** (1 - own.dim))
+
+    def solving(size: PressSize) -> float:
+        each = size.contact_s + (size.finite_strain_s if model.finite_strain else 0.0)
+        return size.assembly_s + size.condensation_s + increments * each
+
+    meshing = 0.0
+    if own.dim == 3 and model.mesh.mesher == "ftetwild":
+        meshing = meshing_s(problem.body.report.cells * _FACTOR**-own.dim)
+    needed = seconds * solving(finer) / solving(own) + START_S + meshing + FIGURES_S[own.dim]
+    memory = 1e-3 * (finer.factor_mb + BASE_MB) + rows_gb(own.dim * finer.contact_points)
+    size, base = (_FACTOR * length for length in (model.mesh.size_mm, model.mesh.base_size_mm))
+    where = f"mesh.size_mm = {size:.3g}, mesh.base_size_mm = {base:.3g}"
+    try:
+        check_memory(memory, "a third of the error bars")
+    except Finger3dError:
+        return f"{memory:.2g} GB, more than this machine has ({where})"
+    return f"about {needed:.2g} s and {memory:.2g} GB ({where})"

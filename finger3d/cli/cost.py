@@ -1,0 +1,65 @@
+"""Command ``cost``: what accuracy costs for a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
+from finger3d.errors import Finger3dError
+
+_MOST_NAMES = 6
+"""Largest number of names that are listed."""
+
+
+@app.command
+def cost(
+    scene: Path,
+    /,
+    *,
+    of: Annotated[
+        str | None,
+        Parameter(help="Numbers whose errors are meant, separated by commas, or all; default: the normal force."),
+    ] = None,
+    png: Annotated[Path | None, Parameter(help="Draw the errors against the time.")] = None,
+    set_: Set = None,
+    json_: Json = False,
+) -> None:
+    """Forecast edge lengths, time and memory for errors of 10, 3, 1 and 0.3 %, from two coarse presses.
+
+    Example: finger3d cost scene.toml --of stick_area_mm2,gauge_g36 --png cost.png
+
+    Parameters
+    ----------
+    scene
+        The scene file (TOML).
+    """
+    if png is not None and png.suffix.lower() != ".png":
+        raise Finger3dError(f"--png {png}: the name must end in .png")
+    loaded = load(scene, set_)
+    from finger3d.analyses.cost import cost as run
+
+    with job(json_, lambda done: "a forecast keeps nothing") as report:
+        found = run(loaded, [name.strip() for name in of.split(",")] if of else [], png, report)
+    if json_:
+        print_json(found.as_dict())
+        return
+    head, *lines = found.table()
+    print_columns(head, lines)
+    print(f"meshes are chosen for the errors of {_names(found.of)}; expected errors of mesh and increments")
+    for row in found.rows:
+        if row.limit:
+            print(f"{100 * (row.error or 0.0):g} %: {row.limit}")
+    print("to press on the mesh of a row, add:")
+    for row in found.rows:
+        if row.error is not None and row.dofs:
+            print(f"  {100 * row.error:g} %: " + " ".join(f"--set {key}" for key in row.keys))
+    if png is not None:
+        print(f"{png} written")
+
+
+def _names(of: Sequence[str]) -> str:
+    return ", ".join(of) if len(of) <= _MOST_NAMES else f"all {len(of)} numbers"

@@ -1,0 +1,98 @@
+"""Forecasts of what accuracy costs: against a press on the mesh of a row, their rates, limits, and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import finger3d
+from finger3d.accuracy.estimate import estimate, press_numbers
+from finger3d.accuracy.refine import relative_error
+from finger3d.accuracy.richardson import kinds_of
+from finger3d.analyses.cost import ERRORS, Forecasts, _scaled
+from finger3d.analyses.pressed_body import PressedBody
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from tests.sensor_cases import scene
+
+BASE = {
+    "model": {"domain": "plane-strain"},
+    "mesh": {"size_mm": 1.0, "base_size_mm": 4.0},
+    "friction": {"mu": 0.4},
+}
+
+
+def test_a_press_on_the_mesh_of_the_scene_has_the_errors_that_are_expected() -> None:
+    given = scene(**BASE)
+    (own, *_) = finger3d.cost(given).rows
+    problem = PressedBody(given.model()).problem
+    steps = PressedBody(given.model(), problem=problem).steps()
+    bars = estimate(problem, steps, numbers=press_numbers).totals()
+    numbers, kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)
+    for name in ("normal_force_N", "friction_sum_N", "stick_area_mm2", "gauge_g36", "external_work_mJ"):
+        ratio = own.errors[name] / relative_error(numbers, kinds, name, bars[name])
+        assert 0.4 < ratio < 2.5, name  # a factor 2 in eight of ten is what the study cost_forecast measures
+    assert own.dofs == pytest.approx(problem.size.dofs, rel=0.1)
+
+
+def test_a_smaller_error_takes_shorter_edges_and_more_time() -> None:
+    found = finger3d.cost(scene(**BASE), of=["stick_area_mm2"])
+    assert found.of == found.names == ("stick_area_mm2",)
+    rows = found.rows[1:]
+    assert [row.error for row in rows] == list(ERRORS)
+    reached = [row for row in rows if row.dofs]
+    assert len(reached) >= 3
+    for row in reached:
+        assert row.errors["stick_area_mm2"] <= row.error * (1.0 + 1e-3)  # edges have four digits
+    sizes, unknowns, seconds = (
+        [f(row) for row in reached] for f in (lambda r: r.mesh.size_mm, lambda r: r.dofs, lambda r: r.seconds)
+    )
+    assert sizes == sorted(sizes, reverse=True)
+    assert unknowns == sorted(unknowns)
+    assert seconds == sorted(seconds)
+
+
+def test_a_mesh_beyond_the_memory_says_so() -> None:
+    forecasts = Forecasts.of(scene(mesh={"size_mm": 3.0, "base_size_mm": 8.0, "mesher": "swept"}).model())
+    row = forecasts.wanted(1e-5, ["normal_force_N"])
+    assert "GB" in row.limit or row.limit == "out of reach"
+    assert not row.dofs
+
+
+def test_increments_shrink_with_the_error_that_they_leave() -> None:
+    curved = scene(**BASE, object={"shape": "cylinder", "radius_mm": 40.0}, press={"depth_mm": 6.0, "steps": 3})
+    forecasts = Forecasts.of(curved.model())
+    few, many = (forecasts.wanted(error, ["friction_sum_N"]) for error in (0.1, 2e-4))
+    assert few.increments == 3
+    assert many.increments > 3
+    assert f"press.steps={many.increments}" in many.keys
+
+
+def test_edges_of_all_meshes_are_in_proportion() -> None:
+    model = scene(**BASE).model()
+    for factor in (0.25, 2.0):
+        mesh = _scaled(model, factor)
+        assert (mesh.size_mm, mesh.base_size_mm) == (factor * 1.0, factor * 4.0)
+
+
+def test_numbers_and_meshes_that_have_no_forecast_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(Finger3dError, match="of = 'force': no number of this press; must be one of normal_force_N, "):
+        finger3d.cost(scene(**BASE), of=["force"])
+
+
+def test_the_command_prints_a_table_json_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, png = tmp_path / "scene.toml", tmp_path / "cost.png"
+    path.write_text(scene(**BASE).to_toml())
+    assert main(["cost", str(path), "--of", "gauge_g36,stick_area_mm2", "--png", str(png)]) == 0
+    text = capsys.readouterr().out
+    for words in ("this mesh", "0.3 %", "stick area mm2", "--set mesh.size_mm="):
+        assert words in text
+    assert png.stat().st_size > 10_000
+    assert main(["cost", str(path), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [row["error"] for row in data["rows"]] == [None, *ERRORS]
+    assert set(data["of"]) == {"normal_force_N", "friction_sum_N", "gauge_g36", "gauge_long"}
+    assert main(["cost", str(path), "--png", "cost.jpg"]) == 2
+    assert main(["cost", str(path), "--of", "gauge"]) == 2
