@@ -10,7 +10,7 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.mechanics.results.zones import Zone
+from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting import solid as render
 from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger, top
 
@@ -99,6 +99,4 @@ def test_borders_cross_the_sides_of_a_facet_where_the_zones_have_them(quadratic:
 
 def test_a_border_beside_a_place_without_contact_point_is_midway() -> None:
     zones = tuple(Zone(np.array([True, True]), lambda last, beyond: np.full(len(last), 0.9)) for _ in range(2))
-    assert render.border_shares(np.array([[0, -1], [0, 1]]), np.array([STICK, STICK]), zones) == pytest.approx(
-        [0.5, 0.5]
-    )
+    assert border_shares(np.array([[0, -1], [0, 1]]), np.array([STICK, STICK]), zones) == pytest.approx([0.5, 0.5])

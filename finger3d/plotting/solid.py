@@ -13,7 +13,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
-from finger3d.mechanics.results.zones import Zone
+from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting.renderer import (
     AXES,
     WINDOW,
@@ -50,9 +50,6 @@ _ARROW_COUNT = 100.0  # approximate number of arrows
 _SIX = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 6], [4, 5, 6], [5, 3, 6]])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
-
-_SHARES = 0.02, 0.98
-"""Least and largest share of a side in a status: all triangles have an area."""
 
 
 @dataclass(frozen=True)
@@ -198,29 +195,6 @@ def _coloured(
         np.einsum("fpc,fc->fp", place, corner)[:, _SIX].reshape(-1, 3),
         _status_on_six(np.where(at >= 0, status[at], OPEN)).ravel(),
     )
-
-
-def border_shares(pairs: Int, status: Int, zones: tuple[Zone, Zone] | None) -> Float:
-    """Return where the status changes on the way from one contact point to another, (k,) shares of it.
-
-    Parameters
-    ----------
-    pairs : (k, 2) contact points; -1: none, an open place whose gap is not known
-    zones : of contact and of stick; None: midway
-    """
-    shares = np.full(len(pairs), 0.5)
-    if zones is None:
-        return shares
-    state = np.where(pairs >= 0, status[pairs], OPEN)
-    known = (pairs >= 0).all(axis=1) & (state[:, 0] != state[:, 1])
-    contact, stick = zones
-    for zone in (contact, stick):  # a border of stick counts, where it is that of contact, too
-        for inner, outer in ((0, 1), (1, 0)):
-            on = np.flatnonzero(known)
-            on = on[zone.inside[pairs[on, inner]] & ~zone.inside[pairs[on, outer]]]
-            share = np.clip(zone.share(pairs[on, inner], pairs[on, outer]), *_SHARES)
-            shares[on] = share if inner == 0 else 1.0 - share
-    return shares
 
 
 def _status_on_six(corner: Int) -> Int:
