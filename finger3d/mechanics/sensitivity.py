@@ -140,9 +140,8 @@ def _reading_rows(problem: Problem, body: MeshedBody) -> sp.csr_matrix:
     return sp.vstack(wide, format="csr") if wide else sp.csr_matrix((0, size))
 
 
-def refusal(problem: Problem) -> str:
+def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    model = problem.model
     if not has_exact_path(model):
         return (
             "derivatives need an exact path: a section (model.domain), in small strain, under a plane that never turns"
@@ -164,7 +163,7 @@ def derivatives(problem: Problem, variations: Sequence[Variation]) -> tuple[list
     Finger3dError
         If the path of the press is not exact, or an increment does not converge.
     """
-    if text := refusal(problem):
+    if text := refusal(problem.model):
         raise Finger3dError(text)
     steps = list(march(problem))
     if not steps[-1].outcome.ok:
@@ -174,7 +173,9 @@ def derivatives(problem: Problem, variations: Sequence[Variation]) -> tuple[list
     tangent, motion = _Tangent(zero, zero, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, rows = np.zeros((2, count)), list[list[Numbers]]()
     for number, leg in enumerate(problem.model.legs):
-        follower = _PathTangents(_path(problem, state, Move(pose, leg.end(pose)), leg), variations, tangent, motion, number)
+        follower = _PathTangents(
+            _path(problem, state, Move(pose, leg.end(pose)), leg), variations, tangent, motion, number
+        )
         for station in stations((leg,)):
             step = next(rest)
             tangent, change = follower.at_share(station.share)
@@ -247,15 +248,19 @@ class _PathTangents:
         ]
         self._mu = np.array([one.difference(*(e.model.friction.mu for e in one.ends)) for one in variations])
         legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
-        end = np.array([
-            one.difference(*((own.slide_x_mm, -own.depth_mm) for own in pair))
-            for one, pair in zip(variations, legs, strict=True)
-        ]).reshape(-1, 2)
+        end = np.array(
+            [
+                one.difference(*((own.slide_x_mm, -own.depth_mm) for own in pair))
+                for one, pair in zip(variations, legs, strict=True)
+            ]
+        ).reshape(-1, 2)
         self._weights: Float | None = None
         if path.problem.model.legs[leg].force_N is not None:
             self._weights = -path.count[:, None] * path.bases[:, :, 1]
             end[:, 1] = motion[:, 1]
-            at_end = [one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)]
+            at_end = [
+                one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
+            ]
             self._force_slopes = np.einsum("ca,pca->p", self._weights, start.force), np.array(at_end)
         self._motions = motion, end
         self._events, self._tangents = [path.start], [start]
@@ -341,7 +346,9 @@ class _PathTangents:
         closing = self.path.bases[:, :, 1]
         amplitude = -last.displacement[:, point, 0] / closing[point, 0]
         return replace(
-            last, displacement=last.displacement + amplitude[:, None, None] * closing, amplitude=last.amplitude + amplitude
+            last,
+            displacement=last.displacement + amplitude[:, None, None] * closing,
+            amplitude=last.amplitude + amplitude,
         )
 
     def _solved(self, piece: int, event: Event) -> _Tangent:
