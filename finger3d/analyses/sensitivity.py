@@ -148,25 +148,21 @@ def varied(scene: Scene, problem: Problem, key: str) -> Variation:
     problems = []
     for low in (value - step, value, value - 2.0 * step):
         try:
-            ends = [scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step)]
+            first, last = (scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step))
         except Finger3dError as error:
             problems.append(str(error))
         else:
-            return variation(problem, *ends, step)
+            return variation(problem, first, last, step)
     raise Finger3dError(f"{key} = {value:g}: numbers have no derivative here: {problems[0]}")
 
 
 def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
     """Yield the dotted keys of a scene whose values are numbers that may change continuously."""
-    if isinstance(node, Mapping):
-        children = node.items()
+    if isinstance(node, float):
+        yield place, node
     elif isinstance(node, list | tuple):
-        children = enumerate(node)
-    else:
-        if isinstance(node, float):
-            yield place, node
-        return
-    for key, child in children:
+        node = dict(enumerate(node))
+    for key, child in node.items() if isinstance(node, Mapping) else ():
         yield from _numbers_of(child, f"{place}.{key}" if place else str(key))
 
 
@@ -219,4 +215,4 @@ def _write(out: Path, found: Sensitivity) -> None:
         write_json(folder / "sensitivity.json", found.as_dict())
         rows = found.rows()
         write_csv(folder / "sensitivity.csv", {name: [row[name] for row in rows] for name in rows[0]})
-        draw(folder / "sensitivity.png", found)
+        draw(folder / "sensitivity.png", found.title, found.numbers, rows)

@@ -97,7 +97,7 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
     ends = [replace(problem, model=replace(own, **{n: getattr(m, n) for n in changed})) for m in (low, high)]
     names = ("material", "parts", "gauges", "markers", "taxels")
     if all(getattr(end.model, name) == getattr(own, name) for name in names for end in ends):
-        return Variation(*ends, step)
+        return Variation(ends[0], ends[1], step)
     body, system = problem.body, problem.system
     elastics = [
         elasticity_of(end.model.materials(body.mesh.part_labels), body.mesh, own.domain == "plane-stress")
@@ -129,7 +129,7 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
             reading_rows=system.reading_rows + sign * reading_rows,
         )
         out.append(replace(end, system=changed_system))
-    return Variation(*out, step)
+    return Variation(out[0], out[1], step)
 
 
 def _reading_rows(problem: Problem, body: MeshedBody) -> sp.csr_matrix:
@@ -246,7 +246,9 @@ class _PathTangents:
             else one.difference(self._local(one.low), self._local(one.high))
             for one in variations
         ]
-        self._mu = np.array([one.difference(*(e.model.friction.mu for e in one.ends)) for one in variations])
+        self._mu = np.array(
+            [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
+        )
         legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
         end = np.array(
             [
