@@ -79,6 +79,10 @@ class Outcome(Enum):
         "the prescribed force is not reached: the force jumps with the depth; prescribe a depth, or use [contact] "
         "rule = 'projection' and a constant friction coefficient"
     )
+    SLIPS = (
+        "the whole contact slips: the prescribed tangential force is more than friction holds; prescribe a smaller "
+        "one, or a larger normal force"
+    )
     EVENTS = (
         "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"
     )

@@ -6,10 +6,10 @@ import math
 
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge
+from finger3d.mold.body import shell
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.parts import Mold, mold
 from finger3d.mold.pours import poured
-from finger3d.mold.shell import shell
 from finger3d.scene import parse
 
 BODIES = {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.accuracy import large_deformation as module
+from finger3d.accuracy import model_error as module
 from finger3d.accuracy.advice import advise, largest_principal_strain
 from finger3d.accuracy.changes import Change, ChangeEstimate
 from finger3d.cli import main
@@ -67,14 +67,14 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     scene = tmp_path / "scene.toml"
     scene.write_text(DEEP, encoding="utf-8")
     told = finger3d.press(scene, tmp_path / "told", figures=False).summary()
-    found = json.loads((tmp_path / "told" / "summary.json").read_text(encoding="utf-8"))["large_deformation_estimate"]
-    force = found["changes"]["normal_force_N"]
-    assert set(force) == {"value", "change", "error"}
-    assert force["value"] == told["steps"][-1]["normal_force_N"]
+    found = json.loads((tmp_path / "told" / "summary.json").read_text(encoding="utf-8"))["model_error"]
+    force = found["large_deformation"]["normal_force_N"]
+    assert set(force) == {"change", "low", "high"}
+    value = told["steps"][-1]["normal_force_N"]
     line = next(text for text in told["advice"] if "[effects.large_deformation]" in text)
-    assert f" {float(format(100.0 * force['change'] / force['value'], '.2g')):+g} % (" in line
+    assert f" {float(format(100.0 * force['change'] / value, '.2g')):+g} % (" in line
     page = words(press_page(tmp_path / "told"))
-    assert f"normal_force_N {force['value']:.5g} {force['change']:.5g} {force['error']:.5g}" in page
+    assert f"normal_force_N {force['change']:.5g} {force['low']:.5g} {force['high']:.5g}" in page
 
     def forbidden(*_: Any) -> Any:
         raise AssertionError("estimated under --no-error")
@@ -82,7 +82,7 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     monkeypatch.setattr(module, "large_deformation", forbidden)
     alone = finger3d.press(scene, tmp_path / "alone", error=False).summary()
     assert alone["steps"] == told["steps"]  # to the last digit
-    assert alone["large_deformation_estimate"] is None
+    assert alone["model_error"] == {}
     assert any("[effects.large_deformation]" in text for text in alone["advice"])
 
 

@@ -32,8 +32,9 @@ from tests.scenes import HALF_CYLINDER, changed, solid
 
 SCENE = changed(HALF_CYLINDER, domain="plane-strain")
 
-UNRESOLVED = 0.005
-"""Relative error below which one comparison of two runs may agree by chance, as points close one by one."""
+UNRESOLVED = 0.002
+"""Relative error below which one comparison of two runs may agree by chance, as points close one by one: with five
+increments the error is 0.19 %, and twice its estimate 0.18 %."""
 
 
 def barred(size: float, **changes: int) -> Model:
@@ -162,7 +163,7 @@ def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.C
     scene.write_text(changed(SCENE, size_mm=0.2), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "a"), "--no-figures"]) == 0
     bars = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
-    assert set(bars) == {"discretisation", "steps", "modulus", "signed", "method", "seconds"}
+    assert set(bars) == {"discretisation", "steps", "modulus", "signed", "method", "seconds", "third"}
     # the cells' shares add up to the signed error, which the bar covers
     shares = pyvista.read(tmp_path / "a" / "error_shares.vtu")["normal_force_N"]
     assert float(shares.sum()) == pytest.approx(bars["signed"]["normal_force_N"], rel=1e-9)

@@ -14,7 +14,7 @@ import pytest
 
 import finger3d
 from finger3d.errors import MissingError
-from finger3d.materials.shore import modulus_of_shore_00
+from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, PRESS, TRUE, bench

@@ -12,8 +12,7 @@ from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.cluster import Cluster
 from finger3d.analyses.sweep.points import combinations
-from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
-from finger3d.analyses.sweep.store import ResultStore
+from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.errors import MissingError
 from finger3d.progress import Progress
 from tests.scenes import HALF_CYLINDER, written

@@ -11,8 +11,7 @@ import pytest
 
 from finger3d.analyses.sweep import local, worker
 from finger3d.analyses.sweep.points import Sweep
-from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
-from finger3d.analyses.sweep.store import ResultStore
+from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
 from tests.sweep_cases import points_of, pressed_here
 

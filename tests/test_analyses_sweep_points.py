@@ -1,11 +1,18 @@
-"""Points of a sweep: combinations of values, and the bodies that they need."""
+"""Points of a sweep: combinations of values, tables and random samples, and the bodies that they need."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from finger3d.analyses.sweep.points import Vary, combinations
-from tests.sweep_cases import points_of
+import finger3d
+from finger3d.analyses.sweep.points import Vary, columns_of, combinations, drawn, listed_points, rows_of
+from finger3d.cli import main
+from finger3d.errors import Finger3dError
+from tests.scenes import HALF_CYLINDER, written
+from tests.sweep_cases import SETS, lines, points_of, table
 
 
 def test_every_combination_is_a_point_and_only_the_material_makes_bodies(paper_scene) -> None:
@@ -35,3 +42,146 @@ def test_a_varied_modulus_or_silicone_replaces_what_the_scene_gives(paper_scene)
     assert len(moduli.bodies) == 2
     silicones = combinations(paper_scene, (), ['material.silicone="Ecoflex 00-30","dragon skin 20"'])
     assert len(silicones.bodies) == 2
+
+
+RANGES = ("friction.mu=0.05:1", "press.depth_mm=0.2:0.6")
+
+
+def values(sample: str, seed: int = 0) -> np.ndarray:
+    return np.array([v.values for v in drawn(sample, RANGES, seed)])
+
+
+def test_each_part_of_a_latin_hypercube_holds_one_sample_of_every_key() -> None:
+    found = values("lhs:40")
+    for column, (low, high) in zip(found, ((0.05, 1.0), (0.2, 0.6)), strict=True):
+        part = np.floor(40 * (column - low) / (high - low)).astype(int)
+        assert sorted(part) == list(range(40))
+    # the keys are independent: among 40! orders one with a correlation above 0.6 does not occur
+    assert abs(np.corrcoef(found)[0, 1]) < 0.6
+
+
+def test_random_samples_lie_within_their_ranges_and_depend_on_the_seed() -> None:
+    mu, depth = values("random:1000")
+    assert 0.05 <= mu.min() < 0.06 < 0.99 < mu.max() <= 1.0
+    assert mu.mean() == pytest.approx(0.525, abs=4.0 * 0.95 / np.sqrt(12.0 * 1000.0))
+    assert 0.2 <= depth.min() < depth.max() <= 0.6
+    np.testing.assert_array_equal(values("random:1000"), [mu, depth])
+    assert not np.array_equal(values("random:1000", 1), [mu, depth])
+
+
+@pytest.mark.parametrize(
+    ("sample", "ranges", "seed", "expected"),
+    [
+        ("lhs", RANGES, 0, "--sample"),
+        ("lhs:0", RANGES, 0, "--sample"),
+        ("lhs:-3", RANGES, 0, "--sample"),
+        ("lhs:1000000", RANGES, 0, "--sample"),
+        ("sobol:8", RANGES, 0, "lhs:NUMBER"),
+        ("lhs:8", (), 0, "--range"),
+        ("lhs:8", ("friction.mu=1:0.1",), 0, "--range"),
+        ("lhs:8", ("friction.mu=0.1",), 0, "--range"),
+        ("lhs:8", ("friction.mu=0:inf",), 0, "--range"),
+        ("lhs:8", ("friction.mu=0:1", "friction.mu=0:2"), 0, "friction.mu: given twice"),
+        ("lhs:8", RANGES, -1, "--seed -1"),
+    ],
+)
+def test_samples_that_cannot_be_drawn_are_refused(sample, ranges, seed, expected) -> None:
+    with pytest.raises(Finger3dError, match=expected):
+        drawn(sample, ranges, seed)
+
+
+def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("\ufefffriction.mu, material.nu\n0.3,0.45\n\n0.1,0.49\n0.2,0.45\n", encoding="utf-8")
+    sweep = listed_points(paper_scene, SETS, rows_of(path), "--points")
+    assert [p.values for p in sweep.points] == [
+        {"friction.mu": 0.3, "material.nu": 0.45},
+        {"friction.mu": 0.1, "material.nu": 0.49},
+        {"friction.mu": 0.2, "material.nu": 0.45},
+    ]
+    assert len(sweep.bodies) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "first line"),
+        ("friction.mu,\n0.1,2\n", "first line"),
+        ("friction.mu\n", "no row"),
+        ("friction.mu,friction.mu\n0.1,0.2\n", "twice"),
+        ("friction.mu,material.nu\n0.1,0.3\n0.2\n", "line 3"),
+        ("friction.mu,material.nu\n0.1,\n", "line 2"),
+        ("friction.mu\n0.1\n-2\n", "friction.mu = -2"),
+        ("frictoin.mu\n0.1\n", "friction"),
+        ("gauge.g36.x_mm,gauge.0.x_mm\n1,2\n", "given twice"),
+        (b"friction.mu\n\xff\n", "cannot be read"),
+        (None, "cannot be read"),
+    ],
+)
+def test_a_bad_table_is_refused_in_one_line(text, expected, paper_scene, tmp_path, capsys) -> None:
+    path = tmp_path / "points.csv"
+    if text is not None:
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    assert main(["sweep", str(paper_scene), "--points", str(path), "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--points" in line
+    assert expected in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--vary", "friction.mu=1", "--sample", "lhs:3"], ["--points", "a", "--sample", "b"]]
+)
+def test_points_are_given_in_one_way(words, paper_scene, tmp_path, capsys) -> None:
+    assert main(["sweep", str(paper_scene), *words, "--out", str(tmp_path / "out")]) == 2
+    assert "one of --vary, --points and --sample" in capsys.readouterr().err
+
+
+def test_a_sampled_sweep_continues_and_its_page_shows_points(tmp_path: Path, monkeypatch, capsys) -> None:
+    scene, out = written(tmp_path, HALF_CYLINDER), tmp_path / "out"
+    words = ["sweep", str(scene), "--sample", "lhs:6", "--range", RANGES[0], "--range", RANGES[1], "--out", str(out)]
+    assert main(words) == 0
+    before = (out / "points.jsonl").read_text(encoding="utf-8")
+    (out / "points.jsonl").write_text("".join(before.splitlines(keepends=True)[:4]), encoding="utf-8")
+    assert main(words) == 0
+    kept = lines(out)
+    assert [row["point"] for row in kept] == list(range(6))
+    assert [row["normal_force_N"] for row in kept[:4]] == [float(r["normal_force_N"]) for r in table(out)[:4]]
+    mu = [float(row["friction.mu"]) for row in table(out)]
+    np.testing.assert_array_equal(mu, drawn("lhs:6", RANGES, 0)[0].values)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "6 values from" in page
+    assert '"joined": false' in page.replace('"joined":false', '"joined": false')
+    capsys.readouterr()
+    assert main([*words, "--seed", "1"]) == 2
+    assert "another task" in capsys.readouterr().err
+
+
+def test_python_takes_lists_tables_samples_scenes_and_dicts(tmp_path: Path) -> None:
+    path = written(tmp_path, HALF_CYLINDER)
+    scene = finger3d.load(path, ["press.steps=2"])
+    lists = {"friction.mu": [0.1, 0.3], "press.depth_mm": [0.3, 0.5]}
+    found = finger3d.sweep(scene, lists, tmp_path / "list", sample="list")
+    assert found.columns["friction.mu"] == lists["friction.mu"]
+    assert found.columns["press.depth_mm"] == lists["press.depth_mm"]
+    assert found.failed == 0
+    (tmp_path / "p.csv").write_text("friction.mu,press.depth_mm\n0.1,0.3\n0.3,0.5\n", encoding="utf-8")
+    again = finger3d.sweep(dict(scene.given), tmp_path / "p.csv", tmp_path / "table")
+    assert again.columns["normal_force_N"] == found.columns["normal_force_N"]
+    drawn_ones = finger3d.sweep(scene, {"friction.mu": (0.1, 0.3)}, tmp_path / "lhs", sample="lhs:3", seed=5)
+    assert len(drawn_ones.columns["point"]) == 3
+    assert drawn_ones.failed == 0
+    with pytest.raises(Finger3dError, match="as many values"):
+        columns_of({"friction.mu": ["1"], "press.depth_mm": ["1", "2"]})
+
+
+def test_every_marker_of_a_grid_is_a_column(tmp_path: Path) -> None:
+    path = written(tmp_path, HALF_CYLINDER + "[marker_grid]\nspacing_mm = 2.5\n")
+    swept = finger3d.sweep(path, {"friction.mu": [0.25, 0.6]}, tmp_path / "out")
+    markers = finger3d.press(path, error=False).to_dataframe("markers")
+    last = markers[markers["step"] == markers["step"].max()]
+    assert len(last) >= 3
+    for _, marker in last.iterrows():
+        for axis in "xyz":
+            own = swept.columns[f"marker_{marker['marker']}_{axis}_mm"][0]
+            assert own == pytest.approx(marker[f"displacement_{axis}_mm"], rel=1e-9, abs=1e-12)

@@ -1,17 +1,29 @@
-"""The local page: its figures, and in a browser its sliders."""
+"""The local page: its figures, in a browser its sliders, and its server, which answers at a secret address only."""
 
 from __future__ import annotations
 
 import threading
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from dash import Dash
+from dash import Dash, html
 
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
-from finger3d.app.page import numbers_of, page, section_figure, text_of, traction_figure
-from finger3d.app.server import LocalServer, local_server
+from finger3d.app.page import (
+    HOST,
+    LocalServer,
+    local_server,
+    numbers_of,
+    page,
+    section_figure,
+    text_of,
+    traction_figure,
+)
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.scene import parse
 from tests.test_app_live_body import GAUGE, SCENE
@@ -75,9 +87,15 @@ def test_a_value_that_no_slider_has_is_refused_in_one_line(opened: Dash, value: 
     assert said["numbers"]["children"] == ""
 
 
-@pytest.fixture
-def running() -> Iterator[LocalServer]:
-    server = local_server(page(LiveBody.of(parse(SCENE)), 0.3))
+def page_at(prefix: str) -> Dash:
+    page = Dash(__name__, url_base_pathname=prefix)
+    page.layout = html.Div("here")
+    return page
+
+
+@contextmanager
+def served(page: Dash) -> Iterator[LocalServer]:
+    server = local_server(page)
     thread = threading.Thread(target=server.serve)
     thread.start()
     yield server
@@ -86,10 +104,10 @@ def running() -> Iterator[LocalServer]:
 
 
 @pytest.mark.browser
-def test_a_moved_slider_changes_numbers_and_figures_in_a_browser(running: LocalServer) -> None:
+def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
     from playwright.sync_api import expect, sync_playwright
 
-    with sync_playwright() as playwright:
+    with served(page(LiveBody.of(parse(SCENE)), 0.3)) as running, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         tab = browser.new_page()
         complaints: list[str] = []
@@ -108,3 +126,48 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser(running: LocalS
         browser.close()
     assert complaints == []
     assert all(url.startswith((running.url, "data:", "blob:")) for url in asked)
+
+
+@pytest.fixture
+def running() -> Iterator[LocalServer]:
+    with served(page_at("/secret/")) as server:
+        yield server
+
+
+def status(url: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=10) as answer:
+            assert "Set-Cookie" not in answer.headers
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_only_the_secret_address_is_answered(running: LocalServer) -> None:
+    base = running.url.removesuffix("secret/")
+    assert base.startswith(f"http://{HOST}:")
+    assert status(running.url) == 200
+    for path in ("", "guess/", "_dash-layout", "guess/_dash-layout", "%C3%BC/", "%ff/", "?token=%C3%BC"):
+        assert status(base + path) == 404, path
+    assert status(running.url + "_dash-layout", Cookie="token=\xfc") == 200
+
+
+def test_a_name_that_another_site_had_resolved_to_this_machine_is_refused(running: LocalServer) -> None:
+    assert status(running.url, Host="evil.example:8000") == 403
+
+
+def test_two_pages_are_open_at_once(running: LocalServer) -> None:
+    with served(page_at("/other/")) as other:
+        assert (status(running.url), status(other.url), status(running.url)) == (200, 200, 200)
+
+
+def test_a_port_that_is_taken_is_refused_by_number(running: LocalServer) -> None:
+    port = int(running.url.split(":")[2].split("/")[0])
+    with pytest.raises(Finger3dError, match=str(port)):
+        local_server(page_at("/secret/"), port)
+
+
+@pytest.mark.parametrize("port", [-1, 65536, 99999, 10**9])
+def test_a_port_that_cannot_be_one_is_refused(port: int) -> None:
+    with pytest.raises(Finger3dError, match=f"port {port}: must be"):
+        local_server(page_at("/secret/"), port)

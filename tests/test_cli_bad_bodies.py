@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -93,48 +94,12 @@ def refused(capsys: Any, folder: Path, finger: str, obj: str, size: float = 1.0,
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("role", ["finger", "object"])
 def test_meshes_that_are_no_body(name: str, role: str, tmp_path: Path, capsys: Any) -> None:
-    import re
-
     surface, text = SURFACES[name]
     write_stl(tmp_path / "body.stl", surface)
     where = ('"body.stl"', 'shape = "plane"') if role == "finger" else (PAD, 'shape = "mesh"\npath = "body.stl"')
     said = refused(capsys, tmp_path, *where)
     assert "body.stl" in said or "object.path" in said
     assert re.search(text, said), said
-
-
-@pytest.fixture(scope="module")
-def no_solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A STEP file with a face."""
-    from build123d import Face, export_step
-
-    folder = tmp_path_factory.mktemp("step")
-    assert export_step(Face.make_rect(5, 5), folder / "face.step")
-    return folder
-
-
-@pytest.mark.parametrize("role", ["finger", "object"])
-@pytest.mark.parametrize(
-    ("name", "content", "text"),
-    [
-        ("a.stl", b"hello", "STL"),
-        ("a.stl", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 40, "STL"),
-        ("a.step", b"hello", "STEP"),
-        ("face.step", None, "solid"),
-        ("none.stl", None, "none.stl"),
-    ],
-    ids=["text", "a picture", "text step", "face", "absent"],
-)
-def test_files_that_hold_no_body(
-    role: str, name: str, content: bytes | None, text: str, no_solid: Path, tmp_path: Path, capsys: Any
-) -> None:
-    import re
-
-    path = tmp_path / name if content is not None else no_solid / name
-    if content is not None:
-        path.write_bytes(content)
-    where = (f'"{path}"', 'shape = "plane"') if role == "finger" else (PAD, f'shape = "mesh"\npath = "{path}"')
-    assert re.search(text, refused(capsys, tmp_path, *where))
 
 
 @pytest.mark.parametrize(
@@ -166,8 +131,6 @@ def test_objects_that_meet_something_else_first(
     ],
 )
 def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys: Any) -> None:
-    import re
-
     assert re.search(text, refused(capsys, tmp_path, PAD, table))
 
 

@@ -14,17 +14,10 @@ from tests.scenes import BLOCK, written
 STEPS = ("1_print", "2_prepare", "3_gauges", "4_close", "5_pour", "6_open")
 
 
-@pytest.fixture
-def scene_file(tmp_path) -> Path:
-    path = tmp_path / "scene.toml"
-    assert main(["new", str(path)]) == 0
-    return path
-
-
-def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) -> None:
+def test_the_command_writes_a_mold(scene, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     out = tmp_path / "Gießform, neu"
-    assert main(["export", str(scene_file), "--out", str(out), "--mold", "--shrinkage=0.002", "--bed=100x100x100"]) == 0
+    assert main(["export", str(scene), "--out", str(out), "--mold", "--shrinkage=0.002", "--bed=100x100x100"]) == 0
     printed, err = capsys.readouterr()
     assert err == ""
     names = {"finger.step", "finger.stl", "mold.3mf", "mold.step", "mold.png", "sheet.txt"}
@@ -33,7 +26,7 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
     names |= {"mold_exploded.step"} | {f"mold_bed_{i}.3mf" for i in range(2, 5)}
     assert {f.name for f in out.glob("[!.]*")} == names
     text = (out / "sheet.txt").read_text(encoding="utf-8")
-    volume = load(scene_file).design.volume_mm3 / 0.998**3 / 1e3
+    volume = load(scene).design.volume_mm3 / 0.998**3 / 1e3
     assert f"cavity              {volume:.2f} ml" in text
     assert "100 x 100 x 100 mm" in text
     assert "g36" in text
@@ -55,26 +48,21 @@ def test_the_command_writes_a_mold(scene_file, tmp_path, capsys, monkeypatch) ->
         (["--mold", "--set", "gauge=[]", "--split-mm", "11"], "split"),
     ],
 )
-def test_the_command_refuses_in_one_line(arguments, told, scene_file, tmp_path, capsys) -> None:
-    assert main(["export", str(scene_file), "--out", str(tmp_path / "out"), *arguments]) == 2
+def test_the_command_refuses_in_one_line(arguments, told, scene, tmp_path, capsys) -> None:
+    assert main(["export", str(scene), "--out", str(tmp_path / "out"), *arguments]) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert told in err
     assert not list((tmp_path / "out").glob("*"))
 
 
-def test_a_folder_that_cannot_be_written(scene_file, capsys) -> None:
-    assert main(["export", str(scene_file), "--out", str(scene_file)]) == 2
+def test_a_folder_that_cannot_be_written(scene, capsys) -> None:
+    assert main(["export", str(scene), "--out", str(scene)]) == 2
     assert "is a file" in capsys.readouterr().err
 
 
-@pytest.fixture
-def scene(tmp_path: Path) -> Path:
-    return written(tmp_path, BLOCK)
-
-
-def test_export_prints_json_alone(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", str(scene), "--out", str(tmp_path / "out"), "--json"]) == 0
+def test_export_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(written(tmp_path, BLOCK)), "--out", str(tmp_path / "out"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["results"] == str(tmp_path / "out")
     assert [Path(file).name for file in found["files"]] == ["finger.step", "finger.stl"]

@@ -28,7 +28,7 @@ def test_a_section_as_picture_and_animation(section: Path, tmp_path: Path, capsy
     png, gif = tmp_path / "with space" / "a.png", tmp_path / "a.gif"
     assert main(["show", str(section), "--png", str(png), "--gif", str(gif)]) == 0
     assert capsys.readouterr().out == f"{png} written\n{gif} written\n"
-    assert orange(rgb(png)) > 5e-4  # few points slip
+    assert orange(rgb(png)) > 5e-4  # two points at either edge slip, at 4e-4 each
     assert marked(rgb(png)) > 30
     first, *_, last = frames(gif)
     assert len(frames(gif)) == 4

@@ -6,8 +6,7 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.materials.elastic import NU, ElasticConstants, elastic_constants
-from finger3d.materials.modulus import youngs_modulus
-from finger3d.materials.shore import SPREAD_00, modulus_of_shore_00
+from finger3d.materials.modulus import SPREAD_00, modulus_of_shore_00, youngs_modulus
 from finger3d.materials.silicones import silicone_named
 
 

@@ -58,13 +58,13 @@ def test_edges_in_a_thin_part_are_no_longer_than_it_is_thick() -> None:
 def test_tets_that_are_none_or_inverted_or_do_not_fill_the_body_are_refused() -> None:
     mesh = grid((2, 2, 2))
     check_tets(mesh.points, mesh.cells, 1.0)
-    for points, tets, volume in (
-        (mesh.points, mesh.cells[:0], 1.0),
-        (mesh.points, mesh.cells[:, [1, 0, 2, 3]], 1.0),
-        (mesh.points, mesh.cells, 2.0),
+    for tets, volume, text in (
+        (mesh.cells[:0], 1.0, "no cells"),
+        (mesh.cells[:, [1, 0, 2, 3]], 1.0, "inverted"),
+        (mesh.cells, 2.0, "volume"),
     ):
-        with pytest.raises(UnusableMeshError):
-            check_tets(points, tets, volume)
+        with pytest.raises(UnusableMeshError, match=text):
+            check_tets(mesh.points, tets, volume)
 
 
 def test_tets_in_the_wrong_place_are_no_part_of_a_body() -> None:

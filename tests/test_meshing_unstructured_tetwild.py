@@ -16,7 +16,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.structured.snap import UnusableMeshError, check_closed
-from finger3d.meshing.unstructured import solids, tetwild
+from finger3d.meshing.unstructured import tetwild
 from tests.bodies import CUBE, SIDES
 from tests.designs import FIG9, OPTIONS, ZONE
 from tests.logs import Log
@@ -122,16 +122,3 @@ def test_three_attempts_and_then_one_line(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert sum("again" in text for text in said.lines) >= 2
     assert "\n" not in str(failed.value)
     assert not list(tmp_path.rglob("*.npz"))
-
-
-@pytest.mark.parametrize(
-    ("tets", "volume", "text"),
-    [
-        (np.zeros((0, 4), dtype=int), 1.0, "cells"),
-        (np.array([[0, 1, 2, 4]]), 1000.0 / 6.0, "inverted"),
-        (np.array([[0, 2, 1, 4]]), 200.0, "volume"),
-    ],
-)
-def test_tets_that_are_no_mesh_of_the_body_are_refused(tets: Any, volume: float, text: str) -> None:
-    with pytest.raises(UnusableMeshError, match=text):
-        solids.check_tets(CUBE, tets, volume)

@@ -1,4 +1,4 @@
-"""Bodies of CAD and of triangles."""
+"""Bodies of CAD and of triangles, and triangulated solids."""
 
 from __future__ import annotations
 
@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 
 from finger3d.geometry.registry import designs
-from finger3d.mold.body import Body
-from finger3d.mold.shell import shell
+from finger3d.mold.body import Body, shell
 from finger3d.mold.solids import between
 from tests.bodies import box
 from tests.mold_cases import BODIES
+
+
+def test_the_tolerance_is_absolute(paper_finger) -> None:
+    """Sag of a chord on R = 100 at most what was asked: every edge's middle is that near to the arc."""
+    for tolerance in (0.05, 0.005):
+        surface = shell(paper_finger.solid(), tolerance, "finger").surface
+        middle = 0.5 * (surface.corners + np.roll(surface.corners, -1, axis=1)).reshape(-1, 3)
+        centre = paper_finger.height_mm - 100.0
+        arc = middle[:, 1] > 36.6 + 1e-6
+        top = np.abs(middle[arc, 0]) < 50.0 - 1e-6
+        sag = 100.0 - np.hypot(middle[arc, 0], middle[arc, 1] - centre)[top & (np.abs(middle[arc, 2]) > 9.999)]
+        assert 0.2 * tolerance < sag.max() <= tolerance
 
 
 @pytest.mark.parametrize("cad", [True, False])

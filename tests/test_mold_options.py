@@ -1,11 +1,17 @@
-"""Options of a mold."""
+"""Options of a mold, and lengths of screws."""
 
 from __future__ import annotations
 
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.options import MoldOptions
+from finger3d.mold.options import MoldOptions, standard_length
+
+
+def test_the_longest_screw_that_stays_inside_is_chosen() -> None:
+    assert standard_length(43.6) == 40.0
+    assert standard_length(45.0) == 45.0
+    assert standard_length(3.0) == 6.0
 
 
 @pytest.mark.parametrize(

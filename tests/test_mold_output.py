@@ -1,25 +1,67 @@
-"""Files of a mold."""
+"""Files of a mold, and its page."""
 
 from __future__ import annotations
 
 import re
+from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from finger3d.mold.output import write_mold
-from finger3d.mold.packing import as_printed, beds
-from finger3d.mold.shell import Shell, shell
+from finger3d.mold.body import Shell, shell
+from finger3d.mold.output import mold_page, write_mold
+from finger3d.mold.parts import Mold
+from finger3d.mold.printing import as_printed, beds
+from finger3d.mold.sheet import pour_lines
 from finger3d.progress import Progress
 from tests.bodies import box
+
+
+def write(made: Mold, out: Path) -> str:
+    shells = {name: made.shell(name, 0.5, 0.8) for name in made.parts}
+    printed = as_printed(shells)
+    packed = beds(printed, made.options.bed_mm)
+    mold_page("a finger", made, shells, printed, packed, out, "the sheet", ["a remark"])
+    return (out / "mold.html").read_text(encoding="utf-8")
+
+
+def test_every_step_has_its_picture(molds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    made = molds["tongue, screws, plugs"]
+    text = write(made, tmp_path)
+    assert re.findall(r"<h2>(\d)\. [A-Z]", text) == ["1", "2", "3", "4", "5", "6"]
+    words = ("print", "prepare", "gauges", "close", "pour", "open")
+    pictures = [f"mold_step_{i}_{word}.png" for i, word in enumerate(words, 1)]
+    assert sorted(path.name for path in tmp_path.glob("mold_step_*.png")) == pictures
+    assert text.count("data:image/png") == 6
+    assert f"{made.bolts.number} M3 x {made.bolts.length_mm:g}" in text
+    assert "<dd>4 % " in text
+    assert "a remark" in text
+    assert "the sheet" in text
+
+
+def test_every_pour_has_a_step(molds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the parts that are in the mold then: the lid of that pour, and all that was cast so far."""
+    drawn = {}
+    monkeypatch.setattr(
+        "finger3d.mold.output.step_pictures", lambda shown: drawn.update((p.path.stem, set(p.parts)) for p in shown)
+    )
+    made = molds["pours"]
+    text = write(made, tmp_path)
+    for i, name in enumerate(("skin", "body", "core"), 1):
+        assert f"Pour {i} of 3: {name}" in text
+        (parts,) = (parts for stem, parts in drawn.items() if stem.endswith(f"pour_{name}"))
+        assert f"lid_{name}" in parts
+        assert sum(part.startswith("silicone") for part in parts) == i
+    assert all(escape(line) in text for pour in made.pours for line in pour_lines(made, pour))
 
 
 def test_parts_and_plate_load_again_in_mm(paper_mold, tmp_path: Path) -> None:
     from lib3mf import Lib3MF
 
-    from finger3d.mold.shell import write_3mf, write_stl
+    from finger3d.mold.body import write_3mf, write_stl
 
     shells = {name: shell(part, 0.05, name) for name, part in paper_mold.parts.items()}
     printed = as_printed(shells)

@@ -11,11 +11,11 @@ import pytest
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge
+from finger3d.mold.body import shell
+from finger3d.mold.fasteners import THIN
 from finger3d.mold.foils import foils
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.parts import mold, overlaps
-from finger3d.mold.pegs import THIN
-from finger3d.mold.shell import shell
 from finger3d.mold.solids import common
 from tests.mold_cases import BODIES, GAUGES, made
 

@@ -1,4 +1,4 @@
-"""Solids of which molds are made."""
+"""Solids and features of molds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.solids import between, common, cone, cylinder, hexagon, one, revolved
+from finger3d.mold.solids import Feature, added, between, common, cone, cuts, cylinder, hexagon, one, revolved
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z", "-x", "-y", "-z"])
@@ -36,3 +36,11 @@ def test_volumes() -> None:
 def test_pieces_are_refused() -> None:
     with pytest.raises(Finger3dError, match="lid.*2 pieces"):
         one(between((0, 0, 0), (1, 1, 1)) + between((2, 2, 2), (3, 3, 3)), "lid")
+
+
+def test_what_features_add_and_cut_is_collected_by_part() -> None:
+    a, b, c = (between((i, 0, 0), (i + 1.0, 1, 1)) for i in range(3))
+    features = [Feature(add={"lid": [a]}, cut={"half_a": [b]}), Feature(add={"lid": [c]})]
+    assert added(features, "lid") == [a, c]
+    assert cuts(features, "half_a") == [b]
+    assert cuts(features, "half_b") == []

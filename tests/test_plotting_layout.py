@@ -14,12 +14,12 @@ from finger3d.errors import Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.plotting.calibration import draw as draw_calibration
+from finger3d.plotting.calibration import draw_map
 from finger3d.plotting.comparison import draw as draw_comparison
 from finger3d.plotting.figures import contact_figure, force_figure
 from finger3d.plotting.gauges import marks_of
 from finger3d.plotting.layout import DPI, sheet
 from finger3d.plotting.optimise import draw as draw_search
-from finger3d.plotting.strain_map import draw_map
 from finger3d.report.sweep import sweep_charts
 from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case

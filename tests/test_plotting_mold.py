@@ -1,4 +1,4 @@
-"""Exploded views of molds."""
+"""Exploded views of molds, and pictures of the steps of casting."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.plotting.mold import exploded, picture
+from finger3d.plotting.mold import StepPicture, exploded, picture, step_pictures
 from tests.bodies import box
 from tests.pictures import share
 
@@ -37,3 +37,17 @@ def test_every_part_is_seen_in_its_colour(tmp_path: Path, monkeypatch: pytest.Mo
     assert picture(tmp_path / "a.png", PARTS, "a mold", {"lid": "20 x 10 mm"}) == "matplotlib"
     for colour in ("#9db4c8", "#8d8a84"):  # half A and the lid, shaded
         assert share(tmp_path / "a.png", colour, within=0.2) > 0.01
+
+
+def test_every_step_has_a_picture_of_its_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    pour = {name: part for name, part in PARTS.items() if name != "lid"}
+    pictures = [
+        StepPicture(tmp_path / "1.png", PARTS, on_bed=True),
+        StepPicture(tmp_path / "2.png", pour),
+    ]
+    assert step_pictures(pictures) == "matplotlib"
+    lid, sensor = "#8d8a84", "#f28e2b"
+    assert share(tmp_path / "1.png", lid, within=0.2) > 0.01
+    assert share(tmp_path / "2.png", lid, within=0.05) < 0.01
+    assert share(tmp_path / "2.png", sensor, within=0.3) > 0.0

@@ -10,7 +10,7 @@ import pytest
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.materials.elastic import elastic_constants
-from finger3d.materials.shore import modulus_of_shore_A
+from finger3d.materials.modulus import modulus_of_shore_A
 from finger3d.mechanics.model import Leg
 from finger3d.scene import load, parse
 from finger3d.scene.derived import check_parts, largest_spread, moduli, parts_of

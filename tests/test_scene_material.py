@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.materials.shore import modulus_of_shore_A
+from finger3d.materials.modulus import modulus_of_shore_A
 from finger3d.scene import load, parse
 from finger3d.scene.material import modulus_of, replace_modulus
 from tests.commands import refused

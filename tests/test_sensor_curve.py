@@ -1,11 +1,24 @@
-"""A calibration curve: second-order fit, resolution, and error of the interpolation."""
+"""A calibration curve: second-order fit, resolution, and error of the interpolation, which is monotone."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
+from finger3d.sensor.curve import MonotoneCubic
 from tests.sensor_cases import curve, saturating, straight
+
+
+def test_the_interpolation_is_that_of_scipy() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(300):
+        count = random.integers(2, 9)
+        x, y = np.cumsum(random.uniform(0.1, 2.0, count)), random.normal(size=count) * random.choice([0, 1, 1], count)
+        at = random.uniform(x[0], x[-1], 20)
+        found, wanted = MonotoneCubic.of(x, y), PchipInterpolator(x, y)
+        assert found(at) == pytest.approx(wanted(at), rel=1e-12, abs=1e-12)
+        assert found(at, 1) == pytest.approx(wanted(at, 1), rel=1e-9, abs=1e-9)
 
 
 def test_the_papers_numbers_a_slope_of_15e_4_and_a_noise_of_15e_5_give_a_tenth() -> None:

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from finger3d._types import Float
-from finger3d.analyses.calculix.deck import Contact
+from finger3d.analyses.calculix.deck import Contact, printed_forces, program
 from finger3d.analyses.calculix.press import press_deck
-from finger3d.analyses.calculix.run import printed_forces, program
 from finger3d.mechanics.model import Model
 
 

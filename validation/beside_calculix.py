@@ -22,8 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
-from finger3d.analyses.calculix.deck import Contact
-from finger3d.analyses.calculix.run import program
+from finger3d.analyses.calculix.deck import Contact, program
 from finger3d.errors import MissingError
 from finger3d.mechanics.model import Leg
 

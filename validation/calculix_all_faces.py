@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import Contact
-from finger3d.analyses.calculix.run import program
+from finger3d.analyses.calculix.deck import Contact, program
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.solids.material import Isotropic

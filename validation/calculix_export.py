@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import finger3d
+from finger3d.analyses.calculix.deck import printed_forces, program, solve
 from finger3d.analyses.calculix.press import press_deck
-from finger3d.analyses.calculix.run import printed_forces, program, solve
 from finger3d.scene import Scene
 
 from ._rows import Result, Row

@@ -4,12 +4,18 @@ Source: Maeno 2004, Sec. IV, Fig. 14: the strain falls as mu grows; a second-ord
 with the largest standard deviation of the strain, 1.5e-4, the equation gives mu = 0.5 with an error of 0.1.  The text
 leaves open on which side the gauge of 30 degrees leans and from which axis the angle is measured, how deep and how far
 from the middle plane the gauge lies, Poisson's ratio, and how much a foil in silicone reads.  All of these are swept,
-in sections and 20 mm wide, in small strain and at large deformation (neo-Hookean).  Two readings of the sentence:
+in sections and 20 mm wide, in small strain and at large deformation (neo-Hookean).  The surface above the gauge is
+43.3 mm high.  A finger whose ends are held is the section in plane strain (plane_strain_limit.py).  Foils are 4 mm
+long, at y = 40, z = 0 mm.  Two readings of the sentence:
 
 - slope: at mu = 0.5 the strain changes by -1.5e-4/0.1 = -1.5e-3 per mu; a factor of 3 either way passes, and on the way
   from 0.06 to 0.5 at most a twentieth of the movement may rise;
 - vertex: the parabola ends in its vertex at 0.5, where 1.5e-4 = c 0.1^2, so that the strain falls by c 0.44^2 = 2.9e-3
   from mu = 0.06 to 0.5, a factor of 2 either way, and changes by no more than 2 x 1.5e-4 beyond.
+
+Two gauges of one finger that lean to both sides, at 30 and -30 degrees, decide between the models: in plane strain the
+strain of the first falls and that of the second rises, 20 mm wide at large deformation it is the reverse, and 20 mm
+wide in small strain both rise.
 """
 
 from __future__ import annotations
@@ -128,7 +134,7 @@ def _curves(quick: bool) -> Iterator[Curve]:
                 read = _read(_model(domain, nu, large, gauges, quick), mus)
                 for lean, y, z in places:
                     yield Curve(name + LARGE * large, nu, lean, y, z, FREE, mus, read[f"{lean}:{y}:{z}"])
-            for lean in () if quick or domain == "plane-stress" else ("30", "-30"):
+            for lean in () if quick or domain == "plane-stress" else LEANING:
                 foils = (_gauge("g", lean, *PLACE, FOIL_MM), _gauge("m", lean, *PLACE, FOIL_MM, side=-1))
                 foiled = FOIL.apply(_model(domain, NUS[-1], large, foils, quick))
                 yield Curve(name + LARGE * large, NUS[-1], lean, *PLACE, READ, FEW, _read(foiled, FEW)["g"])
@@ -188,7 +194,7 @@ def _claims(curves: list[Curve]) -> list[Row]:
 
 
 def _draw(figure: Any, curves: list[Curve]) -> None:
-    figure.set_size_inches(15.0, 5.4)
+    figure.set_size_inches(15.0, 6.0)
     panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.9))
     models = list(dict.fromkeys(c.model for c in curves))
     for axes, leaning in zip(panels, ("30", "-30"), strict=False):
@@ -196,25 +202,27 @@ def _draw(figure: Any, curves: list[Curve]) -> None:
         c = NOISE / ERROR**2
         axes.plot(mu, 1e3 * c * ((mu - 0.5) ** 2 - 0.44**2), "k--", lw=1.5, label="measured, read by the vertex")
         axes.plot([0.4, 0.6], 1e3 * (-c * 0.44**2 + np.array([0.1, -0.1]) * NOISE / ERROR), "k", lw=3.0,
-                  label="measured slope at 0.5")  # fmt: skip
-        for i, model in enumerate(models):
-            for curve in curves:
-                if (curve.model, curve.nu, curve.leaning, (curve.y, curve.z)) == (model, NUS[-1], leaning, PLACE):
-                    style = "-" if curve.kind == FREE else ":"
-                    change = 1e3 * (curve.strain - curve.strain[0])
-                    label = model if curve.kind == FREE else None
-                    axes.plot(curve.mu, change, style, color=f"C{i}", lw=1.5, label=label)
+                  label="measured, read by the slope")  # fmt: skip
+        for curve in curves:
+            if (curve.nu, curve.leaning, (curve.y, curve.z)) == (NUS[-1], leaning, PLACE):
+                style = "-" if curve.kind == FREE else ":"
+                change = 1e3 * (curve.strain - curve.strain[0])
+                label = curve.model if curve.kind == FREE else None
+                axes.plot(curve.mu, change, style, color=f"C{models.index(curve.model)}", lw=1.5, label=label)
         axes.axhline(0.0, color="#999999", lw=0.7)
-        axes.set(xlabel="mu", ylabel="strain less that at mu = 0.06, 1e-3", ylim=(-9.0, 9.0))
-        axes.set_title(f"gauge at {leaning}°, y = 40, z = 0 mm, nu = 0.49; dotted: foil", fontsize=10)
-    panels[0].legend(fontsize=7.5, loc="upper left", frameon=False)
+        axes.set(xlabel="friction coefficient mu", ylabel="strain less that at mu = 0.06, 1e-3", ylim=(-9.0, 9.0))
+        axes.set_title(f"gauge at {leaning}°, y = 40 mm, z = 0, nu = 0.49", fontsize=10)
+    figure.legend(*panels[0].get_legend_handles_labels(), title="solid: free strain, dotted: foil of 4 mm", fontsize=8,
+                  loc="outside lower left", ncols=4, frameon=False)  # fmt: skip
     shares = [[np.mean([getattr(c, by) for c in curves if c.model == m and c.kind == FREE and c.leaning == lean])
-               for m in models for by in ("by_slope", "by_vertex")] for lean in LEANING]  # fmt: skip
+               for lean in LEANING] for m in models for by in ("by_slope", "by_vertex")]  # fmt: skip
     axes = panels[2]
-    axes.imshow(np.array(shares).T, cmap="Greens", vmin=0.0, vmax=1.0, aspect="auto")
-    for i, line in enumerate(np.array(shares).T):
+    axes.imshow(np.array(shares), cmap="Greens", vmin=0.0, vmax=1.0, aspect="auto")
+    for i, line in enumerate(shares):
         for j, share in enumerate(line):
             axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8)
-    axes.set_xticks(range(len(LEANING)), [f"{name.replace(' from the ', '° from ')}" for name in LEANING], fontsize=7)
+    names = [f"{lean}°\nfrom the {'vertical' if 'vertical' in name else 'x axis'}"
+             for name in LEANING for lean in name.split()[:1]]  # fmt: skip
+    axes.set_xticks(range(len(LEANING)), names, fontsize=7)
     axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=7)
-    axes.set_title("share of the places and nu that are compatible, free strain", fontsize=10)
+    axes.set_title("share of places and nu compatible", fontsize=10)

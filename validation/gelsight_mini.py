@@ -193,10 +193,11 @@ def _draw(figure: Any, models: list[Model], best: Model) -> None:
             middle.plot([m.mu for m in own], [100.0 * m.misfit for m in own], style, marker="o", ms=3, color=f"C{j}",
                         label=f"{law}, nu = {nu:g}")  # fmt: skip
             right.errorbar([m.E for m in own], [m.predicted for m in own], [2.0 * m.predicted_sd for m in own],
-                           fmt="osv"[i], ms=4, lw=0.8, color=f"C{j}")  # fmt: skip
+                           fmt="osv"[i], ms=4, lw=0.8, color=f"C{j}", label=f"{law}, nu = {nu:g}")  # fmt: skip
     middle.axhline(100.0 * FITS, color="#222222", lw=0.8)
     middle.set(xscale="log", xlabel="mu that is assumed", ylabel="largest distance from a force (%)", ylim=(0.0, None))
     middle.legend(fontsize=6.5, frameon=False, ncols=2)
     right.axhline(FORCES[3], color="k", lw=1.0)
     right.set(xlabel="Young's modulus that is identified (MPa)", ylabel="force at 2 mm from the first three (N)")
-    right.set_title("line: measured", fontsize=10)
+    right.set_title("with two standard deviations; line: measured", fontsize=10)
+    right.legend(fontsize=6.5, frameon=False, ncols=2)

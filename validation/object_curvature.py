@@ -64,20 +64,22 @@ def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, flo
 def run(quick: bool) -> Result:
     """Strains over mu on the plane, one mu on every other object; all twice, on two meshes."""
     sizes, steps = ((3.0, 1.5), 4) if quick else ((1.0, 0.5), 80)
-    mus = np.array([0.0, 0.25, 0.5, 1.0]) if quick else np.array([0.0, 0.06, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
+    mus = np.array([0.0, 0.06, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
+    if quick:
+        mus = np.array([0.0, 0.25, 0.375, 0.5])  # on coarse meshes the strain is constant beyond
     radii = (100.0, 1e5) if quick else (30.0, 50.0, 70.0, 100.0, 140.0, 200.0, 400.0, 1e5)
-    (_, _, rough), (calibration, found, read) = (_measured(size, steps, mus, radii) for size in sizes)
+    (coarse, _, rough), (calibration, found, read) = (_measured(size, steps, mus, radii) for size in sizes)
     fewer = _measured(sizes[0], steps // 2, mus, (100.0,))[2]
     curve = calibration[:, 1]
     true = float(np.interp(TRUE, mus, curve))
-    rising = bool(np.all(np.diff(curve) > 0.0) or np.all(np.diff(curve) < 0.0))
+    monotonic = all(np.all(d > 0.0) or np.all(d < 0.0) for d in (np.diff(c[:, 1]) for c in (coarse, calibration)))
     what = "mu read on a bar of radius 100 mm with the plane's calibration, true 0.25"
     rows = [
         Row(
             "strain on a bar of radius 1e5 mm, by that on the plane", "the limit", 1.0, found[1e5][1] / true, 3e-3,
             "curvatures add: 1e-3 of the finger's",
         ),
-        Row("calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(rising), 0.0, "a statement"),
+        Row("calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(monotonic), 0.0, "a statement"),
         Row(what, HALVED, rough[100.0], read[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
         Row(f"{what}; edges of {sizes[0]:g} mm, {steps} increments", f"{steps // 2} increments", fewer[100.0],
             rough[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),

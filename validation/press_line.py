@@ -248,7 +248,7 @@ def _draw(figure: Any, profile: Profile, columns: dict[str, list[float]], finest
     middle.set(xlabel="points per a", ylabel="error, %", title="a/h = 1/200")
     middle.set_xticks([10, 20, 40], ["10", "20", "40"], minor=False)
     middle.set_xticks([], minor=True)
-    middle.legend(fontsize=7)
+    middle.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
     of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
     for height in HEIGHTS:
         which = of & (t["block_height_mm"] == height) & (t["plain"] == 1)
@@ -258,7 +258,7 @@ def _draw(figure: Any, profile: Profile, columns: dict[str, list[float]], finest
     right.loglog(t["increments"][own], 1e4 * t["reported_D_over_AP2"][own], "s-", label=name)
     right.loglog(list(STEPS), [1e4 * d for _, d in STEPS.values()], "k+", ms=10, label="integral equations")
     right.axhline(1e4 * INTEGRALS[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
-    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="dissipation, nu = .3, mu = .25")
+    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="nu = .3, mu = .25")
     right.legend(fontsize=7)
 
 

@@ -109,8 +109,8 @@ def _draw(figure: Any, found: Spread) -> None:
         axes.set_title(f"{measure}, {tolerances}", fontsize=10)
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("standard deviation of mu")
-    handles, labels = panels[0].get_legend_handles_labels()
+    lines = {line.get_label(): line for axes in panels for line in axes.get_legend_handles_labels()[0]}
     title = "thick: R = 5 mm, thin: R = 10 mm"
     figure.legend(
-        handles, labels, title=title, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9
+        lines.values(), lines, title=title, loc="outside lower center", ncols=len(lines), frameon=False, fontsize=9
     )

@@ -1,12 +1,11 @@
 """Does the speed of a press change the friction coefficient that a gauge reads, in a rubber that relaxes?
 
 Source: Maeno 2004, Sec. IV: "this experiment is performed by increasing the indentation slowly to avoid the effect of
-viscosity of the sensor". The relaxation of rubbers is given as a share of the stress per decade of time, a few per cent
-(Lindley 1978); a Prony series with 2, 5 or 10 % in each decade from 1 ms to 1000 s stands for it, since no series of a
-silicone was found with its numbers. The finger of Fig. 9 (nu = 0.49 at once) is calibrated by presses of 10 s and read
-in presses of 0.1 to 1000 s: at the same depth and at the same force; with all moduli relaxing, and in the section with
-the shear modulus alone, where Poisson's ratio grows. The section has the paper's gauge, the finger 20 mm wide the gauge
-that design_search.py finds best, at x = 6 mm and 85 degrees.
+viscosity of the sensor". No relaxation of a silicone was found with its numbers, so that the stress is assumed to relax
+by 2, 5 or 10 % in each decade of time, by a Prony series from 1 ms to 1000 s. The finger of Fig. 9 (nu = 0.49 at once)
+is calibrated by presses of 10 s and read in presses of 0.1 to 1000 s: at the same depth and at the same force; with all
+moduli relaxing, and in the section with the shear modulus alone, where Poisson's ratio grows. The section has the
+paper's gauge, the finger 20 mm wide the gauge that design_search.py finds best, at x = 6 mm and 85 degrees.
 """
 
 from __future__ import annotations
@@ -160,10 +159,13 @@ def _draw(figure: Any, found: Found) -> None:
                               color="#2166ac" if control == DEPTH else "#b2182b", lw=0.5 + 12.0 * rate)  # fmt: skip
         axes.axhspan(-0.1, 0.1, color="#eeeeee", lw=0)
         axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
-        axes.legend(frameon=False, fontsize=8)
+        shares = sorted({100.0 * key[3] for key in found if key[0] == model})
+        title = f"{', '.join(f'{share:g}' for share in shares)} % per decade{', thin to thick' if shares[1:] else ''}"
+        axes.legend(title=title, title_fontsize=8, frameon=False, fontsize=8)
     for (name, control, bulk, rate), reads in found.items():
         if name == models[0] and control == DEPTH and bulk:
             panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
                                 label=f"{100.0 * rate:g} % per decade")  # fmt: skip
-    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s")
+    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s",
+                   title=f"{models[0]}, all moduli")  # fmt: skip
     panels[-1].legend(frameon=False, fontsize=8)

@@ -29,7 +29,7 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.plotting.strain_map import resolution_panel, slope_panel
+from finger3d.plotting.calibration import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap

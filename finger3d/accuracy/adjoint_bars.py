@@ -116,7 +116,7 @@ def applies(model: Model) -> bool:
     The body must be linear elastic without inclusions, the object rigid, and every leg given by its depth.
     """
     plain = model.is_linear_elastic and model.inclusions is None and model.object_compliance is None
-    as_given = model.rule == "projection" and all(leg.force_N is None for leg in model.legs)
+    as_given = model.rule == "projection" and not model.is_under_force
     return plain and as_given
 
 

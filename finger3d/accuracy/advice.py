@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.changes import Change, ChangeEstimate
+from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
 from finger3d.mechanics.model import Model
-
-LEAST_STRAIN = 0.05
-"""Principal strain from which it is estimated what large deformation would change."""
 
 _LARGE_STRAIN = 0.1
 """Principal strain from which large deformation is advised without an estimate."""
@@ -37,8 +34,7 @@ def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> 
     """
     out = []
     if not model.finite_strain:
-        if large and large.significant:
-            said = _changes(large.significant)
+        if large and (said := _changes(large.significant)):
             out.append(f"large deformation would change {said}: switch on [effects.large_deformation]")
         elif strain >= _LARGE_STRAIN:
             out.append(
@@ -51,7 +47,9 @@ def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> 
 def _changes(changes: dict[str, Change]) -> str:
     """Return forces and the gauges that change most, each with its change and the interval of the change."""
     forces = [name for name in changes if name in _NAMES]
-    gauges = sorted((name for name in changes if name not in forces), key=lambda name: -abs(changes[name].change))
+    gauges = sorted((name for name in changes if name.startswith("gauge_")), key=lambda n: -abs(changes[n].change))
+    if not (forces or gauges):
+        return ""
     said = [f"{_NAMES.get(name, name)} by {_change(changes[name])}" for name in forces + gauges[:_MOST_GAUGES]]
     return " and ".join(part for part in (", ".join(said[:-1]), said[-1]) if part)
 
@@ -61,7 +59,7 @@ def _change(change: Change) -> str:
     if abs(change.change) > abs(change.value):
         return f"{change.change:+.2g} ({change.low:+.2g} to {change.high:+.2g})"
     ends = sorted((change.low / change.value, change.high / change.value))
-    middle, low, high = (f"{float(f'{100.0 * x:.2g}'):+g}" for x in (change.change / change.value, *ends))
+    middle, low, high = (two_digits(100.0 * x) for x in (change.change / change.value, *ends))
     return f"{middle} % ({low} to {high} %)"
 
 

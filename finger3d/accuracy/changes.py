@@ -11,21 +11,25 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Tree
+from finger3d.accuracy.cost import forecast
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import by_key, of_kind
+from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
 from finger3d.mechanics.results.history import StepResult, measure
 
-FORCES = ("normal_force_N", "friction_sum_N")
-"""Forces whose changes are estimated, beside the strains of all gauges."""
+_OWN = ("depth_mm", *MAIN, *AREAS)
+"""Numbers whose changes are estimated beside readings."""
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
 
 _LEAST_CHANGE = 0.01
-"""Significant change of a force, relative to it, and of a strain, relative to the largest of all gauges."""
+"""Least significant change, see `scales`."""
+
+_FACTORS = (2.0, 2.83, 4.0)
+"""Edge lengths of a coarse mesh over those of the press; the first that is cheap enough is taken."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class ChangeEstimate:
 
     Attributes
     ----------
-    changes : changes of normal force, friction sum and gauges by name; empty if there is no estimate
+    changes : changes of forces, lengths, areas and readings by name; empty if there is no estimate
     method : one line that says how the changes were estimated, or ``no estimate: ...``
     seconds : wall time of the estimate
     """
@@ -77,13 +81,27 @@ class ChangeEstimate:
         return {name: change for name, change in self.changes.items() if change.significant}
 
     def as_dict(self) -> Tree:
-        """Return the entry of summary.json; changes that are not significant are left out."""
-        shown = {name: {"value": c.value, "change": c.change, "error": c.error} for name, c in self.significant.items()}
-        return {
-            "changes": shown,
-            "method": self.method,
-            "seconds": self.seconds,
-        }
+        """Return the entry of summary.json: change, and the ends of its interval, by number."""
+        return {name: {"change": c.change, "low": c.low, "high": c.high} for name, c in self.changes.items()}
+
+
+def affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> float:
+    """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget.
+
+    Parameters
+    ----------
+    coarse : function of this factor that returns the model of the coarse press
+
+    Raises
+    ------
+    Finger3dError
+        If all coarse presses cost more.
+    """
+    for factor in _FACTORS:
+        cost = forecast(coarse(factor))
+        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget_s:
+            return factor
+    raise Finger3dError(f"it would take more than {budget_s:.2g} s")
 
 
 def attempted(
@@ -106,20 +124,29 @@ def attempted(
     return timed
 
 
-def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
-    """Return the numbers whose changes are estimated: normal force, friction sum and gauges, by name.
+def two_digits(value: float) -> str:
+    """Return a change with its sign and two digits, without a power of ten unless it is tiny or huge."""
+    return f"{float(f'{value:.2g}'):+g}"
 
-    Areas of contact and stick are not among them: the distance of the points hides their changes.
-    """
+
+def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
+    """Return the numbers whose changes are estimated, by name: forces, lengths, areas, readings, and a depth found."""
     measured = measure(problem.points, step)
-    strains = {column: step.readings[column] for column in of_kind(step.readings, "gauge")}
-    return {name: float(measured[name]) for name in FORCES} | by_key(strains)
+    numbers = {name: float(measured[name]) for name in (*MAIN, *AREAS)} | by_key(step.readings)
+    return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
 def scales(values: Mapping[str, float]) -> dict[str, float]:
-    """Return what a change of each number is relative to: a force to itself, a strain to the largest of all gauges."""
-    largest = max((abs(x) for name, x in values.items() if name not in FORCES), default=0.0)
-    return {name: abs(x) if name in FORCES else largest for name, x in values.items()}
+    """Return what a change of each number is relative to: to itself, a length to that of contact, a reading to the
+    largest of its kind, and an area of stick that is zero to that of contact.
+    """
+    kind = {name: name.split("_")[0] for name in values if name not in _OWN}
+    largest = {k: max(abs(values[name]) for name in kind if kind[name] == k) for k in set(kind.values())}
+    found = {name: largest[kind[name]] if name in kind else abs(x) for name, x in values.items()}
+    for name, other in (("stick_half_length_mm", "contact_half_length_mm"), ("stick_area_mm2", "contact_area_mm2")):
+        if name in values and (name.endswith("mm") or not found[name]):
+            found[name] = abs(values[other])
+    return found
 
 
 def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, Change]:
@@ -153,7 +180,7 @@ def check_kind(model: Model) -> None:
         raise Finger3dError(f"it was not compared with presses under {names}")
     if not model.object.has_section:  # on coarse meshes its details may keep an increment from settling for minutes
         raise Finger3dError("it was not compared with presses on triangulated objects")
-    if any(leg.force_N is not None for leg in model.legs):
+    if model.is_under_force:
         raise Finger3dError("it was not compared with presses to a force")
     if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
         raise Finger3dError("the result depends on the number of increments")

@@ -8,22 +8,31 @@ alone, and a force, energy or pressure on E and F / E ::
     J(F; (1 + s) E) = J(F / (1 + s); E),    J(F; (1 + s) E) = (1 + s) J(F / (1 + s); E)
 
 On a single leg straight down this follows from the increments at smaller forces, on other paths in small strain from a
-press with all forces divided by 1 + s, which has the same condensation.
+press with all forces divided by 1 + s, which has the same condensation.  In all other models the scene is pressed twice
+on a coarser mesh, with E times r = 1 + s and divided by it ::
+
+    error of J = s |J(r E) - J(E / r)| / (2 log r)
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from finger3d._cost import CHANGES
+from finger3d.accuracy.changes import affordable_factor
+from finger3d.accuracy.companions import built_like, coarser
+from finger3d.accuracy.cost import forecast
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.march.step_halving import with_increments_of
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.march.step_halving import last_step, with_increments_of
+from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import QUANTITIES
 from finger3d.mechanics.results.history import StepResult
 
@@ -33,6 +42,9 @@ _STRESS_UNITS = ("_N", "_Nmm", "_mJ", "_MPa")
 _ROUND_OFF = 1e-9
 """Relative error of a number that does not depend on the modulus, such as the prescribed force."""
 
+_MOST_STEPS = 5
+"""Largest number of increments in a leg on the coarser mesh."""
+
 
 def modulus_errors(
     problem: Problem,
@@ -40,8 +52,8 @@ def modulus_errors(
     spread: float | None,
     numbers: Callable[[Problem, StepResult], dict[str, float]],
     workspace: Workspace | None = None,
-) -> dict[str, float]:
-    """Return the errors of the last increment due to the spread of Young's modulus, by name.
+) -> tuple[dict[str, float], str]:
+    """Return the errors of the last increment due to the spread of Young's modulus of the main body, by name.
 
     Parameters
     ----------
@@ -52,55 +64,89 @@ def modulus_errors(
 
     Returns
     -------
-    dict
-        In the units of the numbers.  Empty without a spread, and where `why_unknown` says why.
+    errors : in the units of the numbers; empty without a spread or an estimate
+    reason : why there is no estimate, in words; empty if there is one, or nothing to estimate
     """
-    model = problem.model
-    if not spread or not steps or not model.stresses_scale_with_modulus:
-        return {}
+    if not spread or not steps:
+        return {}, ""
     others = {column.key for column in steps[-1].readings if column.kind not in QUANTITIES}
     told = {name: x for name, x in numbers(problem, steps[-1]).items() if name not in others}
+    model = problem.model
     if model.forces_scale_with_modulus:
-        return {name: spread * abs(x) for name, x in told.items() if name.endswith(_STRESS_UNITS)}
+        return {name: spread * abs(x) for name, x in told.items() if name.endswith(_STRESS_UNITS)}, ""
     ratio = 1.0 + spread
-    if _is_press_to_force(model):
+    try:
+        if not model.stresses_scale_with_modulus or (model.finite_strain and not _is_press_to_force(model)):
+            soft, stiff = (_on_coarser_mesh(problem, len(steps), e, numbers) for e in (1.0 / ratio, ratio))
+            share = 0.5 * spread / math.log(ratio)
+        else:
+            soft, share = told, ratio
+            stiff = _stiffer_by_scaling(problem, steps, ratio, numbers, workspace)
+    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
+        return {}, str(error) or type(error).__name__
+    errors = {name: share * abs(stiff[name] - soft[name]) for name in told}
+    return {name: error for name, error in errors.items() if error > _ROUND_OFF * abs(told[name])}, ""
+
+
+def _stiffer_by_scaling(
+    problem: Problem,
+    steps: Sequence[StepResult],
+    ratio: float,
+    numbers: Callable[[Problem, StepResult], dict[str, float]],
+    workspace: Workspace | None,
+) -> dict[str, float]:
+    """Return the numbers, by name, with Young's modulus times a ratio, from a press to forces divided by it."""
+    if _is_press_to_force(problem.model):
         history = [numbers(problem, step) for step in steps]
         force = [0.0, *(entry["normal_force_N"] for entry in history)]
         softer = {
             name: float(np.interp(force[-1] / ratio, force, [0.0, *(entry[name] for entry in history)]))
-            for name in told
+            for name in history[-1]
         }
-    elif model.finite_strain or (last := _last_of_press_to_less(problem, len(steps), ratio, workspace)) is None:
-        return {}
     else:
-        softer = numbers(problem, last)
-    # the change by 1 / (1 + s) of the force, extrapolated to first order in s
-    stiff = {name: (ratio if name.endswith(_STRESS_UNITS) else 1.0) * softer[name] for name in told}
-    errors = {name: ratio * abs(x - stiff[name]) for name, x in told.items()}
-    return {name: error for name, error in errors.items() if error > _ROUND_OFF * abs(told[name])}
+        softer = numbers(problem, _last_of_press_to_less(problem, len(steps), ratio, workspace))
+    return {name: (ratio if name.endswith(_STRESS_UNITS) else 1.0) * x for name, x in softer.items()}
 
 
-def why_unknown(model: Model) -> str:
-    """Return why the errors due to the spread of Young's modulus are not known, in words; empty if they may be."""
-    if not model.stresses_scale_with_modulus:
-        return "parts, foils or the object have a modulus of their own"
-    if model.finite_strain and not model.forces_scale_with_modulus and not _is_press_to_force(model):
-        return "at large deformation, under a force in several legs or with viscosity, they take another press"
-    return ""
+def _on_coarser_mesh(
+    problem: Problem, increments: int, ratio: float, numbers: Callable[[Problem, StepResult], dict[str, float]]
+) -> dict[str, float]:
+    """Return the numbers, by name, on a coarser mesh, with Young's modulus of the main body times a ratio."""
+    model = problem.model
+    material = model.material.isotropic("the spread of E_MPa")
+    legs = _finished_legs(model, increments)
+    few = tuple(replace(leg, steps=min(int(leg.steps), _MOST_STEPS)) for leg in legs)
+    changed = replace(model, material=replace(material, E_MPa=ratio * material.E_MPa), legs=few)
+    seconds = CHANGES.seconds(forecast(replace(model, legs=legs))["total_s"])
+    factor = affordable_factor(lambda factor: coarser(changed, factor), seconds)
+    beside = built_like(problem, coarser(changed, factor))
+    return numbers(beside, last_step(beside))
 
 
-def _last_of_press_to_less(
-    problem: Problem, increments: int, ratio: float, workspace: Workspace | None
-) -> StepResult | None:
-    """Return the last increment of a press to forces divided by a ratio; None if it, or the press, did not converge."""
+def _last_of_press_to_less(problem: Problem, increments: int, ratio: float, workspace: Workspace | None) -> StepResult:
+    """Return the last increment of a press to forces divided by a ratio.
+
+    Raises
+    ------
+    Finger3dError
+        If it, or the press, did not reach the end of the path.
+    """
     legs = tuple(
         leg if leg.force_N is None else replace(leg, force_N=leg.force_N / ratio)
-        for leg in with_increments_of(problem.model.legs, increments)
+        for leg in _finished_legs(problem.model, increments)
     )
-    if len(stations(legs)) != increments:
-        return None
     *_, last = march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace)
-    return last if last.outcome.ok else None
+    if not last.outcome.ok:
+        raise Finger3dError("the press to smaller forces did not converge")
+    return last
+
+
+def _finished_legs(model: Model, increments: int) -> tuple[Leg, ...]:
+    """Return the legs with the increments of the press, which reached their end."""
+    legs = with_increments_of(model.legs, increments)
+    if len(stations(legs)) != increments:
+        raise Finger3dError("the press did not reach the end of the path")
+    return legs
 
 
 def _is_press_to_force(model: Model) -> bool:

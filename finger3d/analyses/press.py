@@ -86,7 +86,14 @@ def run_press(
     -------
     record, summary : the press, and the content of summary.json
     """
+    need = None
+    if scene.auto is not None:
+        from finger3d.analyses.effects_by_need import judge  # only a scene that leaves its effects open needs it
+
+        need = judge(scene, report)
+        scene = scene.with_effects(need.used)
     record = _solve(scene, writer, report, started)
+    record.need = need
     fields = _recover(record, writer, report)
     summary = writer.summary(record, record.outcome())
     if error:
@@ -245,15 +252,14 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, press_numbers
-    from finger3d.accuracy.modulus import modulus_errors, why_unknown
+    from finger3d.accuracy.modulus import modulus_errors
     from finger3d.accuracy.price import price_of_a_third
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
     found = estimate(record.problem, record.steps, report, press_numbers, runs)
     spread = record.scene.tables.material.constants.spread
-    by_modulus = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
-    why = why_unknown(record.problem.model) if spread else ""
+    by_modulus, why = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
     third = ""
     if found.discretisation:
@@ -263,16 +269,21 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:
-    """Estimate the effect of large deformation where it may matter; add advice on it."""
-    from finger3d.accuracy.advice import LEAST_STRAIN
-    from finger3d.accuracy.large_deformation import large_deformation
+    """Estimate what effects that are off would change; add advice on it."""
+    from finger3d.accuracy.changes import changing_numbers
 
     problem, steps = record.problem, record.steps
-    if problem.model.finite_strain or not steps or not steps[-1].outcome.ok:
+    if not steps or not steps[-1].outcome.ok:
         return
-    if record.largest_strain >= LEAST_STRAIN:
+    if record.need:
+        from finger3d.analyses.effects_by_need import of_press
+
+        record.model_error = of_press(record.need, changing_numbers(problem, steps[-1]))
+    elif not problem.model.finite_strain:
+        from finger3d.accuracy.model_error import large_deformation
+
         report.stage("estimating what large deformation would change")
-        record.large_deformation = large_deformation(problem, steps[-1], len(steps))
+        record.model_error = {"large_deformation": large_deformation(problem, steps[-1], len(steps))}
     _advise(record)
 
 
@@ -281,5 +292,6 @@ def _advise(record: PressRecord) -> None:
     from finger3d.accuracy.advice import advise
     from finger3d.mechanics.results.penetration import penetration_advice
 
-    record.advice = advise(record.problem.model, record.largest_strain, record.large_deformation)
+    large = record.model_error.get("large_deformation")
+    record.advice = advise(record.problem.model, record.largest_strain, large)
     record.advice += penetration_advice(record.problem, record.surface_checks)

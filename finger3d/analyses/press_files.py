@@ -180,9 +180,7 @@ class ResultWriter:
         figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
         figures.force_figure(self.folder / "force.png", steps)
         if markers := _markers(record):
-            from finger3d.plotting.markers import draw
-
-            draw(self.folder / "markers.png", markers)
+            figures.marker_figure(self.folder / "markers.png", markers)
         finger = DeformedFinger(
             mesh=mesh,
             displacement=fields.displacement,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -15,11 +15,13 @@ from finger3d.contact.friction import OPEN
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import History, StepResult, measure
+from finger3d.mechanics.results.slip_limit import slip_limit
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
+    from finger3d.analyses.effects_by_need import Need
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate
@@ -52,7 +54,8 @@ class PressRecord:
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
     largest_strain : principal strain at the end, without singular corners
-    large_deformation : what it would change, where it may matter
+    need : which effects are on because the scene calls for them, if it leaves that open
+    model_error : what the effects that are off would change, by name
     warnings, advice : lines for the user
     seconds : time by stage, s
     workspace : factors that increments leave for the next, those of the error estimate not among them
@@ -68,7 +71,8 @@ class PressRecord:
     step_estimate: StepEstimate | None = None
     error_estimate: ErrorEstimate | None = None
     largest_strain: float = 0.0
-    large_deformation: ChangeEstimate | None = None
+    need: Need | None = None
+    model_error: Mapping[str, ChangeEstimate] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -120,6 +124,12 @@ class PressRecord:
         detail = failed.detail and f" ({failed.detail})"
         return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}{detail}"
 
+    def _slip_limit(self) -> Tree | None:
+        """Return what the contact of the last converged increment holds before it slips as a whole."""
+        good = self.converged_steps
+        limit = slip_limit(self.problem.points, good[-1].state, self.problem.model.friction) if good else None
+        return limit.as_dict() if limit else None
+
     def summary(self, outcome: str) -> Tree:
         """Return the content of summary.json."""
         return {
@@ -129,9 +139,12 @@ class PressRecord:
             "warnings": self.warnings,
             "advice": self.advice,
             "steps": [measure(self.problem.points, step) for step in self.steps],
+            "slip_limit": self._slip_limit(),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
-            "large_deformation_estimate": self.large_deformation.as_dict() if self.large_deformation else None,
+            "model_error": {name: found.as_dict() for name, found in self.model_error.items()},
+            "model_error_methods": {name: found.method for name, found in self.model_error.items()},
+            "effects_auto": self.need.as_dict() if self.need else None,
             "refinement": self.refinement.as_dict() if self.refinement else None,
             "uniqueness": {"largest_coupling": self.coupling},
             "mesh": _mesh(self.problem),

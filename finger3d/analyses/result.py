@@ -99,6 +99,12 @@ class PressResult:
         """Return what summary.json holds: scene, effects, steps, mesh, cost, versions, errors, warnings."""
         return self._numbers
 
+    @property
+    def model_error(self) -> dict[str, dict[str, dict[str, float]]]:
+        """What each effect that is off would change: effect -> number -> change, low, high; in the number's unit."""
+        found: dict[str, dict[str, dict[str, float]]] = self._numbers.get("model_error") or {}
+        return found
+
     def to_dataframe(self, table: Literal["history", "contact", "markers"] = "history") -> pandas.DataFrame:
         """Return a table as a pandas DataFrame.
 

@@ -89,6 +89,7 @@ _NUMBERS = {
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
+    from finger3d.accuracy.changes import two_digits
     from finger3d.accuracy.error_bars import ErrorBars, with_error
     from finger3d.results.summary import readings_of
 
@@ -99,17 +100,30 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
         error = bars.total(key)
         return with_error(factor * value, None if error is None else factor * error, digits, "+-")
 
+    def of_model(key: str, factor: float = 1.0) -> str:
+        """Return what the effects that are off would change, where that is more than the error bar."""
+        least, said = bars.total(key) or 0.0, []
+        for name, changes in summary.get("model_error", {}).items():
+            change, low, high = (changes.get(key, {}).get(part, 0.0) for part in ("change", "low", "high"))
+            if abs(change) > least and low * high > 0.0:
+                middle, *ends = (two_digits(factor * x) for x in (change, low, high))
+                said.append(f"; {name.replace('_', ' ')} {middle} ({' to '.join(ends)})")
+        return "".join(said)
+
     def of_modulus(key: str, unit: str, factor: float = 1.0) -> str:
         error = bars.modulus.get(key)
         return "" if error is None else f", +- {factor * error:.2g}{unit} by the modulus"
 
     yield "outcome", summary["outcome"]
+    for name, one in ((summary.get("effects_auto") or {}).get("judged") or {}).items():
+        yield name.replace("_", " "), f"{'used' if one['used'] else 'not used'}: {one['why']}"
     if steps:
         last = steps[-1]
         depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
         yield "depth", f"{depth}, increment {summary['steps'].index(last) + 1}"
         for name, (key, factor, digits, unit) in _NUMBERS.items():
-            yield name, number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
+            text = number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
+            yield name, text + of_model(key, factor)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
         readings = readings_of(last["gauges"], last["markers"], last["taxels"])
         for (kind, sensor), group in groupby(readings, key=lambda c: (c.kind, c.sensor)):
@@ -118,7 +132,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
             text = ", ".join(number(value, c.key, 5) for c in columns if (value := readings[c]) is not None) + unit
             by_modulus = [bars.modulus.get(c.key, 0.0) for c in columns]
             name = f"{'strain' if kind == 'gauge' else kind} {sensor}"
-            yield name, text if len(columns) > 1 else text + of_modulus(key, unit)
+            yield name, text if len(columns) > 1 else text + of_modulus(key, unit) + of_model(key)
             if len(columns) > 1 and any(by_modulus):
                 yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f"{unit} by the modulus"
     if bars.discretisation:

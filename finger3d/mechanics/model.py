@@ -37,6 +37,8 @@ class Leg:
     """Straight part of the path of the object, from the end of the leg before, in equal increments.
 
     With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
+    Likewise `force_x_N` and `force_z_N`, the forces applied to the object along x and z, determine the slides.  In
+    equilibrium they are the components of the contact force on the finger.
 
     With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).
     This is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a
@@ -52,11 +54,24 @@ class Leg:
     turn_y: float = 0.0
     turn_z: float = 0.0
     force_N: float | None = None
+    force_x_N: float | None = None
+    force_z_N: float | None = None
+
+    @property
+    def forces(self) -> tuple[float | None, float | None, float | None]:
+        """Normal force and forces along x and z (N) that are prescribed in place of depth and slides; None if not."""
+        return self.force_N, self.force_x_N, self.force_z_N
+
+    @property
+    def is_under_force(self) -> bool:
+        """Whether a force is prescribed, so that the pose at the end is unknown."""
+        return any(force is not None for force in self.forces)
 
     @property
     def moves_sideways(self) -> bool:
         """Whether the object is slid or turned at its end."""
-        return any((self.slide_x_mm, self.slide_z_mm, self.turn_x, self.turn_y, self.turn_z))
+        slides = self.slide_x_mm or self.slide_z_mm or self.force_x_N is not None or self.force_z_N is not None
+        return bool(slides) or any((self.turn_x, self.turn_y, self.turn_z))
 
     def end(self, start: ObjectPose) -> ObjectPose:
         """Return the pose at the end of the leg, which begins at `start`."""
@@ -213,7 +228,7 @@ class Model:
     @property
     def forces_scale_with_modulus(self) -> bool:
         """Whether all forces are proportional to Young's modulus, and no displacement depends on it."""
-        return self.stresses_scale_with_modulus and all(leg.force_N is None for leg in self.legs)
+        return self.stresses_scale_with_modulus and not self.is_under_force
 
     @property
     def stresses_scale_with_modulus(self) -> bool:
@@ -224,6 +239,11 @@ class Model:
             for part in parts
         )
         return rigid and self.inclusions is None and self.object_compliance is None
+
+    @property
+    def is_under_force(self) -> bool:
+        """Whether a force is prescribed in any leg."""
+        return any(leg.is_under_force for leg in self.legs)
 
     @property
     def ends_at_force(self) -> bool:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from build123d import Solid
 
     from finger3d.geometry.design import Design
+    from finger3d.mold.body import Shell
     from finger3d.mold.parts import Mold
-    from finger3d.mold.shell import Shell
     from finger3d.scene import Scene
 
 
@@ -92,7 +92,7 @@ def export(
     (['finger.step', 'finger.stl'], 960.0)
     """
     from finger3d.io import claimed
-    from finger3d.mold.shell import Shell, shell, write_step, write_stl
+    from finger3d.mold.body import Shell, shell, write_step, write_stl
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     design = scene.design
@@ -191,7 +191,7 @@ def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
 
 def _volume(design: Design, solid: Solid | None, body: Shell) -> float:
     """Return the finger's volume (mm3): in closed form, by CAD, or of its triangles."""
-    from finger3d.mold.shell import volume
+    from finger3d.mold.body import volume
 
     if not isinstance(design, Imported):
         return float(design.volume_mm3)

@@ -14,9 +14,9 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import triangulated
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mold.body import Body
-from finger3d.mold.features import Feature
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import MoldOptions
+from finger3d.mold.solids import Feature
 
 if TYPE_CHECKING:
     from build123d import Solid

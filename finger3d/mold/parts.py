@@ -25,19 +25,25 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
-from finger3d.mold.body import Body
-from finger3d.mold.carrier import Keys, key_solids, keys
+from finger3d.mold.body import Body, Shell, shell
+from finger3d.mold.cover import Keys, Ports, base_region, key_solids, keys, openings, ports, riser_cup
 from finger3d.mold.demould import Draft, check_opening, undercut_depth
-from finger3d.mold.fasteners import Bolts, band_grooves, bolts, pry_notches, screws
-from finger3d.mold.features import Feature, added, cuts
+from finger3d.mold.fasteners import (
+    Bolts,
+    Pegs,
+    band_grooves,
+    bolts,
+    carrier_pins,
+    half_pegs,
+    lid_pegs,
+    pry_notches,
+    screws,
+    seal,
+)
 from finger3d.mold.foils import FoilSlot, check_foils, plugs, slot
 from finger3d.mold.layout import Layout, layout_of
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.pegs import Pegs, carrier_pins, half_pegs, lid_pegs
-from finger3d.mold.ports import Ports, base_region, openings, ports, riser_cup
-from finger3d.mold.seal import seal
-from finger3d.mold.shell import Shell, shell
-from finger3d.mold.solids import between, common, one
+from finger3d.mold.solids import Feature, added, between, common, cuts, one
 
 if TYPE_CHECKING:
     from build123d import Solid

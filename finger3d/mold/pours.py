@@ -19,8 +19,9 @@ import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.body import Body
+from finger3d.mold.cover import Ports, base_region, openings, ports, riser_cup
 from finger3d.mold.demould import check_opening, undercut_depth
-from finger3d.mold.features import Feature
+from finger3d.mold.fasteners import lid_pegs
 from finger3d.mold.foils import FoilSlot, check_foils, slot
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import MoldOptions
@@ -37,9 +38,7 @@ from finger3d.mold.parts import (
     halves_and_features,
     part,
 )
-from finger3d.mold.pegs import lid_pegs
-from finger3d.mold.ports import Ports, base_region, openings, ports, riser_cup
-from finger3d.mold.solids import common, cylinder, one, peg
+from finger3d.mold.solids import Feature, common, cylinder, one, peg
 
 if TYPE_CHECKING:
     from build123d import Solid

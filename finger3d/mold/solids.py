@@ -1,8 +1,9 @@
-"""Solids of which a mold is made: boxes, cylinders, pegs, hexagons and extruded regions."""
+"""Solids of which a mold is made: boxes, cylinders, pegs, hexagons, and the features that parts gain and lose."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ from finger3d._types import Float
 
 if TYPE_CHECKING:
     from build123d import Shape, Solid
+
 
 Place = tuple[float, float, float]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -111,3 +113,25 @@ def common(a: Shape, b: Shape) -> float:
     """Return the common volume of two solids, mm3."""
     shared = a & b
     return sum(float(s.volume) for s in shared.solids()) if shared is not None else 0.0
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Solids that are added to parts, and solids that are then cut from parts, both by the name of the part.
+
+    Parts are half_a, half_b and lid; `parts` are further ones of the feature itself.
+    """
+
+    add: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
+    cut: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
+    parts: Mapping[str, Solid] = field(default_factory=dict)
+
+
+def added(features: Iterable[Feature], name: str) -> list[Solid]:
+    """Return all that features add to a part."""
+    return [solid for feature in features for solid in feature.add.get(name, ())]
+
+
+def cuts(features: Iterable[Feature], name: str) -> list[Solid]:
+    """Return all that features cut from a part."""
+    return [solid for feature in features for solid in feature.cut.get(name, ())]

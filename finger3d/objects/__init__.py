@@ -4,13 +4,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
-from finger3d.objects.held import HeldBody
-from finger3d.objects.placed import DistanceTracker, PlacedObject
-from finger3d.objects.pose import Move, ObjectPose
-from finger3d.objects.rigid import Axis, RigidObject, vertical_frame
-from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wedge
+from finger3d.objects.placed import DistanceTracker, Move, ObjectPose, PlacedObject
+from finger3d.objects.rigid import Axis, HeldBody, RigidObject, vertical_frame
+from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.objects.triangulated import MeshObject, ObjectFile
-from finger3d.objects.wave import Wave
 
 OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
     {"plane": Plane, "cylinder": Cylinder, "sphere": Sphere, "wedge": Wedge, "wave": Wave, "mesh": ObjectFile}

@@ -10,8 +10,7 @@ import numpy as np
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.errors import Finger3dError
-from finger3d.objects.placed import PlacedObject
-from finger3d.objects.pose import Move, ObjectPose
+from finger3d.objects.placed import Move, ObjectPose, PlacedObject
 from finger3d.objects.rigid import RigidObject
 
 Top = Callable[[Float, Float], Float]

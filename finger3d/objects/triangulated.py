@@ -13,8 +13,7 @@ from finger3d._ranges import PathName, Scale
 from finger3d._types import Float
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
-from finger3d.objects.held import HALF_TURN, HeldBody
-from finger3d.objects.rigid import RigidObject
+from finger3d.objects.rigid import HALF_TURN, HeldBody, RigidObject
 
 _LEVEL = 1e-6  # of the size: points this little above the lowest one count as lowest too (STL has single precision)
 _MOST = 2_000  # points that are compared with their mirror images

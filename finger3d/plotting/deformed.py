@@ -15,10 +15,20 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.plotting.camera import WINDOW, flat
 from finger3d.plotting.gauges import Mark, draw_marks
-from finger3d.plotting.outlines import edges_of, interfaces_of, outline_of
-from finger3d.plotting.panels import Marks, highest_of, keys, palette, pressure_colours, sliced, two_panels
+from finger3d.plotting.panels import (
+    Marks,
+    edges_of,
+    highest_of,
+    interfaces_of,
+    keys,
+    outline_of,
+    palette,
+    pressure_colours,
+    sliced,
+    two_panels,
+)
+from finger3d.plotting.renderer import WINDOW, flat
 from finger3d.plotting.solid import BODY, FEATURE, LINE, OBJECT, OBJECT_TINT, REST, draw_solid, render_solids, skin_of
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Pictures of a press, drawn without a display: the contact tractions, and force against depth."""
+"""Pictures of a press, drawn without a display: contact tractions, force against depth, displacements of markers."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from finger3d.plotting.solid import COLOURS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
+
 
 _FEWEST_ON_LINE = 5
 _MOST_MARKERS = 40  # increments that are marked on a curve
@@ -217,3 +218,56 @@ def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status:
     handles += patches(_SHADES, [s for s in (STICK, SLIP) if np.any(status == s)])
     finish(axes, handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=3, columnspacing=1.4)
     axes.grid(False, axis="x")
+
+
+_MAGNIFIED = (1.0, 2.0, 5.0)  # times a power of ten
+_LONGEST = 0.12  # of an arrow, over the extent of the markers
+_MARKERS_WIDTH, _LEAST_HEIGHT = 8.4, 2.9  # inches
+_MARKERS_MARGINS = (0.9, 1.4, 0.6, 0.45)
+_MARKERS_CMAP = "viridis"
+
+
+def marker_figure(path: Path, table: Mapping[str, ArrayLike]) -> None:
+    """Draw the displacements after the last increment as magnified arrows; the colour is that along y.
+
+    Markers of a solid are seen along the press axis, those of a section along z.
+
+    Parameters
+    ----------
+    path : PNG file to write
+    table : columns of markers.csv
+    """
+    step = np.asarray(table["step"])
+    last = step == step.max()
+    x, y, z = (np.asarray(table[f"{axis}_mm"], dtype=float)[last] for axis in "xyz")
+    along = {axis: np.asarray(table[f"displacement_{axis}_mm"], dtype=float)[last] for axis in "xyz"}
+    solid = bool(np.any(z != 0.0) or np.any(along["z"] != 0.0))
+    across, moved, name = (z, along["z"], "z") if solid else (y, along["y"], "y")
+    extent = max(float(np.ptp(x)), float(np.ptp(across)), 1.0)
+    longest = float(np.hypot(along["x"], moved).max())
+    factor = _round(_LONGEST * extent / longest) if longest > 0.0 else 1.0
+    left, right, below, above = _MARKERS_MARGINS
+    pad = 0.08 * extent
+    shape = (float(np.ptp(across)) + 2.0 * pad) / (float(np.ptp(x)) + 2.0 * pad)
+    height = max(_LEAST_HEIGHT, (_MARKERS_WIDTH - left - right) * shape + below + above)
+    made = sheet(1, 1, (_MARKERS_WIDTH, height), _MARKERS_MARGINS)
+    (axes,) = made.axes
+    arrows = axes.quiver(
+        x, across, factor * along["x"], factor * moved, along["y"], cmap=_MARKERS_CMAP, angles="xy", scale_units="xy",
+        scale=1.0, width=0.0025, zorder=3,
+    )  # fmt: skip
+    axes.plot(x, across, "o", ms=2.0, color="#777777", zorder=2)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    depth = float(np.asarray(table["depth_mm"], dtype=float)[last][0])
+    axes.set_title(f"markers at {depth:.4g} mm, displacements drawn {factor:g} times", fontsize=11)
+    finish(axes, "x (mm)", f"{name} (mm)")
+    bar = made.figure.colorbar(arrows, ax=axes, fraction=0.04, pad=0.02)
+    bar.set_label("displacement along y (mm)")
+    made.save(path)
+
+
+def _round(value: float) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(f * power for f in _MAGNIFIED if f * power <= value * (1.0 + 1e-9)))

@@ -1,4 +1,4 @@
-"""Exploded view of a mold, rendered by PyVista, or drawn by matplotlib if PyVista cannot render."""
+"""Exploded view of a mold and its steps of casting, by PyVista, or by matplotlib if PyVista cannot render."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
-from finger3d.plotting.camera import viewer_axes
 from finger3d.plotting.layout import blank, save
-from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render
+from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render, viewer_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,11 +42,13 @@ OPACITY = {"half_b": 0.35}
 LABELS = {"half_a": "half A", "half_b": "half B", "strips": "gauge strips"}
 
 _VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
+_LYING = np.array([0.1, 1.0, 0.7])  # the same for parts on the bed, from above
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
 _SEPARATION = 0.45  # distance between the parts, relative to their largest extent
 _WINDOW_OVER_PARTS = 1.08  # size of the window over that of the parts
 _WIDTH, _TITLE_HEIGHT = 10.0, 0.5  # of the figure and of its title, in inches
 _DPI = 130  # pixels per inch
+_STEP_WIDTH, _STEP_DPI = 6.0, 110  # the same for a step of casting
 _LABEL_FACTOR = 1.6  # width of the figure over that of the parts; the rest holds the labels
 _PIXELS = round(_WIDTH * _DPI / _LABEL_FACTOR)  # width of the rendered image
 
@@ -257,3 +258,38 @@ def rendered(views: Sequence[Scenery]) -> list[Image] | None:
         )
         drawings.append(Drawing(Camera(view.axes, view.middle, float(height), window), parts))
     return render(drawings)
+
+
+@dataclass(frozen=True)
+class StepPicture:
+    """Picture of a step.
+
+    Attributes
+    ----------
+    path : PNG file
+    parts : surfaces, mm, by the names of parts, y up, or z up on the bed
+    on_bed : whether the parts lie on the bed of the printer
+    """
+
+    path: Path
+    parts: Mapping[str, Triangles]
+    on_bed: bool = False
+
+
+def step_pictures(pictures: Sequence[StepPicture]) -> str:
+    """Write the pictures of all steps, in one run of the renderer; returns the renderer."""
+    views = [scenery(_y_up(p), _LYING, opaque=True) if p.on_bed else scenery(p.parts) for p in pictures]
+    images = rendered(views)
+    for i, (one, view) in enumerate(zip(pictures, views, strict=True)):
+        width, height = view.half
+        figure = blank(_STEP_WIDTH, float(_STEP_WIDTH * height / width))
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        show(axes, view, None if images is None else images[i])
+        save(figure, one.path, _STEP_DPI)
+    return "matplotlib" if images is None else "pyvista"
+
+
+def _y_up(picture: StepPicture) -> dict[str, Triangles]:
+    """Return parts on a bed (z up) with y up, as the camera stands."""
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    return {name: Triangles(part.points @ turn.T, part.faces) for name, part in picture.parts.items()}

@@ -1,4 +1,4 @@
-"""The two panels of pictures of a finger, contact pressure and status: their frames, colours and keys."""
+"""The two panels of pictures of a finger, contact pressure and status: their frames, colours, keys and outlines."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.fem.mesh.simplex import Mesh
+from finger3d.geometry.design import Design
 from finger3d.plotting.layout import WIDEST, blank, head
 from finger3d.plotting.solid import BODY, COLOURS
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
+    from matplotlib.path import Path
+
 
 Marks = Sequence[tuple[str, Float]]
 """Labels of gauges, and their start, middle and end, shape (3, d), mm."""
@@ -116,3 +120,65 @@ def pressure_colours(values: Float, highest: float, status: Int) -> Float:
 def highest_of(pressure: Float) -> float:
     """Return the upper end of the pressure scale, MPa; 1 if nothing is in contact."""
     return float(pressure.max(initial=0.0)) or 1.0
+
+
+_MOST_CELLS = 4000  # of a mesh whose edges are drawn; those of a finer mesh would merge into a grey area
+
+
+def _runs(lines: Float) -> Path:
+    """Return one path of k separate polylines, shape (k, p, 2): far faster to draw than k artists."""
+    from matplotlib.path import Path
+
+    codes = np.full(lines.shape[:2], Path.LINETO)
+    codes[:, 0] = Path.MOVETO
+    return Path(lines.reshape(-1, 2), codes.ravel())
+
+
+def edges_of(mesh: Mesh, moved: Float) -> Path:
+    """Return every edge of the cells once, at nodes moved to (n, 2) mm; an empty path for a very fine mesh."""
+    if len(mesh.cells) > _MOST_CELLS:
+        return _runs(np.zeros((0, 2, 2)))
+    edges = _sides(mesh)
+    ends = np.sort(edges[:, [0, -1]], axis=1)
+    return _runs(moved[edges[np.unique(ends, axis=0, return_index=True)[1]]])
+
+
+def interfaces_of(mesh: Mesh, moved: Float) -> Path:
+    """Return the edges between the parts of a section, at nodes moved to (n, 2) mm; an empty path for one part."""
+    edges = _sides(mesh)
+    if mesh.part is None:
+        return _runs(moved[edges[:0]])
+    part = np.repeat(mesh.part, 3)
+    _, first, number = np.unique(np.sort(edges[:, [0, -1]], axis=1), axis=0, return_index=True, return_inverse=True)
+    between = np.zeros(len(first), dtype=np.bool_)
+    number = number.ravel()
+    np.logical_or.at(between, number, part != part[first[number]])
+    return _runs(moved[edges[first[between]]])
+
+
+def _sides(mesh: Mesh) -> Int:
+    """Return the nodes (3 e, 2 or 3) along the edges of all cells, in order."""
+    sides = mesh.element.edges
+    if mesh.element.is_quadratic:
+        sides = np.insert(sides, 1, range(3, 6), axis=1)
+    return np.asarray(mesh.cells[:, sides].reshape(-1, len(sides[0])))
+
+
+def outline_of(mesh: Mesh, moved: Float) -> Path:
+    """Return the boundary of a section as a closed path, at nodes moved to (n, 2) mm."""
+    from matplotlib.path import Path
+
+    facets = np.concatenate([f for f in mesh.facets.values() if len(f)])
+    facets = facets[:, [0, 2, 1]] if mesh.element.is_quadratic else facets
+    following = {int(a): i for i, a in enumerate(facets[:, 0])}
+    ring = [0]
+    while (after := following[int(facets[ring[-1], -1])]) != 0:
+        ring.append(after)
+    return Path(np.concatenate([moved[facets[ring, :-1]].reshape(-1, 2), moved[facets[:1, 0]]]), closed=True)
+
+
+def middle_section(design: Design, count: int = 201) -> Float:
+    """Return the closed outline (k, 2), mm, of the section of a finger at z = 0, with `count` points on its top."""
+    half = design.half_length_mm
+    x = np.linspace(-half, half, count)
+    return np.column_stack([[-half, *x, half, -half], [0.0, *np.nan_to_num(design.top(x, np.zeros_like(x))), 0.0, 0.0]])

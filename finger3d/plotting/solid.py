@@ -13,8 +13,21 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
-from finger3d.plotting.camera import AXES, WINDOW, flat, framed, half_height
-from finger3d.plotting.renderer import Arrows, Camera, Drawing, Image, Polygons, Polylines, render, unshared
+from finger3d.plotting.renderer import (
+    AXES,
+    WINDOW,
+    Arrows,
+    Camera,
+    Drawing,
+    Image,
+    Polygons,
+    Polylines,
+    flat,
+    framed,
+    half_height,
+    render,
+    unshared,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

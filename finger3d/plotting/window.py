@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.plotting.animation import mesh_of
 from finger3d.plotting.gauges import COLOUR, marks_of
-from finger3d.plotting.show import found
+from finger3d.plotting.show import found, mesh_of
 from finger3d.plotting.solid import OBJECT_OPACITY, OBJECT_TINT
 from finger3d.results.states import States, captions
 from finger3d.results.vtu import grid

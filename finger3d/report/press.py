@@ -63,11 +63,6 @@ _STEP_COLUMNS = {
 }
 """Key of a step -> column of the table of steps."""
 
-_CHANGES = {
-    "large_deformation_estimate": "What large deformation would change",
-}
-"""Key of summary.json -> heading on the page."""
-
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
 
@@ -120,6 +115,7 @@ def press_page(folder: str | Path) -> Path:
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
+        *([_slip_limit(limit)] if (limit := summary.get("slip_limit")) else []),
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
@@ -190,16 +186,41 @@ def _error_bars(bars: ErrorBars) -> PageSection:
 
 
 def _changes(summary: TreeView) -> list[PageSection]:
-    """Return what large deformation would change, if it was estimated."""
+    """Return which effects the scene calls for, if it left that open, and what those that are off would change."""
     out = []
-    for key, title in _CHANGES.items():
-        found = summary.get(key)
-        if not found or not found["changes"]:
-            continue
-        rows = [(name, c["value"], c["change"], c["error"]) for name, c in found["changes"].items()]
-        head = ("number, in the unit of its name", "in this press", "change", "its error")
-        out.append(PageSection(title, [f"Estimated from {found['method']}.", Table(head, rows)], folded=True))
+    if need := summary.get("effects_auto"):
+        rows = [
+            (name, "used" if one["used"] else "not used", one["why"], f"{one['seconds']:.2g}")
+            for name, one in need["judged"].items()
+        ]
+        rows += [(name, "not judged", why, "") for name, why in need["not_judged"].items()]
+        text = f"An effect is used if it changes a number by more than {100.0 * need['tolerance']:g} %."
+        out.append(PageSection("Effects", [text, Table(("effect", "used", "why", "seconds"), rows)]))
+    for name, changes in summary.get("model_error", {}).items():
+        if changes:
+            rows = [(key, c["change"], c["low"], c["high"]) for key, c in changes.items()]
+            head = ("number, in the unit of its name", "change", "from", "to")
+            text = f"Estimated from {summary['model_error_methods'][name]}."
+            title = f"Model error: what {name.replace('_', ' ')} would change"
+            out.append(PageSection(title, [text, Table(head, rows)], folded=True))
     return out
+
+
+def _slip_limit(limit: TreeView) -> PageSection:
+    """Return the largest tangential forces and torque that the last contact holds, and the share that it transmits."""
+    names = {
+        "tangential_force_x_N": "net friction along x (N)",
+        "tangential_force_z_N": "net friction along z (N)",
+        "moment_y_Nmm": "moment of friction about the press axis (N mm)",
+    }
+    rows = [(text, limit[key]) for key, text in names.items() if limit[key] is not None]
+    said = (
+        "The largest net friction along x and along z, and the largest moment about the press axis through the centre "
+        "of pressure, each alone, that the last contact transmits before it slips as a whole: every point at its "
+        "friction limit, with its normal force as it is. Together they bound an ellipsoid (Howe and Cutkosky 1996), on "
+        f"which {100.0 * limit['used']:.3g} % of the friction available is used."
+    )
+    return PageSection("How near to slipping", [said, Table(("resultant", "largest"), rows)])
 
 
 def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[PressStep]) -> PageSection:

@@ -106,7 +106,7 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
             continue
         if leg.depth_mm is None:
             pass
-        elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
+        elif i == 0 and leg.depth_mm == 0.0 and any((*_target(leg)[4:], leg.force_x_N, leg.force_z_N)):
             lines.append(f"{dotted(place)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
             lines.append(f"{dotted((*place, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
@@ -117,14 +117,42 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
                     f"{dotted((*place, key))} = {shown(value)}: must be a number from -{at_most(far)} to "
                     f"{at_most(far)}, {LONGEST_SLIDE:g} times the finger's half length"
                 )
+        lines += _tangential(place, leg, legs[i - 1] if i else None, solid)
         for key in () if solid else ("slide_z_mm", "turn_x_deg", "turn_y_deg"):
             if (value := getattr(leg, key)) != 0.0:
                 lines.append(f"{dotted((*place, key))} = {shown(value)}: must be 0.0 in a 2D domain")
     return lines
 
 
+def _tangential(place: Place, leg: LegTable, before: LegTable | None, solid: bool) -> list[str]:
+    """Return a line about every tangential force that cannot act, and a slide that is missing after one."""
+    lines = []
+    for axis in "xz":
+        force, slide = (f"{name}_{axis}_{unit}" for name, unit in (("force", "N"), ("slide", "mm")))
+        what = f"{dotted((*place, force))} = {shown(value := getattr(leg, force))}"
+        after_force = before is not None and getattr(before, force) is not None
+        if value is None:
+            if after_force and leg.depth_mm != 0.0 and slide not in leg.model_fields_set:
+                lines.append(
+                    f"{dotted((*place, force))} is missing: the leg before has {force} = "
+                    f"{shown(getattr(before, force))}; give it here, too, or {slide} to which the object then moves"
+                )
+        elif axis == "z" and not solid:
+            lines.append(f"{what}: must be left out in a 2D domain")
+        elif getattr(leg, slide):
+            lines.append(
+                f"{what}: must not stand beside {slide} = {shown(getattr(leg, slide))}; give either a force or a slide"
+            )
+        elif before is None or before.depth_mm == 0.0 or leg.depth_mm == 0.0:
+            lines.append(
+                f"{what}: there is no contact to hold it; give a tangential force in a leg that begins and ends pressed"
+            )
+    return lines
+
+
 def _target(leg: LegTable) -> tuple[float | None, ...]:
-    return leg.force_N, leg.depth_mm, leg.slide_x_mm, leg.slide_z_mm, leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg
+    slides, turns = (leg.slide_x_mm, leg.slide_z_mm), (leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg)
+    return leg.force_N, leg.depth_mm, leg.force_x_N, leg.force_z_N, *slides, *turns
 
 
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:

@@ -78,4 +78,14 @@ def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) 
         material = Isotropic(constants.E_MPa, constants.nu)
         way = contact_path(design, obj, (), tables.model.domain)
         leg["depth_mm"] = forecast_depth(way, material, leg["force_N"], design.height_mm, design.width_mm)
+    for axis in "xz":
+        if (force := leg[f"force_{axis}_N"]) is not None:
+            leg[f"slide_{axis}_mm"] = forecast_slide(tables.material.constants, force, design)
     return Leg(**leg)
+
+
+def forecast_slide(constants: ElasticConstants, force: float, design: Design) -> float:
+    """Return a rough slide (mm) under a tangential force (N): simple shear of half of the finger's base area."""
+    shear = constants.E_MPa / (2.0 * (1.0 + constants.nu))
+    slide = force * design.height_mm / (shear * design.half_length_mm * design.width_mm)
+    return math.copysign(min(abs(slide), 0.5 * design.half_length_mm), force)

@@ -12,6 +12,7 @@ from finger3d.geometry.registry import designs
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene.messages import described, listed, shown
 from finger3d.scene.tables import (
+    AutoTable,
     ContactTable,
     DomainTable,
     FileTable,
@@ -68,6 +69,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     yield "[[marker]]", _rows(MarkerTable)
     yield "[marker_grid]", _rows(MarkerGridTable)
     yield "[[taxel]]", _rows(TaxelTable)
+    yield "[effects]", _rows(AutoTable)
     for name in effect_names():
         effect = effect_type(name)
         rows = _rows(table_of(effect), effect)

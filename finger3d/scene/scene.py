@@ -28,6 +28,7 @@ from finger3d.scene.derived import legs_of, parts_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.tables import (
+    AutoTable,
     LegsTable,
     LegTable,
     PressTable,
@@ -40,6 +41,9 @@ from finger3d.scene.tables import (
 
 AnyTable = TypeVar("AnyTable", bound=TomlTable)
 
+_AUTO_TOLERANCE = 0.02
+"""Default relative change of a number above which an effect is needed."""
+
 
 @dataclass(frozen=True, repr=False)
 class Scene:
@@ -51,7 +55,8 @@ class Scene:
     design : the finger, a frozen dataclass from geometries/
     object : the rigid object
     mesh : edge lengths and mesher
-    effects : name -> settings of the effects that are on
+    effects : name -> settings of the effects that are on, or that are on where they are needed
+    auto : relative change of a number above which an effect is needed; None: all are on
     given : what the user wrote, overrides included
     path : the file, or None
     """
@@ -61,6 +66,7 @@ class Scene:
     object: RigidObject = field(compare=False)
     mesh: MeshOptions = field(compare=False)
     effects: TreeView = field(compare=False)
+    auto: float | None
     given: TreeView = field(compare=False)
     path: Path | None = field(compare=False, default=None)
 
@@ -113,8 +119,27 @@ class Scene:
             return replace(self, mesh=mesh)
         return parse({**self.given, "mesh": mesh.as_table()}, self.path)
 
+    def with_effects(self, names: Iterable[str]) -> Scene:
+        """Return the scene with some effects on, with its own settings of each or else the default ones."""
+        given = self.given.get("effects", {})
+        return parse({**self.given, "effects": {name: given.get(name, {}) for name in names}}, self.path)
+
     def model(self) -> Model:
-        """Return the model: the baseline, and then every effect that is on. Angles are in radians."""
+        """Return the model: the baseline, and then every effect that is on. Angles are in radians.
+
+        Raises
+        ------
+        Finger3dError
+            If it is still open which effects are on.
+        """
+        if self.auto is not None:
+            raise Finger3dError(
+                "effects.auto = true: a press finds which effects this scene calls for; take the scene.toml that "
+                "finger3d press writes"
+            )
+        return self._assembled()
+
+    def _assembled(self) -> Model:
         t = self.tables
         model = Model(
             design=self.design,
@@ -164,8 +189,9 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
         raise messages.refusal(lines, path, set_keys)
     try:
         mesh = parts.mesh()
-        scene = Scene(parts.filled_in(mesh), parts.design, parts.object, mesh, parts.effects, given, path)
-        scene.model()  # effects may refuse what the rest of the scene asks for
+        filled, auto = parts.filled_in(mesh), parts.tolerance_of_effects
+        scene = Scene(filled, parts.design, parts.object, mesh, parts.effects, auto, given, path)
+        scene._assembled()  # effects may refuse what the rest of the scene asks for
     except Finger3dError as error:
         raise messages.refusal([str(error)], path, set_keys) from None
     return scene
@@ -185,6 +211,7 @@ class _Parts:
     press: PressTable | LegsTable
     settings: Mapping[str, TomlTable]
     effects: TreeView
+    auto: AutoTable
 
     @property
     def legs(self) -> tuple[LegTable, ...]:
@@ -194,6 +221,12 @@ class _Parts:
         """Return the mistakes that show only when tables are read together."""
         unit = files.unit_mistake(self.design, self.object)
         return checks.check(self.tables, self.legs, self.design) + ([unit] if unit else [])
+
+    @property
+    def tolerance_of_effects(self) -> float | None:
+        """Relative change of a number above which an effect is needed; None: all are on."""
+        given = self.auto.auto_tolerance or self.tables.mesh.tolerance or _AUTO_TOLERANCE
+        return given if self.auto.auto else None
 
     def mesh(self) -> MeshOptions:
         """Return the edge lengths, given or chosen.
@@ -208,7 +241,7 @@ class _Parts:
         way = contact_path(self.design, self.object, legs, domain)
         box, linear = initial_contact(way).contact_box, not set(self.settings) - {"kinetic_friction"}
         # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
-        quick = linear and self.tables.friction.mu > 0.0 and all(leg.force_N is None for leg in self.legs)
+        quick = linear and self.tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in legs)
         return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)
 
     def filled_in(self, mesh: MeshOptions) -> SceneTable:
@@ -224,7 +257,8 @@ class _Parts:
                 "mesh": self.tables.mesh
                 if self.tables.mesh.tolerance
                 else self.tables.mesh.model_copy(update=mesh.as_table()),
-                "effects": {name: settings.model_dump() for name, settings in self.settings.items()},
+                "effects": {name: settings.model_dump() for name, settings in self.settings.items()}
+                | ({"auto": True, "auto_tolerance": self.tolerance_of_effects} if self.auto.auto else {}),
             }
         )
 
@@ -239,8 +273,8 @@ def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
     shape, placed = _named(shaped, "object", "shape", OBJECTS, mistakes)
     rigid = _object(shape, placed, mistakes)
     press = _press(document, mistakes)
-    settings, effects = _effects(document, mistakes)
-    if mistakes or not (tables and dimensions and design and placed and rigid and press):
+    settings, effects, auto = _effects(document, mistakes)
+    if mistakes or not (tables and dimensions and design and placed and rigid and press and auto):
         return None
     return _Parts(
         tables=tables,
@@ -253,6 +287,7 @@ def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
         press=press,
         settings=settings,
         effects=effects,
+        auto=auto,
     )
 
 
@@ -366,17 +401,28 @@ def _press(document: TreeView, mistakes: dict[Place, str]) -> PressTable | LegsT
     return _checked(LegsTable, press, ("press",), mistakes)
 
 
-def _effects(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree]:
-    """Check the effects that are present, the only ones that are imported; return their tables and their settings."""
+def _effects(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:
+    """Check the effects that are present, the only ones that are imported; return their tables and their settings, and
+    whether they are used only where they are needed.
+    """
     tables: dict[str, TomlTable] = {}
     effects: Tree = {}
     present = document.get("effects")
-    for name, settings in present.items() if isinstance(present, Mapping) else ():
+    present = present if isinstance(present, Mapping) else {}
+    keys = {name: value for name, value in present.items() if name in AutoTable.model_fields}
+    auto = _checked(AutoTable, keys, ("effects",), mistakes, also=effect_names())
+    if auto and auto.auto_tolerance and not auto.auto:
+        mistakes["effects", "auto_tolerance"] = (
+            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: only with effects.auto = true"
+        )
+    for name, settings in present.items():
+        if name in AutoTable.model_fields:
+            continue
         place = ("effects", name)
         if name not in effect_names():
-            mistakes[place] = unknown(place, settings, effect_names(), kind="effect")
+            mistakes[place] = unknown(place, settings, (*effect_names(), *AutoTable.model_fields), kind="effect")
         elif not isinstance(settings, Mapping):
             mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
         elif table := _checked(table_of(effect_type(name)), settings, place, mistakes):
             tables[name], effects[name] = table, _built(effect_type(name), table, place, mistakes)
-    return tables, effects
+    return tables, effects, auto

@@ -19,6 +19,7 @@ from finger3d.objects import OBJECTS
 from finger3d.scene import tables
 from finger3d.scene.reference import descriptions
 from finger3d.scene.tables import (
+    AutoTable,
     FileTable,
     LegsTable,
     LegTable,
@@ -50,7 +51,7 @@ def schema() -> Tree:
     keys["object"] = _one_of("what the finger is pressed on; without it a rigid plane", shapes)
     keys["press"] = _one_of("the motion of the object", [_press(), _legs()])
     keys["material"] |= _one_modulus()
-    effects = {name: _documented(effect_type(name)) for name in effect_names()}
+    effects = _of(AutoTable)["properties"] | {name: _documented(effect_type(name)) for name in effect_names()}
     keys["effects"] = {"type": "object", "additionalProperties": False, "properties": effects}
     for name, description in descriptions(SceneTable).items():
         keys[name] |= {"description": description}

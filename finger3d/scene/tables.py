@@ -26,6 +26,7 @@ from finger3d._ranges import (
     Radians,
     Seconds,
     Shore,
+    SignedForce,
     Title,
     Zero,
 )
@@ -108,6 +109,7 @@ class LegTable(TomlTable):
     ----------
     depth_mm : of the object below the first touch, less than the finger's height
     force_N : normal force, in place of the depth, which follows
+    force_x_N, force_z_N : force applied to the object along x, z, in place of a slide, which follows; 0 leaves it free
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
     turn_x_deg, turn_y_deg, turn_z_deg : how it then is turned about its lowest point, about x, then y, then z
     steps : equal parts of the leg; "auto": 10 along the exact path of a section, else as errors of 1 % ask for
@@ -116,6 +118,8 @@ class LegTable(TomlTable):
 
     depth_mm: Zero | Length | None = None
     force_N: Force | None = None
+    force_x_N: SignedForce | None = None
+    force_z_N: SignedForce | None = None
     slide_x_mm: Place = 0.0
     slide_z_mm: Place = 0.0
     turn_x_deg: Angle = 0.0
@@ -283,6 +287,19 @@ class SceneTable(TomlTable):
     marker_grid: MarkerGridTable | None = None
     taxel: tuple[TaxelTable, ...] = ()
     effects: Tree = {}
+
+
+class AutoTable(TomlTable):
+    """[effects] itself: whether the effects that it names are used only where they are needed.
+
+    Attributes
+    ----------
+    auto : use large deformation and each effect named below only if it changes a number by more than the tolerance
+    auto_tolerance : relative; mesh.tolerance unless given, else 0.02
+    """
+
+    auto: bool = False
+    auto_tolerance: Annotated[float, Gt(0), Lt(1)] | None = None
 
 
 class FileTable(TomlTable):

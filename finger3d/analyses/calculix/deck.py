@@ -1,18 +1,84 @@
-"""Text of an input deck of CalculiX: a meshed body pressed by a rigid object.
+"""Input deck of CalculiX, its text and its run: a meshed body pressed by a rigid object.
 
 The contact is CalculiX's surface to surface penalty.  The object is made of elements behind its surface, all of whose
 nodes are moved.  Sources: CalculiX CrunchiX user's manual 2.20, sec. 6.2 (elements), 6.7.8 (contact), 7 (cards).
+Its hyperelastic energies are those of the isochoric invariants, with the volumetric part (J - 1)^2 / D1; hence
+D1 = 2 / K.
 """
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.solids.material import Material
+
+MOST_TERMS = 3
+"""Largest number of terms of Ogden's law in CalculiX."""
+
+_NO_TERM = 1e12
+"""Compressibility D_k, over D_1, of a volumetric term (J - 1)^2k / D_k that is left out: CalculiX takes 0 for a value
+that is not given, and puts in one of its own."""
+
+_ONE_CARD = 8  # constants on a line of a deck
+
+
+def law_cards(material: Material, law: IsochoricLaw | None) -> tuple[str, ...]:
+    """Return the cards of a material: linear elasticity without a hyperelastic `law`.
+
+    Raises
+    ------
+    Finger3dError
+        If CalculiX has no such law.
+    """
+    own = material.isotropic("--solver calculix")
+    if own.nu >= 0.5:
+        raise Finger3dError(
+            "--solver calculix: CalculiX has no elements for nu = 0.5; lower material.nu, for instance to 0.49"
+        )
+    if law is None:
+        return ("*ELASTIC", f"{own.E_MPa:.12g}, {own.nu:.12g}")
+    shear, bulk = own.E_MPa / (2.0 * (1.0 + own.nu)), own.E_MPa / (3.0 * (1.0 - 2.0 * own.nu))
+    return _hyperelastic(law.with_shear(shear), 2.0 / bulk)
+
+
+def _hyperelastic(law: IsochoricLaw, d1: float) -> tuple[str, ...]:
+    match law:
+        case NeoHooke():
+            return _cards("NEO HOOKE", [0.5 * law.shear, d1])
+        case MooneyRivlin():
+            half = 0.5 * law.shear
+            return _cards("MOONEY-RIVLIN", [half * (1.0 - law.c01_share), half * law.c01_share, d1])
+        case Yeoh():
+            c1 = 0.5 * law.shear
+            return _cards("YEOH", [c1, c1 * law.c2_over_c1, c1 * law.c3_over_c1, d1, *2 * [_NO_TERM * d1]])
+        case Ogden() if len(law.terms) <= MOST_TERMS:
+            # CalculiX sums 2 mu / alpha^2 (l1^alpha + ...); this project mu / alpha (...) with mu = 2 share G / alpha
+            terms = [number for share, alpha in law.terms for number in (share * law.shear, alpha)]
+            return _cards(f"OGDEN, N={len(law.terms)}", [*terms, d1, *(len(law.terms) - 1) * [_NO_TERM * d1]])
+        case Ogden():
+            raise Finger3dError(
+                f"--solver calculix: effects.large_deformation.terms: CalculiX has Ogden's law with up to {MOST_TERMS} "
+                f"terms, and the scene {len(law.terms)}"
+            )
+    raise Finger3dError(f"--solver calculix: CalculiX has no equal of effects.large_deformation's {type(law).__name__}")
+
+
+def _cards(name: str, constants: list[float]) -> tuple[str, ...]:
+    text = [f"{c:.12g}" for c in constants]
+    lines = [", ".join(text[i : i + _ONE_CARD]) for i in range(0, len(text), _ONE_CARD)]
+    return (f"*HYPERELASTIC, {name}", *lines)
+
 
 OBJECT = "NOBJECT"
 """Name of the object's node set; its total force, which ccx prints, is the contact force on the meshed part."""
@@ -207,3 +273,44 @@ def _rows(points: Float, first: int) -> list[str]:
 
 def _cells(cells: Int, numbers: Int) -> list[str]:
     return [", ".join(map(str, (n, *c))) for n, c in zip(numbers.tolist(), cells.tolist(), strict=True)]
+
+
+_NUMBER = r"\s*([-+]?\d\.\d+E[-+]\d+)"
+_TOTAL = re.compile(rf"total force \(fx,fy,fz\) for set {OBJECT} and time\s+(\S+)\s+{_NUMBER}{_NUMBER}{_NUMBER}")
+_SAID = 300  # last characters of what it said, in a message
+
+
+def program() -> str | None:
+    """Return the path of ccx; None if it is not installed."""
+    return shutil.which("ccx")
+
+
+def solve(deck: Path, seconds: float) -> None:
+    """Run ccx on a deck; its results lie beside it.
+
+    Raises
+    ------
+    MissingError
+        If ccx is not installed.
+    RuntimeError
+        If it did not reach the end.
+    subprocess.TimeoutExpired
+        If it takes longer than so many seconds.
+    """
+    ccx = program()
+    if ccx is None:
+        raise MissingError("ccx, CalculiX's solver, is not installed; apt install calculix-ccx")
+    command = [ccx, deck.stem]
+    done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=seconds, check=False)
+    if done.returncode != 0 or "Job finished" not in done.stdout:
+        raise RuntimeError(f"ccx ended with {done.returncode}: {' '.join(done.stdout[-_SAID:].split())}")
+
+
+def printed_forces(path: Path) -> tuple[Float, Float]:
+    """Return the times (n,) and the forces (n, 3), N, on the meshed part from the .dat file of a run.
+
+    A step lasts from one whole number to the next.
+    """
+    found = _TOTAL.findall(path.read_text(encoding="ascii", errors="replace"))
+    table = np.array([[float(value) for value in row] for row in found]).reshape(-1, 4)
+    return table[:, 0], table[:, 1:]

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, DeckStep
-from finger3d.analyses.calculix.laws import law_cards
+from finger3d.analyses.calculix.deck import OBJECT, Contact, Deck, DeckStep, law_cards
 from finger3d.analyses.calculix.objects import object_elements
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
@@ -112,10 +111,10 @@ def _check(model: Model) -> None:
     if type(model.friction) is not Coulomb:
         filled = dict(model.filled).get("friction", type(model.friction).__name__)
         raise Finger3dError(f"--solver calculix: CalculiX has no equal of [effects.{filled}]; take it out")
-    if any(leg.force_N is not None for leg in model.legs):
+    if model.is_under_force:
         raise Finger3dError(
-            "--solver calculix: force_N: a deck moves the object by depths; give depth_mm, for instance that which "
-            "`finger3d press` finds"
+            "--solver calculix: force_N: a deck moves the object by depths and slides; give depth_mm, for instance "
+            "what `finger3d press` finds, and slides in place of force_x_N and force_z_N"
         )
     if model.held_ends:
         raise Finger3dError("--solver calculix: ends that are held cannot be written")

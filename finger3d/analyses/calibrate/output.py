@@ -57,7 +57,7 @@ def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -
 
 def write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge: Gauge) -> None:
     """Map the sensitivity of strain to mu over the section to map.csv and map.png."""
-    from finger3d.plotting.strain_map import draw_map
+    from finger3d.plotting.calibration import draw_map
     from finger3d.sensor.maps import StrainMap
 
     found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)

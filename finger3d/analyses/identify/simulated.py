@@ -18,7 +18,7 @@ from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
-from finger3d.materials.shore import modulus_of_shore_00, modulus_of_shore_A
+from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
@@ -180,7 +180,7 @@ def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[floa
 
 def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: MeasuredPress) -> None:
     """Raise an error for measured depths that the path of the scene does not have, before anything is solved."""
-    if measured.index != "depth_mm" or any(leg.force_N is not None for leg in legs):
+    if measured.index != "depth_mm" or any(leg.is_under_force for leg in legs):
         return
     depths = [target.depth_mm for target in targets(legs)]
     if (np.diff([0.0, *depths]) <= 0.0).any():

@@ -18,7 +18,7 @@ from finger3d.analyses.optimise.task import MUS
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
 from finger3d.mechanics.model import Model
-from finger3d.plotting.gauge_places import GaugeMap, draw
+from finger3d.plotting.optimise import GaugeMap, draw_places
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tables_of, tree
@@ -200,6 +200,6 @@ def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
         GaugeMap(float(g.place[0]), float(g.place[1]), g.angle, own, *one)
         for g, own, one in zip(result.found.gauges, result.found.alone, result.maps, strict=True)
     ]
-    draw(folder / "map.png", result.mus, result.found.mu_sd, shown, model.design)
+    draw_places(folder / "map.png", result.mus, result.found.mu_sd, shown, model.design)
     write_json(folder / "gauges.json", result.as_dict())
     gauge_places_page(folder)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from finger3d import _extras
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import BodyPoints, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.results.journal import Row
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._machine import cores, end_with, reserve_for_linear_algebra
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import BodyPoints, SweepProgress
 from finger3d.errors import MissingError
 from finger3d.results.journal import Row
 

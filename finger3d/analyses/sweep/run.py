@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 
 from finger3d._extras import require
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Point, Sweep, combinations, listed_points
-from finger3d.analyses.sweep.progress import BodyPoints, SweepProgress
-from finger3d.analyses.sweep.samples import columns_of, drawn, rows_of
-from finger3d.analyses.sweep.store import ResultStore
+from finger3d.analyses.sweep.points import Point, Sweep, columns_of, combinations, drawn, listed_points, rows_of
+from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
 from finger3d.scene import Source

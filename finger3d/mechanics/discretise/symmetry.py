@@ -29,8 +29,8 @@ def symmetry(model: Model) -> tuple[str, ...]:
     if model.symmetry is not None:
         return model.symmetry
     moves = {  # a turn about x is its own mirror image along x
-        "x": [(leg.slide_x_mm, leg.turn_y, leg.turn_z) for leg in model.legs],
-        "z": [(leg.slide_z_mm, leg.turn_x, leg.turn_y) for leg in model.legs],
+        "x": [(leg.slide_x_mm, leg.force_x_N is not None, leg.turn_y, leg.turn_z) for leg in model.legs],
+        "z": [(leg.slide_z_mm, leg.force_z_N is not None, leg.turn_x, leg.turn_y) for leg in model.legs],
     }
     thing = PlacedObject.of(model.object, 0.0).mirrors()
     axes = ("x", "z") if model.domain == "solid" else ("x",)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from finger3d._types import Float
 from finger3d.mechanics.model import Leg
 from finger3d.objects import Move, ObjectPose
 
@@ -13,18 +16,23 @@ AUTO_START = 10
 
 @dataclass(frozen=True)
 class Load:
-    """Normal force prescribed at the end of an increment.
+    """Forces prescribed at the end of an increment.
 
     Attributes
     ----------
-    force_N : at the end of the leg
-    share : of the way to it from the force at the start of the leg
+    forces : (3,) N, normal force and forces along x and z at the end of the leg; NaN where none is prescribed
+    share : of the way to them from the forces at the start of the leg
     begins : whether the increment is the first of its leg
     """
 
-    force_N: float
+    forces: Float
     share: float
     begins: bool
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether the normal force alone is prescribed."""
+        return bool(np.isnan(self.forces[1:]).all())
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,7 @@ class Station:
     Attributes
     ----------
     pose : of the object
-    load : the force to which the depth is found, if one is prescribed
+    load : the forces to which depth and slides are found, if any is prescribed
     leg_end : pose at the end of the leg, by default that of the station
     share : of the leg that ends here
     """
@@ -54,7 +62,7 @@ def stations(legs: tuple[Leg, ...]) -> list[Station]:
         end = leg.end(start)
         poses = [Move(start, end).at(k / count) for k in range(1, count)] + [end]
         for k, pose in enumerate(poses, 1):
-            load = None if leg.force_N is None else Load(leg.force_N, k / count, k == 1)
+            load = Load(np.array(leg.forces, dtype=float), k / count, k == 1) if leg.is_under_force else None
             out.append(Station(pose, load, end, k / count))
         start = end
     return out

@@ -15,13 +15,16 @@ from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import SNAPPED, ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.finite_strain.state import expecting
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.energy import external_work, frictional_dissipation
+from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
 from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.slip_limit import largest_force
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.exact_path import ExactPath, NormalForce, has_exact_path, solve_path
 from finger3d.objects import Move, ObjectPose
@@ -127,7 +130,11 @@ class Press:
         self._path: ExactPath | None = None  # of the leg, and the share of it that is reached
         self._leg: tuple[ObjectPose, float | None] | None = None
         self._share = 1.0
-        self._work = self._dissipation = self._leg_start_N = 0.0
+        self._work = self._dissipation = 0.0
+        self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
+        self._station: Station | None = None
+        self._left = np.zeros(2)  # slides at the start of the leg, less those of the path
+        self._stiffness: Float | None = None  # of the last increment under tangential forces
         self._before: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
@@ -150,7 +157,7 @@ class Press:
             If `cancel` is set.
         """
         self._end_if_cancelled()
-        move = Move(self.pose, station.pose)
+        move = Move(self.pose, self._pose_at(station))
         if solutions:
             states = [self.state, *(solution.state for solution in solutions)]
             moves = self.moves_to(station.pose)
@@ -159,12 +166,12 @@ class Press:
         elif self._is_exact:
             end = self._along_path(station)
         elif station.load is None:
-            start = self.expected_force(station.pose) if guess is None else guess
-            end = self._to_pose(station.pose, start)
+            start = self.expected_force(move.end) if guess is None else guess
+            end = self._to_pose(move.end, start)
             if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
-                end = self._to_pose(station.pose, None)
+                end = self._to_pose(move.end, None)
         else:
-            end = self._to_force(move, station.load)
+            end = (self._to_force if station.load.is_normal else self._to_forces)(move, station.load)
         self._before = self.state, self._work, self._dissipation
         self._add_energies(end)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
@@ -246,12 +253,23 @@ class Press:
             method=SNAPPED if any(one.method == SNAPPED for one in found) else found[-1].method,
         ), parts
 
-    def _wanted(self, load: Load) -> tuple[float, float]:
-        """Return the normal force (N) now, and the one prescribed at the end of the increment."""
-        force = self._normal_force(self.state)
+    def _pose_at(self, station: Station) -> ObjectPose:
+        """Return the pose at a station; a slide that forces have determined is taken back in proportion to the leg."""
+        if self._station is None or self._station.share == 1.0:
+            planned = self._station.pose if self._station else self.problem.origin
+            self._left = self.pose.coordinates[1:3] - planned.coordinates[1:3]
+        self._station = station
+        if not self._left.any():
+            return station.pose
+        x, z = (1.0 - station.share) * self._left
+        return replace(station.pose, slide_x_mm=station.pose.slide_x_mm + x, slide_z_mm=station.pose.slide_z_mm + z)
+
+    def _wanted(self, load: Load) -> tuple[Float, Float]:
+        """Return the forces (3,) N now, and those prescribed at the end of the increment."""
+        forces = self._forces(self.state)
         if load.begins:
-            self._leg_start_N = force
-        return force, self._leg_start_N + load.share * (load.force_N - self._leg_start_N)
+            self._leg_start_N = forces
+        return forces, self._leg_start_N + load.share * (load.forces - self._leg_start_N)
 
     @property
     def _deepest(self) -> float:
@@ -261,9 +279,9 @@ class Press:
     def _along_path(self, station: Station) -> _Advanced:
         """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
         end, load = station.leg_end or station.pose, station.load
-        path, leg = self._path, (end, None if load is None else load.force_N)
+        path, leg = self._path, (end, None if load is None else float(load.forces[0]))
         if path is None or self._leg != leg or self._share == 1.0:
-            force = NormalForce(self._normal_force(self.state), load.force_N, self._deepest) if load else None
+            force = NormalForce(self._normal_force(self.state), leg[1], self._deepest) if leg[1] is not None else None
             path = solve_path(self.problem, self.state, Move(self.pose, end), force)
             self._path, self._leg, self._share = path, leg, 0.0
         there = path.between(self._share, station.share)
@@ -278,7 +296,7 @@ class Press:
         why, and state and pose are those at the beginning.
         """
         problem, state, parts = self.problem, self.state, dict[float, list[_Substep]]()
-        force, wanted = self._wanted(load)
+        (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
         rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
@@ -294,7 +312,7 @@ class Press:
                 share = share if abs(share) < 1.0 else 0.0
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
-                start = _expecting(state, there, ends, share) if problem.model.finite_strain else state
+                start = expecting(state, there, ends, share) if problem.model.finite_strain else state
             found, parts[depth] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
@@ -311,8 +329,64 @@ class Press:
         solution = replace(last.solution, iterations=spent)
         return _Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
 
+    def _to_forces(self, move: Move, load: Load) -> _Advanced:
+        """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
+        problem, state, parts = self.problem, self.state, dict[bytes, list[_Substep]]()
+        forces, wanted = self._wanted(load)
+        free = np.flatnonzero(~np.isnan(wanted))
+        normal = float(wanted[0] if 0 in free else forces[0])
+        tangential = np.nan_to_num([wanted[1], 0.0, wanted[2]])
+        size = float(np.linalg.norm(tangential))
+        if normal <= 0.0:
+            detail = "nothing touches, and a tangential force is prescribed; press first"
+            ended = ContactSolution(state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
+            return _Advanced(ended, [], move.start)
+
+        def trial_at(place: Float, near: PoseTrial | None) -> PoseTrial:
+            self._end_if_cancelled()
+            coordinates = move.end.coordinates
+            coordinates[free] = place
+            there = Move(move.start, ObjectPose(*coordinates.tolist()))
+            start, guess = state, self.expected_force(there.end)
+            if near is not None:
+                guess = near.solution.state.contact.force
+                if problem.model.finite_strain:
+                    start = expecting(state, there, (near.solution.state, near.solution.state), 0.0)
+            found, parts[place.tobytes()] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
+            reached = self._forces(found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
+            return PoseTrial(place, found, reached)
+
+        def largest(trial: PoseTrial) -> float:
+            if not size:
+                return np.inf
+            whole, reached = problem.symmetry.unfold(trial.solution.state.contact), trial.forces
+            most = sum(largest_force(problem.points, whole, problem.model.friction, tangential / size)) / size
+            return most * (normal / reached[0] if 0 in free and reached[0] > 0.0 else 1.0)
+
+        search = PoseSearch(
+            trial_at,
+            wanted[free],
+            float(np.nanmax(np.abs([normal, *wanted]))),
+            1e-4 * max(move.end.depth_mm, move.start.depth_mm),
+            TARGET_IF_FACTORED if problem.model.finite_strain else TARGET,
+            largest,
+            (size, float(np.linalg.norm(np.nan_to_num(load.forces[1:])))),
+            None if load.begins else self._stiffness,
+        )
+        last = search.run(move.start.coordinates[free])
+        self._stiffness = search.stiffness
+        if not last.ok:
+            return _Advanced(replace(last.solution, state=state, iterations=search.iterations), [], move.start)
+        pose = parts[last.place.tobytes()][-1].move.end
+        return _Advanced(replace(last.solution, iterations=search.iterations), parts[last.place.tobytes()], pose)
+
+    def _forces(self, state: State[Any]) -> Float:
+        """Normal force and forces along x and z (3,) N, as in a `Load`."""
+        x, y, z = self.problem.world_force(state.contact).sum(axis=0).tolist()
+        return np.array([0.0 - y, x, z])
+
     def _normal_force(self, state: State[Any]) -> float:
-        return -float(self.problem.world_force(state.contact)[:, 1].sum())
+        return float(self._forces(state)[0])
 
     def _free_strain(self, station: Station) -> dict[Column, float]:
         """Strain of every gauge in the body without inclusions; NaN once it has failed."""
@@ -344,14 +418,3 @@ class Press:
             detail=solution.detail,
             parts=tuple((part.move.end, part.after) for part in end.parts),
         )
-
-
-def _expecting(state: State[Any], move: Move, ends: tuple[State[Any], State[Any]], share: float) -> State[Any]:
-    """Return a state at finite strain from which the increment begins its iteration at an expected end.
-
-    The end has the unknowns ``ends[0] + share (ends[0] - ends[1])``.
-    """
-    one, other = (end.body.unknowns for end in ends)
-    end = one + share * (one - other)
-    before = Move(move.at(-1.0), move.start), 2.0 * state.body.unknowns - end
-    return replace(state, body=replace(state.body, previous=before))

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from finger3d._types import Float, Tree
 from finger3d.fem.mesh.simplex import axis_numbers
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.transfer import values_over
+from finger3d.fem.surface.traces import values_over
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column, displacement_columns

@@ -145,7 +145,7 @@ def has_exact_path(model: Model) -> bool:
         and model.object.is_flat
         and type(model.friction) is Coulomb
         and model.rule == "projection"
-        and not any(leg.turn_x or leg.turn_y or leg.turn_z for leg in model.legs)
+        and not any(leg.turn_x or leg.turn_y or leg.turn_z or leg.force_x_N is not None for leg in model.legs)
     )
 
 

@@ -1,4 +1,4 @@
-"""Parts as they lie on the bed of a printer, and their places on one bed or several."""
+"""Printability of the parts of a mold, how they lie on the bed of a printer, and their places on one bed or several."""
 
 from __future__ import annotations
 
@@ -8,7 +8,92 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.mold.shell import Shell
+from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface_checks import mistake
+from finger3d.mold.body import Shell
+from finger3d.mold.regions import manifold
+
+_OPPOSED = -0.9  # cosine between the normals of the two sides of a wall; sharp edges are no walls
+_RAYS = 1500  # of a part
+_NEAR_MM = 1e-4  # distance from a surface at which a ray starts
+_BEND = 1e-3  # of a ray, so that it does not run along a face or hit an edge exactly
+_LEAST_OVERLAP = 1e-6  # of an island's area that must lie on the layer below
+
+
+@dataclass(frozen=True)
+class PrintCheck:
+    """Result of the printability checks of a part.
+
+    Attributes
+    ----------
+    defect : why the surface is not one closed body with triangles facing outward; empty if it is
+    wall_mm : least thickness found between two opposed faces; infinite without such
+    thinnest : (3,) where it was found, mm
+    islands : (n, 3) middles of regions of a layer with nothing below, mm
+    """
+
+    defect: str
+    wall_mm: float
+    thinnest: Float
+    islands: Float
+
+
+def check_print(part: Triangles, layer_mm: float) -> PrintCheck:
+    """Check a part as it lies on the bed, z up, its lowest point on z = 0.
+
+    Parameters
+    ----------
+    layer_mm : distance of the layers that are looked at
+    """
+    defect = mistake(part)
+    if defect:
+        return PrintCheck(defect, 0.0, np.full(3, np.nan), np.empty((0, 3)))
+    wall, where = thickness(part)
+    return PrintCheck("", wall, where, islands(part, layer_mm))
+
+
+def thickness(part: Triangles, rays: int = _RAYS) -> tuple[float, Float]:
+    """Return the least thickness (mm) of the walls of a closed body and where it is (3,), by rays inward.
+
+    Rays start in every triangle, in larger ones more often, and only hits on a face that looks the other way count.
+    Thin walls narrower than the distance of rays may be missed.
+    """
+    body = manifold(part)
+    area = np.linalg.norm(part.area_vectors, axis=1)
+    order = np.argsort(-area)[:rays]
+    number = np.maximum(1, np.round(rays * area[order] / area.sum()).astype(int))
+    random = np.random.default_rng(0)
+    owner = np.repeat(order, number)
+    weights = random.dirichlet((1.0, 1.0, 1.0), len(owner))
+    starts = np.einsum("ij,ijk->ik", weights, part.corners[owner])
+    normals = part.normals[owner]
+    ends = starts - (normals + _BEND * random.standard_normal(normals.shape)) * part.size
+    starts = starts - normals * _NEAR_MM
+    least, where = np.inf, starts[0]
+    for start, end, normal in zip(starts, ends, normals, strict=True):
+        crossed = body.ray_cast(tuple(start), tuple(end))
+        if not crossed or np.dot(crossed[0].normal, normal) > _OPPOSED:
+            continue
+        far = float(np.linalg.norm(np.asarray(crossed[0].position) - start)) + _NEAR_MM
+        if far < least:
+            least, where = far, start
+    return least, where
+
+
+def islands(part: Triangles, layer_mm: float) -> Float:
+    """Return the middles (n, 3), mm, of the pieces of a layer of which nothing lies on the layer below."""
+    body, middles = manifold(part), []
+    heights = np.arange(0.5 * layer_mm, float(part.high[2]), layer_mm)
+    below = body.slice(float(heights[0]))
+    for height in heights[1:]:
+        layer = body.slice(float(height))
+        for piece in layer.decompose():
+            if (piece ^ below).area() <= _LEAST_OVERLAP * piece.area():
+                x0, y0, x1, y1 = piece.bounds()
+                middles.append([0.5 * (x0 + x1), 0.5 * (y0 + y1), float(height)])
+        below = layer
+    return np.array(middles).reshape(-1, 3)
+
 
 GAP_MM = 6.0
 """Distance between parts on the bed."""

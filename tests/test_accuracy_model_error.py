@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from finger3d._cost import PressSize
-from finger3d.accuracy import large_deformation as module
+from finger3d.accuracy import model_error as module
 from finger3d.accuracy.changes import changing_numbers
-from finger3d.accuracy.large_deformation import large_deformation
+from finger3d.accuracy.model_error import large_deformation
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -90,11 +90,11 @@ def test_a_body_of_a_million_unknowns_is_judged_from_a_small_one(monkeypatch: py
     )
     pressed: list[Model] = []
 
-    def build(problem: Any, model: Model) -> None:
+    def build(model: Model) -> None:
         pressed.append(model)
         raise Finger3dError("enough")
 
-    monkeypatch.setattr(module, "built_like", build)
+    monkeypatch.setattr(module, "build", build)
     large_deformation(large, None, 10)  # type: ignore[arg-type]
     (model,) = pressed
     assert model.mesh.size_mm >= 2.5  # below 50 000 unknowns

@@ -1,0 +1,188 @@
+"""Which effects a scene calls for: those that change a number of its press by more than a tolerance.
+
+Every effect that the scene names, and large deformation in any case, is added to coarse presses without it, first
+alone and then beside those that are needed, since one effect may matter because of another.  What is left out is a part
+of the model's error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from finger3d._types import Tree
+from finger3d.accuracy.changes import Change, ChangeEstimate, scales, two_digits
+from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
+from finger3d.effects import effect_names
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.model import Model
+from finger3d.progress import Progress
+from finger3d.scene import Scene
+
+LARGE_DEFORMATION = "large_deformation"
+"""The effect that every scene has the data for."""
+
+_NEEDS = {
+    "viscosity": "no Prony series",
+    "embedded_gauge": "no stiffness of the gauges",
+    "elastic_object": "no modulus of the object",
+    "kinetic_friction": "no kinetic coefficient of friction",
+}
+"""What an effect that a scene does not name lacks."""
+
+_FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was found about one effect.
+
+    Attributes
+    ----------
+    used : whether the effect is on
+    estimate : what it changes, beside the effects that are used
+    number : name of the number that it changes most, relative to its scale
+    change : relative change of that number
+    seconds : that it adds to the press by the forecast
+    """
+
+    used: bool
+    estimate: ChangeEstimate
+    number: str
+    change: float
+    seconds: float
+
+    @property
+    def why(self) -> str:
+        """The reason in words."""
+        return f"changes {self.number} by {two_digits(100.0 * self.change)} %" if self.number else self.estimate.method
+
+
+@dataclass(frozen=True)
+class Need:
+    """Effects that a scene calls for.
+
+    Attributes
+    ----------
+    tolerance : relative change of a number above which an effect is used
+    judged : effects by name
+    unjudged : reason by name of those that could not be judged, and are off
+    seconds : that the judgement took
+    """
+
+    tolerance: float
+    judged: Mapping[str, Judged] = field(default_factory=dict)
+    unjudged: Mapping[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Names of the effects that are on."""
+        return tuple(name for name, one in self.judged.items() if one.used)
+
+    @property
+    def left_out(self) -> dict[str, ChangeEstimate]:
+        """Estimates of what the effects would change that are off."""
+        return {name: one.estimate for name, one in self.judged.items() if not one.used}
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the name of each effect, and whether and why it is used."""
+        rows = [
+            (name, f"{'used' if one.used else 'not used'}: {one.why}, about {one.seconds:.2g} s")
+            for name, one in self.judged.items()
+        ]
+        return rows + [(name, f"not judged: {why}") for name, why in self.unjudged.items()]
+
+    def as_dict(self) -> Tree:
+        """Return the entry of summary.json."""
+        judged = {
+            name: {"used": one.used, "why": one.why, "number": one.number, "change": one.change, "seconds": one.seconds}
+            for name, one in self.judged.items()
+        }
+        return {
+            "tolerance": self.tolerance,
+            "used": list(self.used),
+            "judged": judged,
+            "not_judged": dict(self.unjudged),
+            "seconds": self.seconds,
+        }
+
+
+def judge(scene: Scene, report: Progress) -> Need:
+    """Find the effects that a scene with ``effects.auto`` calls for.
+
+    Raises
+    ------
+    Finger3dError
+        If the coarse presses without any effect fail, so that nothing can be judged.
+    """
+    assert scene.auto is not None
+    start = time.perf_counter()
+    plain = scene.with_effects(()).model()
+    settings = {LARGE_DEFORMATION: None, **scene.effects}
+    on: dict[str, Enriched] = {
+        name: (effect or scene.with_effects([name]).effects[name]).apply for name, effect in settings.items()
+    }
+    presses = CoarsePresses(plain, _factor(plain))
+    report.stage("judging which effects the scene calls for")
+    presses.numbers({})
+    used = dict[str, Enriched]()
+    judged, failed = dict[str, Judged](), dict[str, str]()
+    for effects in (sorted(on), None):  # alone, and then what is left out beside the others
+        left = [name for name in effects or judged if name not in used]
+        if effects is None and not used:
+            break
+        beside = dict(used)
+        for name in left:
+            report.say(f"judging {name}{', beside ' + ', '.join(sorted(beside)) if beside else ''}")
+            try:
+                estimate = presses.changes(beside | {name: on[name]}, name)
+            except _FAILURES as error:
+                failed[name] = str(error) or type(error).__name__
+                continue
+            number, change = _largest(estimate.changes)
+            needed = abs(change) > scene.auto
+            judged[name] = Judged(needed, estimate, number, change, _added_seconds(plain, beside, on[name]))
+            if needed:
+                used[name] = on[name]
+    unjudged = {name: why for name, why in _NEEDS.items() if name not in on and name in effect_names()}
+    return Need(scene.auto, judged, failed | unjudged, time.perf_counter() - start)
+
+
+def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstimate]:
+    """Return what the effects that are off would change in a press with these numbers, by name."""
+    return {
+        name: replace(
+            estimate,
+            changes={key: replace(c, value=numbers[key]) for key, c in estimate.changes.items() if key in numbers},
+        )
+        for name, estimate in need.left_out.items()
+    }
+
+
+def _factor(model: Model) -> float:
+    """Return the edge lengths of the coarse presses over those of the scene."""
+    expected = forecast(model)
+    return cheap_factor(model, expected["total_s"] - expected["start_s"] - expected["output_s"])
+
+
+def _largest(changes: Mapping[str, Change]) -> tuple[str, float]:
+    """Return the number that changes most relative to its scale, of those whose change has a sign, and its change."""
+    scale = scales({name: change.value for name, change in changes.items()})
+    known = {
+        name: change.change / scale[name]
+        for name, change in changes.items()
+        if abs(change.change) > change.error and scale[name] > 0.0
+    }
+    return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
+
+
+def _added_seconds(model: Model, beside: Mapping[str, Enriched], added: Enriched) -> float:
+    """Return the seconds that an effect adds to a press with others by the forecast."""
+    for name in sorted(beside):
+        model = beside[name](model)
+    return max(float(forecast(added(model))["total_s"] - forecast(model)["total_s"]), 0.0)

@@ -1,0 +1,88 @@
+"""Which effects a scene calls for: against presses with each, what is refused, and what a press tells."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import finger3d
+from finger3d.analyses.effects_by_need import judge
+from finger3d.errors import Finger3dError
+from finger3d.progress import QUIET
+from finger3d.scene import Scene, parse
+from tests.scenes import HALF_CYLINDER, changed
+from tests.sensor_cases import scene
+
+MESH = {"size_mm": 1.5, "base_size_mm": 6.0}
+
+
+def needs(depth: float = 10.0, **effects: Any) -> Scene:
+    legs = {"depth_mm": depth, "duration_s": 1.0}
+    found: Scene = scene(press=legs, mesh=MESH, friction={"mu": 0.4}, effects={"auto": True, **effects})
+    return found
+
+
+def test_a_deep_press_calls_for_large_deformation_and_a_shallow_one_does_not() -> None:
+    deep, shallow = judge(needs(), QUIET), judge(needs(0.1), QUIET)
+    assert deep.used == ("large_deformation",)
+    assert shallow.used == ()
+    assert abs(shallow.judged["large_deformation"].change) < 0.02
+    assert set(shallow.left_out) == {"large_deformation"}
+    assert shallow.unjudged["viscosity"] == "no Prony series"
+
+
+@pytest.mark.parametrize(
+    ("name", "much", "little"),
+    [
+        ("viscosity", {"prony": [[0.5, 0.3]]}, {"prony": [[0.001, 0.3]]}),
+        ("elastic_object", {"E_MPa": 2.0, "nu": 0.4}, {"E_MPa": 5e5, "nu": 0.4}),
+    ],
+)
+def test_an_effect_is_used_if_its_data_make_it_matter(name: str, much: Any, little: Any) -> None:
+    assert name in judge(needs(0.5, **{name: much}), QUIET).used
+    without = judge(needs(0.5, **{name: little}), QUIET)
+    assert name not in without.used
+    assert abs(without.judged[name].change) < 0.02
+
+
+def test_what_is_left_out_is_told_and_holds(tmp_path: Path) -> None:
+    """The truth is the same press at large deformation."""
+    given = changed(HALF_CYLINDER, depth_mm=0.05, size_mm=0.15) + "\n[effects]\nauto = true\nauto_tolerance = 0.9\n"
+    path = tmp_path / "scene.toml"
+    path.write_text(given, encoding="utf-8")
+    result = finger3d.press(path, tmp_path / "out", figures=True)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["effects"] == []
+    judged = summary["effects_auto"]["judged"]["large_deformation"]
+    assert not judged["used"]
+    assert "changes" in judged["why"]
+    assert "auto" not in (tmp_path / "out" / "scene.toml").read_text(encoding="utf-8")
+    error = result.model_error["large_deformation"]["normal_force_N"]
+    large = finger3d.press(path, overrides=["effects={large_deformation={}}"], error=False)
+    true = large.last.normal_force_N - result.last.normal_force_N
+    assert error["low"] <= true <= error["high"]
+    assert "Effects" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_other_commands_ask_for_the_scene_that_a_press_writes() -> None:
+    with pytest.raises(Finger3dError, match="effects.auto = true: a press finds which effects"):
+        finger3d.compare(needs(), "unused")
+    assert finger3d.plan(needs()).dofs > 0
+
+
+@pytest.mark.parametrize(
+    ("effects", "why"),
+    [
+        ({"auto": True, "auto_tolerance": 1.5}, "auto_tolerance = 1.5"),
+        ({"auto": "yes"}, "effects.auto = "),
+        ({"auto_tolerance": 0.1}, "only with effects.auto = true"),
+        ({"auto": True, "viscosity": {}}, "prony"),
+        ({"auto": True, "magic": {}}, "magic"),
+    ],
+)
+def test_mistakes_are_refused_in_one_line(effects: Any, why: str) -> None:
+    with pytest.raises(Finger3dError, match=why):
+        parse({**scene().given, "effects": effects})
