@@ -1,4 +1,4 @@
-"""Derivatives of the numbers of a press by the keys of its scene, and what each key's uncertainty means for a number."""
+"""Derivatives of the numbers of a press by the keys of its scene, and the effect of the uncertainty of each key."""
 
 from __future__ import annotations
 

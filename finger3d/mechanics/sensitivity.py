@@ -250,12 +250,9 @@ class _PathTangents:
             [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
         )
         legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
-        end = np.array(
-            [
-                one.difference(*((own.slide_x_mm, -own.depth_mm) for own in pair))
-                for one, pair in zip(variations, legs, strict=True)
-            ]
-        ).reshape(-1, 2)
+        ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
+        end = np.array([one.difference(low, high) for one, (low, high) in zip(variations, ends, strict=True)])
+        end = end.reshape(-1, 2)
         self._weights: Float | None = None
         if path.problem.model.legs[leg].force_N is not None:
             self._weights = -path.count[:, None] * path.bases[:, :, 1]
