@@ -27,6 +27,7 @@ EXAMPLES = (
 COMMANDS = (
     "press",
     "compare",
+    "cost",
     "calibrate",
     "estimate",
     "identify",
