@@ -32,7 +32,7 @@ def test_a_section_is_drawn_without_vtk(tmp_path: Path) -> None:
 
 
 def test_what_draws_loads_neither_the_solver_nor_a_renderer() -> None:
-    heavy = ("matplotlib", "vtkmodules", "scipy", "finger3d.mechanics")
+    heavy = ("matplotlib", "vtkmodules", "scipy", "finger3d.mechanics.march")
     assert not loaded("import finger3d.plotting.figures, finger3d.plotting.deformed", *heavy)
 
 

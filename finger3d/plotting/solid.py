@@ -182,7 +182,8 @@ def _coloured(
     `point` is the number (n,) of the contact point at each node, -1 where there is none.
     """
     at = point[facets[:, :3]]
-    corner = np.where(at >= 0, pressure[at], 0.0)
+    known, corner, statuses = at >= 0, np.zeros(at.shape), np.full(at.shape, OPEN)
+    corner[known], statuses[known] = pressure[at[known]], status[at[known]]
     place = np.zeros((len(facets), len(_RING) + 1, 3))  # of the corners, of a point of each side, of their centre
     place[:, :3] = np.eye(3)
     for side, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
@@ -193,7 +194,7 @@ def _coloured(
     return (
         (shapes @ _six_nodes(facets, moved))[:, _SIX].reshape(-1, 3, 3),
         np.einsum("fpc,fc->fp", place, corner)[:, _SIX].reshape(-1, 3),
-        _status_on_six(np.where(at >= 0, status[at], OPEN)).ravel(),
+        _status_on_six(statuses).ravel(),
     )
 
 
