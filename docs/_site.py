@@ -99,7 +99,10 @@ def _scene_tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
                 told = choice["properties"][kind].get("const", choice.get("title"))
                 yield f'[{name}] {kind} = "{told}"', choice
         elif name == "effects":
-            yield from ((f"[effects.{effect}]", table) for effect, table in node["properties"].items())
+            tables = {key: table for key, table in node["properties"].items() if "properties" in table}
+            own = {key: value for key, value in node["properties"].items() if key not in tables}
+            yield "[effects]", {"properties": own}
+            yield from ((f"[effects.{effect}]", table) for effect, table in tables.items())
         elif node["type"] == "array":
             yield f"[[{name}]]", node["items"]
         elif isinstance(node.get("additionalProperties"), dict):

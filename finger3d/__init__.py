@@ -1,7 +1,7 @@
 """Frictional contact of an elastic, finger-shaped tactile sensor in 3D.
 
 The commands that compute are functions, too: `press`, `compare`, `cost`, `calibrate`, `estimate`, `identify`, `sweep`,
-`optimise`, `place_gauges` (``optimise --gauges``), `export` and `plan`. Names are loaded when they are
+`optimise`, `place_gauges` (``optimise --gauges``), `sensitivity`, `export` and `plan`. Names are loaded when they are
 first used, so that ``import finger3d`` is quick.
 
 >>> import finger3d

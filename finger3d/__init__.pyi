@@ -10,6 +10,7 @@ from finger3d.analyses.plan import plan as plan
 from finger3d.analyses.press import press as press
 from finger3d.analyses.reduced import ReducedModel as ReducedModel
 from finger3d.analyses.result import PressResult as PressResult
+from finger3d.analyses.sensitivity import sensitivity as sensitivity
 from finger3d.analyses.sweep.run import sweep as sweep
 from finger3d.contact.friction import Coulomb as Coulomb
 from finger3d.errors import Finger3dError as Finger3dError

@@ -70,6 +70,7 @@ _RESULTS = {
     "search.json": "optimise",
     "gauges.json": "optimise",
     "identify.json": "identify",
+    "sensitivity.json": "sensitivity",
 }
 """Files of results, and the command that writes each."""
 

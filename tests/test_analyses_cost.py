@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from finger3d.accuracy.refine import relative_error
 from finger3d.accuracy.richardson import kinds_of
 from finger3d.analyses.cost import ERRORS, Forecasts, _scaled
 from finger3d.analyses.pressed_body import PressedBody
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from tests.sensor_cases import scene
 
@@ -80,19 +78,3 @@ def test_edges_of_all_meshes_are_in_proportion() -> None:
 def test_numbers_and_meshes_that_have_no_forecast_are_refused(tmp_path: Path) -> None:
     with pytest.raises(Finger3dError, match="of = 'force': no number of this press; must be one of normal_force_N, "):
         finger3d.cost(scene(**BASE), of=["force"])
-
-
-def test_the_command_prints_a_table_json_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, png = tmp_path / "scene.toml", tmp_path / "cost.png"
-    path.write_text(scene(**BASE).to_toml())
-    assert main(["cost", str(path), "--of", "gauge_g36,stick_area_mm2", "--png", str(png)]) == 0
-    text = capsys.readouterr().out
-    for words in ("this mesh", "0.3 %", "stick area mm2", "--set mesh.size_mm="):
-        assert words in text
-    assert png.stat().st_size > 10_000
-    assert main(["cost", str(path), "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
-    assert [row["error"] for row in data["rows"]] == [None, *ERRORS]
-    assert set(data["of"]) == {"normal_force_N", "friction_sum_N", "gauge_g36", "gauge_long"}
-    assert main(["cost", str(path), "--png", "cost.jpg"]) == 2
-    assert main(["cost", str(path), "--of", "gauge"]) == 2

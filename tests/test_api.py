@@ -24,7 +24,19 @@ EXAMPLES = (
     "finger3d.accuracy.error_bars",
     "finger3d.results.states",
 )
-COMMANDS = ("press", "compare", "calibrate", "estimate", "identify", "sweep", "optimise", "export", "plan")
+COMMANDS = (
+    "press",
+    "compare",
+    "cost",
+    "calibrate",
+    "estimate",
+    "identify",
+    "sweep",
+    "optimise",
+    "export",
+    "plan",
+    "sensitivity",
+)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

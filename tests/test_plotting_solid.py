@@ -10,6 +10,7 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import Mesh
+from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting import solid as render
 from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger, top
 
@@ -67,3 +68,35 @@ def test_the_boundary_of_a_status_is_straight_across_a_facet() -> None:
         assert (sides[slips] == corners[one]).all(axis=2).any()
     shares = [area[render._status_on_six(np.array([[OPEN, STICK, SLIP]]))[0] == s].sum() for s in (OPEN, STICK, SLIP)]
     assert shares == pytest.approx([1.0 / 6.0] * 3)
+
+
+@pytest.mark.parametrize("quadratic", [False, True])
+def test_borders_cross_the_sides_of_a_facet_where_the_zones_have_them(quadratic: bool) -> None:
+    """A corner that sticks to the share t of both sides has t^2 of the facet, one that is open leaves 1 - (1 - t)^2."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    points = np.vstack([corners, 0.5 * (corners + np.roll(corners, -1, axis=0))])
+    facets = np.arange(6 if quadratic else 3)[None]
+    for t in (0.2, 0.5, 0.8):
+        for status, zone_is_stick, share in (
+            ([STICK, SLIP, SLIP], True, t**2),
+            ([OPEN, SLIP, SLIP], False, 1.0 - (1.0 - t) ** 2),
+        ):
+            state = np.array(status)
+            zones = tuple(
+                Zone(inside, lambda last, beyond, t=t: np.full(len(last), t))
+                for inside in (state != OPEN, state == STICK)
+            )
+            point = np.concatenate([np.arange(3), np.full(3, -1)])
+            triangles, pressure, of = render._coloured(facets, points, point, np.arange(3.0), state, zones)
+            arms = triangles[:, 1:] - triangles[:, :1]
+            area = 0.5 * np.cross(arms[:, 0], arms[:, 1])[:, 2]
+            assert area.min() > 0.0
+            assert area.sum() == pytest.approx(0.5)
+            inside = of == STICK if zone_is_stick else of != OPEN
+            assert area[inside].sum() == pytest.approx(0.5 * share)
+            assert pressure == pytest.approx(triangles @ [1.0, 2.0, 0.0])  # linear on the facet
+
+
+def test_a_border_beside_a_place_without_contact_point_is_midway() -> None:
+    zones = tuple(Zone(np.array([True, True]), lambda last, beyond: np.full(len(last), 0.9)) for _ in range(2))
+    assert border_shares(np.array([[0, -1], [0, 1]]), np.array([STICK, STICK]), zones) == pytest.approx([0.5, 0.5])

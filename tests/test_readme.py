@@ -17,6 +17,7 @@ COARSE = {
     "press": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
     "gear": "mesh.mesher=swept mesh.size_mm=1.0 mesh.base_size_mm=4.0",
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
+    "sensitivity": "mesh.size_mm=3.0 mesh.base_size_mm=10.0",
     "cost": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0 press.steps=10",
     "sweep": "model.domain=plane-strain mesh.size_mm=3.0 mesh.base_size_mm=12.0 press.steps=5",

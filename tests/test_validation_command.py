@@ -66,3 +66,19 @@ def test_a_study_of_the_checkout_as_json(tmp_path: Path, capsys: pytest.CaptureF
 def test_the_studies_are_listed_with_their_questions(capsys: pytest.CaptureFixture) -> None:
     assert main(["--list"]) == 0
     assert "patch_test" in capsys.readouterr().out
+
+
+def test_studies_of_increments_end_with_one_line_over_all_of_them(
+    own_studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    counting = (own_studies / "good.py").read_text().replace("[1, 2]))", "[1, 2]), settled=Settled(3, 4, 2e-9))")
+    (own_studies / "good.py").write_text(counting.replace("import Result", "import Settled, Result"))
+    bad = (
+        (own_studies / "bad.py")
+        .read_text()
+        .replace('measure="at most"),))', 'measure="at most"),), settled=Settled(5, 5, 1e-9))')
+    )
+    (own_studies / "bad.py").write_text(bad.replace("import Result", "import Settled, Result"))
+    main(["good", "bad", "--out", str(tmp_path / "out")])
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last == "8 of 9 increments settle, largest residual 2.0e-09"

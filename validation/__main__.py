@@ -14,7 +14,7 @@ from finger3d.cli.common import Json, check_folder, job, print_columns, print_js
 from finger3d.errors import MissingError
 
 from . import _runner
-from ._rows import table
+from ._rows import settled, table
 
 app = App(name="python -m validation", suppress_keyboard_interrupt=False, result_action="return_value")
 
@@ -61,6 +61,8 @@ def validate(
     else:
         print_columns("study what kind reference wanted got error tolerance verdict".split(), table(found))
         print(f"results: {folder}")
+        if counts := [counts for study in selected if (counts := _runner.kept_settled(folder, study))]:
+            print(settled(counts))
     failed = [name for name, rows in found.items() if not all(row.passed for row in rows)]
     if failed:
         raise MissingError(f"outside the tolerance: {', '.join(failed)} (see the rows marked FAIL)")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -75,13 +75,38 @@ class Row:
         return {k: getattr(self, k) for k in COLUMNS}
 
 
+class Settled(NamedTuple):
+    """Increments of all histories of a study: how many converged, of how many, and their largest residual."""
+
+    converged: int
+    increments: int
+    residual: float
+
+    def __str__(self) -> str:
+        return f"{self.converged} of {self.increments} increments settle, largest residual {self.residual:.1e}"
+
+
+def settled(counts: Sequence[Settled]) -> Settled:
+    """Return the sum over several studies or parts of one."""
+    converged, increments, residuals = zip(*counts, strict=True)
+    return Settled(sum(converged), sum(increments), max(residuals))
+
+
 @dataclass(frozen=True)
 class Result:
-    """Outcome of a study: rows, an optional table, and an optional function that draws on a matplotlib Figure."""
+    """Outcome of a study.
+
+    Attributes
+    ----------
+    rows, table : of its results
+    figure : draws on a matplotlib Figure
+    settled : of a study that counts the increments that converge
+    """
 
     rows: tuple[Row, ...]
     table: Mapping[str, ArrayLike] | None = None
     figure: Callable[[Any], None] | None = None
+    settled: Settled | None = None
 
     @property
     def passed(self) -> bool:

@@ -29,7 +29,7 @@ from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 
 from . import _verdict
-from ._rows import COLUMNS, Result, Row, score, table
+from ._rows import COLUMNS, Result, Row, Settled, score, table
 
 NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
@@ -212,7 +212,8 @@ def _keep(out: Path, study: Study, result: Result, stamp: str, seconds: float) -
         write_csv(results / f"{study.name}_table.csv", result.table)
     if result.figure is not None:
         draw(result.figure, out / "figures" / f"{study.name}.png")
-    write_json(about, {"question": study.question, "seconds": round(seconds, 1), "stamp": stamp})
+    counts = {"settled": list(result.settled)} if result.settled else {}
+    write_json(about, {"question": study.question, "seconds": round(seconds, 1), "stamp": stamp, **counts})
 
 
 def draw(figure: Callable[[Any], None], path: Path) -> None:
@@ -244,6 +245,12 @@ def kept_rows(out: Path, study: Study) -> tuple[Row, ...]:
         return ()
     with path.open(newline="", encoding="utf-8") as stream:
         return tuple(map(_row, csv.DictReader(stream)))
+
+
+def kept_settled(out: Path, study: Study) -> Settled | None:
+    """Return the increments that a study counted, as they were kept; None if it counts none or has not run."""
+    counts = _about(out, study).get("settled")
+    return Settled(*counts) if counts else None
 
 
 def _row(kept: TreeView) -> Row:

@@ -41,7 +41,7 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
-from ._rows import Result, Row
+from ._rows import Result, Row, Settled, settled
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -64,7 +64,8 @@ class Found:
     settled : whether all increments converged
     folds : whether it ended at a sharp edge of the finger, with a cell compressed there or folded over
     says : outcome of the increment that failed
-    increments, factorizations, iterations : in all
+    increments, converged, factorizations, iterations : in all
+    residual : the largest of the increments that converged, dimensionless
     penetration : deepest place of the surface inside the object, over the depth
     at_sharp_edge : whether it is beside a sharp edge of the finger, or under an object that has edges
     outside : whether no point of the surface is inside the object but those in contact
@@ -75,6 +76,8 @@ class Found:
     folds: bool
     says: str
     increments: int
+    converged: int
+    residual: float
     factorizations: int
     iterations: int
     penetration: float
@@ -206,6 +209,8 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
         folds="sharp edge of the finger" in last.detail,
         says=f"{last.outcome} ({last.detail})" if last.detail else str(last.outcome),
         increments=sum(int(leg.steps) for leg in model.legs),
+        converged=len(good),
+        residual=max((step.residual for step in good), default=0.0),
         factorizations=factorizations,
         iterations=sum(step.iterations for step in steps),
         penetration=deepest.penetration_mm / model.largest_depth_mm if deepest else 0.0,
@@ -266,7 +271,8 @@ def run(quick: bool) -> Result:
     }
     table = _table(found)
     rows = _settling([f for *_, f in found["coarse"]]) + _penetration(found)
-    return Result(tuple(rows), table, lambda figure: _draw(figure, table))
+    counts = [Settled(f.converged, f.increments, f.residual) for scenes in found.values() for *_, f in scenes]
+    return Result(tuple(rows), table, lambda figure: _draw(figure, table), settled(counts))
 
 
 def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
@@ -331,7 +337,8 @@ def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[A
             "depth_mm": model.largest_depth_mm, "size_mm": model.mesh.size_mm, "settled": f.settled,
             "penetration_over_depth": f.penetration,
             "at_sharp_edge": f.at_sharp_edge if mesh != "coarse" else "",  # coarse edges blur where it is
-            "increments": f.increments, "factorizations": f.factorizations, "least_volume": f.least_volume,
+            "increments": f.increments, "converged": f.converged, "residual": f.residual,
+            "factorizations": f.factorizations, "least_volume": f.least_volume,
         }
         for mesh, scenes in found.items()
         for number, model, f in scenes

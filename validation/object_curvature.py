@@ -79,7 +79,9 @@ def run(quick: bool) -> Result:
             "strain on a bar of radius 1e5 mm, by that on the plane", "the limit", 1.0, found[1e5][1] / true, 3e-3,
             "curvatures add: 1e-3 of the finger's",
         ),
-        Row("calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(monotonic), 0.0, "a statement"),
+        Row(
+            "calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(monotonic), 0.0, "a statement",
+        ),
         Row(what, HALVED, rough[100.0], read[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
         Row(f"{what}; edges of {sizes[0]:g} mm, {steps} increments", f"{steps // 2} increments", fewer[100.0],
             rough[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),

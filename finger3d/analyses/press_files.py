@@ -192,6 +192,7 @@ class ResultWriter:
             thing=placed.to_scene(thing.points)[thing.faces],
             title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
+            zones=problem.points.zones(good[-1].state),
         )
         (figure,), _ = draw_fingers([finger])
         save(figure, self.folder / "finger.png")

@@ -127,6 +127,18 @@ class PressResult:
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
         return pandas.DataFrame(history_table(self.history.points, self.history.steps))
 
+    def derivatives(self, number: str) -> dict[str, float]:
+        """Return the derivatives of a number at the end of the press by the keys of its scene, per unit of each key.
+
+        Raises
+        ------
+        Finger3dError
+            If the press has no such number, or its numbers have no derivatives.
+        """
+        from finger3d.analyses.sensitivity import sensitivity  # a press needs none of it
+
+        return dict(sensitivity(self._numbers["scene"], [number]).derivatives[number])
+
     def plot_contact(self) -> Picture:
         """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""
         from finger3d.plotting.figures import contact_figure

@@ -25,6 +25,7 @@ from finger3d.cli import (  # noqa: F401
     optimise,
     plan,
     press,
+    sensitivity,
     show,
     sweep,
     validate,

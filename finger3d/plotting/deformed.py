@@ -15,6 +15,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.panels import (
     Marks,
@@ -29,7 +30,17 @@ from finger3d.plotting.panels import (
     two_panels,
 )
 from finger3d.plotting.renderer import WINDOW, flat
-from finger3d.plotting.solid import BODY, FEATURE, LINE, OBJECT, OBJECT_TINT, REST, draw_solid, render_solids, skin_of
+from finger3d.plotting.solid import (
+    BODY,
+    FEATURE,
+    LINE,
+    OBJECT,
+    OBJECT_TINT,
+    REST,
+    draw_solid,
+    render_solids,
+    skin_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,6 +60,7 @@ class DeformedFinger:
     thing : (t, 3, 3) corners of the object's triangles, mm; None without it
     title : of the picture
     marks : gauges, from `finger3d.plotting.gauges.marks_of`
+    zones : of contact and of stick, by which their borders are drawn between the points; None: midway
     """
 
     mesh: Mesh
@@ -61,6 +73,7 @@ class DeformedFinger:
     thing: Float | None
     title: str = ""
     marks: Sequence[Mark] = ()
+    zones: tuple[Zone, Zone] | None = None
 
     @property
     def moved(self) -> Float:
@@ -127,9 +140,9 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
 
 
 def _coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
-    """Return both halves (h, 2, 2) of every facet that may touch, the mean pressure (h,) and the status (h,) of each.
+    """Return both parts (h, 2, 2) of every facet that may touch, the mean pressure (h,) and the status (h,) of each.
 
-    The status is that of the half's end.
+    They meet where the status changes; that of a part is that of its end.
     """
     mesh, moved = finger.mesh, finger.moved
     halves, pressure, status = [], [], []
@@ -137,7 +150,14 @@ def _coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
         arc, own = mesh.facets.get(FREE_FACES[k], mesh.facets["contact"][:0]), finger.faces == k
         value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
         value[finger.nodes[own]], state[finger.nodes[own]] = finger.pressure[own], finger.status[own]
+        point = np.full(len(moved), -1)
+        point[finger.nodes[own]] = np.flatnonzero(own)
+        share = border_shares(point[arc[:, :2]], finger.status, finger.zones)[:, None]
         middle = moved[arc[:, 2]] if mesh.element.is_quadratic else moved[arc].mean(axis=1)
+        start, end = moved[arc[:, 0]], moved[arc[:, 1]]
+        middle = (
+            (1 - share) * (1 - 2 * share) * start + 4 * share * (1 - share) * middle + share * (2 * share - 1) * end
+        )
         pairs = np.stack([moved[arc[:, :2]], np.repeat(middle[:, None], 2, axis=1)], axis=2)
         halves.append(pairs.reshape(-1, 2, 2))
         pressure.append((0.75 * value[arc[:, :2]] + 0.25 * value[arc[:, 1::-1]]).ravel())
@@ -149,7 +169,10 @@ def _solids(
     fingers: Sequence[DeformedFinger], highest: float, window: tuple[int, int], arrows: bool
 ) -> tuple[list[Figure], str]:
     """Draw a solid; without a renderer by matplotlib."""
-    skins = [skin_of(f.mesh, f.displacement, f.pressure, f.shear, f.status, f.nodes, f.faces, f.thing) for f in fingers]
+    skins = [
+        skin_of(f.mesh, f.displacement, f.pressure, f.shear, f.status, f.nodes, f.faces, f.thing, f.zones)
+        for f in fingers
+    ]
     pictures = []
     for skin in skins:
         by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)

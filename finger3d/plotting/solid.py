@@ -13,6 +13,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
+from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting.renderer import (
     AXES,
     WINDOW,
@@ -43,8 +44,9 @@ _ARROW_LENGTH = 0.045  # of the longest arrow, relative to the largest extent of
 _ARROW_SPACINGS = 1.6  # largest length of an arrow, in multiples of the distance between arrows
 _ARROW_COUNT = 100.0  # approximate number of arrows
 
-# A quadratic facet is split into six triangles: one at each corner, with its status, and three around the centre (node
-# 6), which have the status that most corners have. A boundary of a status is thus straight across a facet.
+# A quadratic facet is split into six triangles by a point of each side, where the status changes: one at each corner,
+# with its status, and three around their centre (node 6), which have the status that most corners have. A boundary of a
+# status is thus straight across a facet.
 _SIX = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 6], [4, 5, 6], [5, 3, 6]])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
@@ -122,6 +124,7 @@ def skin_of(
     nodes: Int,
     faces: Int,
     thing: Float | None = None,
+    zones: tuple[Zone, Zone] | None = None,
 ) -> Skin:
     """Return the skin of a deformed solid.
 
@@ -139,6 +142,7 @@ def skin_of(
         Nodes of the contact points, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces.
     thing : (t, 3, 3) array, mm
         Corners of the object's triangles, or None.
+    zones : of contact and of stick, which say where the status changes between two contact points; None: midway
     """
     moved = mesh.points + u
     touched = [FREE_FACES[k] for k in np.union1d(faces, CONTACT) if len(mesh.facets.get(FREE_FACES[k], ()))]
@@ -146,7 +150,9 @@ def skin_of(
     parts = []
     for label in touched:
         own = faces == FREE_FACES.index(label)
-        parts.append(_coloured(mesh.facets[label], moved, nodes[own], pressure[own], status[own]))
+        point = np.full(len(moved), -1)
+        point[nodes[own]] = np.flatnonzero(own)
+        parts.append(_coloured(mesh.facets[label], moved, point, pressure, status, zones))
     contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
     rims = [_rim(mesh.facets[label]) for label in touched]
@@ -169,22 +175,25 @@ def skin_of(
 
 
 def _coloured(
-    facets: Int, moved: Float, nodes: Int, pressure: Float, status: Int
+    facets: Int, moved: Float, point: Int, pressure: Float, status: Int, zones: tuple[Zone, Zone] | None
 ) -> tuple[Float, Float, NDArray[np.int64]]:
-    """Return the triangles (t, 3, 3) of a face, and pressure (t, 3) and status (t,) on them."""
-    value, state = np.zeros(len(moved)), np.full(len(moved), OPEN)
-    value[nodes], state[nodes] = pressure, status
-    corner = value[facets[:, :3]]
-    middle = 0.5 * (corner + np.roll(corner, -1, axis=1))
-    seven = np.hstack([corner, middle, corner.mean(axis=1, keepdims=True)])
-    rings = _six_nodes(facets, moved)
-    # Quadratic shape functions at the centroid: 4/9 at the mid-side nodes, -1/9 at the corners.
-    centre = (4.0 * rings[:, 3:].sum(axis=1) - rings[:, :3].sum(axis=1)) / 9.0
-    points = np.concatenate([rings, centre[:, None]], axis=1)
+    """Return the triangles (t, 3, 3) of a face, and pressure (t, 3) and status (t,) on them.
+
+    `point` is the number (n,) of the contact point at each node, -1 where there is none.
+    """
+    at = point[facets[:, :3]]
+    corner = np.where(at >= 0, pressure[at], 0.0)
+    place = np.zeros((len(facets), len(_RING) + 1, 3))  # of the corners, of a point of each side, of their centre
+    place[:, :3] = np.eye(3)
+    for side, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+        share = border_shares(at[:, [i, j]], status, zones)
+        place[:, 3 + side, i], place[:, 3 + side, j] = 1.0 - share, share
+    place[:, 6] = place[:, 3:6].mean(axis=1)
+    shapes = np.concatenate([place * (2.0 * place - 1.0), 4.0 * place * np.roll(place, -1, axis=2)], axis=2)
     return (
-        points[:, _SIX].reshape(-1, 3, 3),
-        seven[:, _SIX].reshape(-1, 3),
-        _status_on_six(state[facets[:, :3]]).ravel(),
+        (shapes @ _six_nodes(facets, moved))[:, _SIX].reshape(-1, 3, 3),
+        np.einsum("fpc,fc->fp", place, corner)[:, _SIX].reshape(-1, 3),
+        _status_on_six(np.where(at >= 0, status[at], OPEN)).ravel(),
     )
 
 

@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
-from finger3d._ranges import PathName, one_line, printable
+from finger3d._ranges import printable
 from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
-from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
-from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
@@ -24,22 +19,19 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject, initial_contact
 from finger3d.scene import checks, files, material, messages, tree
+from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
 from finger3d.scene.derived import legs_of, parts_of
 from finger3d.scene.mesh_sizes import mesh_options
-from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
+from finger3d.scene.messages import Place
 from finger3d.scene.tables import (
     AutoTable,
     LegsTable,
     LegTable,
     PressTable,
-    Record,
     SceneTable,
     TomlTable,
     record_of,
-    table_of,
 )
-
-AnyTable = TypeVar("AnyTable", bound=TomlTable)
 
 _AUTO_TOLERANCE = 0.02
 """Default relative change of a number above which an effect is needed."""
@@ -265,15 +257,15 @@ class _Parts:
 
 def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
     """Check every table by itself; None if there are mistakes, which are put into `mistakes`."""
-    tables = _checked(SceneTable, document, (), mistakes)
+    tables = checked(SceneTable, document, (), mistakes)
     mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
-    geometry, dimensions = _named(document, "finger", "geometry", designs(), mistakes)
-    design = _design(geometry, dimensions, mistakes)
-    shaped = {**document, "object": _shaped(document.get("object", {}))}
-    shape, placed = _named(shaped, "object", "shape", OBJECTS, mistakes)
-    rigid = _object(shape, placed, mistakes)
-    press = _press(document, mistakes)
-    settings, effects, auto = _effects(document, mistakes)
+    geometry, dimensions = named(document, "finger", "geometry", designs(), mistakes)
+    design = design_of(geometry, dimensions, mistakes)
+    with_shape = {**document, "object": shaped(document.get("object", {}))}
+    shape, placed = named(with_shape, "object", "shape", OBJECTS, mistakes)
+    rigid = object_of(shape, placed, mistakes)
+    press = press_of(document, mistakes)
+    settings, effects, auto = effects_of(document, mistakes)
     if mistakes or not (tables and dimensions and design and placed and rigid and press and auto):
         return None
     return _Parts(
@@ -289,140 +281,3 @@ def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
         effects=effects,
         auto=auto,
     )
-
-
-def _checked(
-    table: type[AnyTable], values: TreeView, under: Place, mistakes: dict[Place, str], also: tuple[str, ...] = ()
-) -> AnyTable | None:
-    try:
-        return table.model_validate(values)
-    except ValidationError as error:
-        mistakes |= messages_from(error, table, values, under, also)
-        return None
-
-
-def _built(record: type[Record], settings: TomlTable, place: Place, mistakes: dict[Place, str]) -> Record | None:
-    """Build a design or an effect; values that it refuses are collected as mistakes."""
-    try:
-        return record_of(record, settings)
-    except Finger3dError as error:
-        mistakes[place] = f"{dotted(place)}: {error}"
-        return None
-
-
-def _design(geometry: str, dimensions: TomlTable | None, mistakes: dict[Place, str]) -> Design | None:
-    """Build the finger from a design, or read it from a file."""
-    if dimensions is None:
-        return None
-    if not files.is_file(geometry):
-        design: Design | None = _built(designs()[geometry], dimensions, ("finger",), mistakes)
-        return design
-    try:
-        return files.finger(geometry, dimensions)
-    except Finger3dError as error:
-        mistakes["finger", "geometry"] = f"finger.geometry: {error}"
-        return None
-
-
-def _object(shape: str, placed: TomlTable | None, mistakes: dict[Place, str]) -> RigidObject | None:
-    """Build the object; defects of its file are collected as mistakes."""
-    if placed is None:
-        return None
-    try:
-        return record_of(OBJECTS[shape], placed).read()
-    except Finger3dError as error:
-        hint = "; give its path from the scene's folder" if str(error).endswith("there is no such file") else ""
-        mistakes["object", "path"] = f"object.path: {error}{hint}"
-        return None
-
-
-def _shaped(table: Any) -> Any:
-    """Return the [object] table, with the default shape if it names none."""
-    if not isinstance(table, Mapping) or "shape" in table or any(nearest(k, ("shape",)) for k in table):
-        return table
-    return {"shape": "plane", **table}
-
-
-def _named(
-    document: TreeView, name: str, key: str, types: Mapping[str, type], mistakes: dict[Place, str]
-) -> tuple[str, TomlTable | None]:
-    """Check a table whose `key` says which other keys it takes."""
-    given_table = document.get(name)
-    if not isinstance(given_table, Mapping):
-        return "", None  # found by the check of the whole file
-    if key not in given_table:
-        misspelt = next((k for k in given_table if nearest(k, (key,))), None)
-        line = (
-            unknown((name, misspelt), given_table[misspelt], (key,))
-            if misspelt
-            else f"{name}.{key} is missing: must be {listed(types)}"
-        )
-        mistakes[name, misspelt or key] = line
-        return "", None
-    value, rest = given_table[key], {k: v for k, v in given_table.items() if k != key}
-    if isinstance(value, str) and not one_line(value):
-        mistakes[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
-        return "", None
-    if name == "finger" and files.is_file(value):
-        if not Path(value).exists():
-            # Reported alone: the other keys may be those of the design that the file replaces.
-            mistakes[name, key] = (
-                f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
-                f"{listed(types)}"
-            )
-            return "", None
-        extra: dict[Place, str] = {}
-        table = _checked(files.table_of_file(value), rest, (name,), extra, also=(key,))
-        mistakes |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in extra.items()}
-        return value, table
-    if name == "finger" and isinstance(value, str) and "." in value:
-        mistakes[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
-    elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
-        mistakes[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
-    elif not isinstance(value, str) or value not in types:
-        mistakes[name, key] = choose((name, key), value, list(types))
-    else:
-        return value, _checked(table_of(types[value]), rest, (name,), mistakes, also=(key,))
-    return "", None
-
-
-def _press(document: TreeView, mistakes: dict[Place, str]) -> PressTable | LegsTable | None:
-    press = document.get("press")
-    if not isinstance(press, Mapping):
-        return None  # found by the check of the whole file
-    if "leg" not in press:
-        return _checked(PressTable, press, ("press",), mistakes, also=("leg",))
-    if both := [k for k in press if k in LegTable.model_fields]:
-        mistakes["press", both[0]] = (
-            f"press.{both[0]} = {shown(press[both[0]])}: must not stand beside [[press.leg]]; "
-            "give either one press or its legs"
-        )
-        return None
-    return _checked(LegsTable, press, ("press",), mistakes)
-
-
-def _effects(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:
-    """Check the effects that are present, the only ones that are imported; return their tables and their settings, and
-    whether they are used only where they are needed.
-    """
-    tables: dict[str, TomlTable] = {}
-    effects: Tree = {}
-    present = document.get("effects")
-    present = present if isinstance(present, Mapping) else {}
-    keys = {name: value for name, value in present.items() if name in AutoTable.model_fields}
-    auto = _checked(AutoTable, keys, ("effects",), mistakes, also=effect_names())
-    if auto and auto.auto_tolerance and not auto.auto:
-        mistakes["effects", "auto_tolerance"] = (
-            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: only with effects.auto = true"
-        )
-    for name, settings in present.items():
-        if name in AutoTable.model_fields:
-            continue
-        place = ("effects", name)
-        if name not in effect_names():
-            mistakes[place] = unknown(place, settings, (*effect_names(), *AutoTable.model_fields), kind="effect")
-        elif not isinstance(settings, Mapping):
-            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
-        elif table := _checked(table_of(effect_type(name)), settings, place, mistakes):
-            tables[name], effects[name] = table, _built(effect_type(name), table, place, mistakes)
-    return tables, effects, auto

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from finger3d.fem.tensors import bases_of
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.relaxation import InternalVariables
 from finger3d.objects import Move, ObjectPose
 
@@ -105,14 +103,3 @@ def curvature_of(problem: Problem, face: BoundarySurface, u: Float, target: Obje
         turn = np.einsum("qk,qtk->qt", ahead - behind, tangents) / (2.0 * step)
         out += np.einsum("qs,qsi,qj->qij", turn, tangents, tangents[:, t])
     return 0.5 * (out + np.swapaxes(out, 1, 2))
-
-
-def expecting(state: State[Any], move: Move, ends: tuple[State[Any], State[Any]], share: float) -> State[Any]:
-    """Return a state at finite strain from which the increment begins its iteration at an expected end.
-
-    The end has the unknowns ``ends[0] + share (ends[0] - ends[1])``.
-    """
-    one, other = (end.body.unknowns for end in ends)
-    end = one + share * (one - other)
-    before = Move(move.at(-1.0), move.start), 2.0 * state.body.unknowns - end
-    return replace(state, body=replace(state.body, previous=before))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Event
 from typing import Any
 
@@ -15,12 +15,11 @@ from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.contact.state import SNAPPED, ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.finite_strain.state import expecting
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.energy import external_work, frictional_dissipation
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
+from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting
 from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
@@ -36,28 +35,6 @@ _CUTS = 6
 _FIRST_PARTS = 1.0 / 16.0, 0.25
 """Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
 ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
-
-
-@dataclass(frozen=True)
-class _Substep:
-    """A converged part of an increment: states before and after, and the motion of the object."""
-
-    before: State[Any]
-    after: State[Any]
-    move: Move
-
-
-@dataclass(frozen=True)
-class _Advanced:
-    """End of an increment: its solution, the converged parts, and the pose that was reached.
-
-    `energies` are the work of the object and the dissipation (mJ) if they are known, else they follow from the parts.
-    """
-
-    solution: ContactSolution[State[Any]]
-    parts: list[_Substep]
-    pose: ObjectPose
-    energies: tuple[float, float] | None = None
 
 
 def march(
@@ -161,8 +138,8 @@ class Press:
         if solutions:
             states = [self.state, *(solution.state for solution in solutions)]
             moves = self.moves_to(station.pose)
-            parts = [_Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
-            end = _Advanced(solutions[-1], parts, station.pose)
+            parts = [Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
+            end = Advanced(solutions[-1], parts, station.pose)
         elif self._is_exact:
             end = self._along_path(station)
         elif station.load is None:
@@ -179,11 +156,8 @@ class Press:
         self.has_failed = not (outcome.ok or outcome.is_cycle)
         return self._result(end, self._free_strain(station))
 
-    def _add_energies(self, end: _Advanced) -> None:
-        work, lost = end.energies or (0.0, 0.0)
-        for part in end.parts if end.energies is None else ():
-            work += external_work(self.problem, part.before, part.after, part.move)
-            lost += frictional_dissipation(self.problem, part.before.contact, part.after.contact)
+    def _add_energies(self, end: Advanced) -> None:
+        work, lost = end.energies or energies(self.problem, end.parts)
         self._work += work
         self._dissipation += lost
 
@@ -199,7 +173,7 @@ class Press:
         if not found.outcome.ok:
             return False
         self.state, self._work, self._dissipation = found.state, work, dissipation
-        self._add_energies(_Advanced(found, parts, whole.end))
+        self._add_energies(Advanced(found, parts, whole.end))
         return True
 
     def expected_force(self, pose: ObjectPose) -> Float | None:
@@ -216,8 +190,8 @@ class Press:
         move = Move(self.pose, pose)
         return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
 
-    def _to_pose(self, pose: ObjectPose, guess: Float | None) -> _Advanced:
-        return _Advanced(*self._in_turn(self.state, self.moves_to(pose), self._cuts, guess), pose)
+    def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
+        return Advanced(*self._in_turn(self.state, self.moves_to(pose), self._cuts, guess), pose)
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
@@ -225,20 +199,20 @@ class Press:
 
     def _increment(
         self, state: State[Any], move: Move, cuts: int, guess: Float | None = None
-    ) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
+    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
         """Solve an increment; one that does not converge is halved and repeated from the same state."""
         whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
         if whole.outcome.ok or cuts == 0:
-            return whole, [_Substep(state, whole.state, move)]
+            return whole, [Substep(state, whole.state, move)]
         halves, parts = self._in_turn(state, move.cut(0.5), cuts - 1)
         method = SNAPPED if halves.method == SNAPPED else "cut back"
         return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts
 
     def _in_turn(
         self, state: State[Any], moves: Sequence[Move], cuts: int, guess: Float | None = None
-    ) -> tuple[ContactSolution[State[Any]], list[_Substep]]:
+    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
         """Solve the parts of an increment one after another; the guess is that of the last."""
-        found, parts, now = list[ContactSolution[State[Any]]](), list[_Substep](), state
+        found, parts, now = list[ContactSolution[State[Any]]](), list[Substep](), state
         for move in moves:
             one, more = self._increment(now, move, cuts, guess if move is moves[-1] else None)
             found, parts, now = [*found, one], parts + more, one.state
@@ -276,7 +250,7 @@ class Press:
         model = self.problem.model
         return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
 
-    def _along_path(self, station: Station) -> _Advanced:
+    def _along_path(self, station: Station) -> Advanced:
         """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
         end, load = station.leg_end or station.pose, station.load
         path, leg = self._path, (end, None if load is None else float(load.forces[0]))
@@ -286,16 +260,16 @@ class Press:
             self._path, self._leg, self._share = path, leg, 0.0
         there = path.between(self._share, station.share)
         self._share = station.share
-        part = _Substep(self.state, there.solution.state, Move(self.pose, there.pose))
-        return _Advanced(there.solution, [part], there.pose, there.energies)
+        part = Substep(self.state, there.solution.state, Move(self.pose, there.pose))
+        return Advanced(there.solution, [part], there.pose, there.energies)
 
-    def _to_force(self, move: Move, load: Load) -> _Advanced:
+    def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one.
 
         Every trial begins at the end expected from those before it.  If the force is not reached, the solution says
         why, and state and pose are those at the beginning.
         """
-        problem, state, parts = self.problem, self.state, dict[float, list[_Substep]]()
+        problem, state, parts = self.problem, self.state, dict[float, list[Substep]]()
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
@@ -325,13 +299,13 @@ class Press:
         last = search.run(first_trial(start_mm, stride, wanted, begin))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
-            return _Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
+            return Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
         solution = replace(last.solution, iterations=spent)
-        return _Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
+        return Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
 
-    def _to_forces(self, move: Move, load: Load) -> _Advanced:
+    def _to_forces(self, move: Move, load: Load) -> Advanced:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
-        problem, state, parts = self.problem, self.state, dict[bytes, list[_Substep]]()
+        problem, state, parts = self.problem, self.state, dict[bytes, list[Substep]]()
         forces, wanted = self._wanted(load)
         free = np.flatnonzero(~np.isnan(wanted))
         normal = float(wanted[0] if 0 in free else forces[0])
@@ -340,7 +314,7 @@ class Press:
         if normal <= 0.0:
             detail = "nothing touches, and a tangential force is prescribed; press first"
             ended = ContactSolution(state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
-            return _Advanced(ended, [], move.start)
+            return Advanced(ended, [], move.start)
 
         def trial_at(place: Float, near: PoseTrial | None) -> PoseTrial:
             self._end_if_cancelled()
@@ -376,9 +350,9 @@ class Press:
         last = search.run(move.start.coordinates[free])
         self._stiffness = search.stiffness
         if not last.ok:
-            return _Advanced(replace(last.solution, state=state, iterations=search.iterations), [], move.start)
+            return Advanced(replace(last.solution, state=state, iterations=search.iterations), [], move.start)
         pose = parts[last.place.tobytes()][-1].move.end
-        return _Advanced(replace(last.solution, iterations=search.iterations), parts[last.place.tobytes()], pose)
+        return Advanced(replace(last.solution, iterations=search.iterations), parts[last.place.tobytes()], pose)
 
     def _forces(self, state: State[Any]) -> Float:
         """Normal force and forces along x and z (3,) N, as in a `Load`."""
@@ -398,7 +372,7 @@ class Press:
         columns = [strain_columns(gauge.name) for gauge in self.problem.model.gauges]
         return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
-    def _result(self, end: _Advanced, free_strain: dict[Column, float]) -> StepResult:
+    def _result(self, end: Advanced, free_strain: dict[Column, float]) -> StepResult:
         problem, state, pose, solution = self.problem, self.state, self.pose, end.solution
         moment = self.formulation.loads(problem, state, pose).moment
         return StepResult(

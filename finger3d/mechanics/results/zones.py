@@ -39,6 +39,9 @@ _LARGE = 1e15
 _SMALL_SLOPE = 1e-2
 """Singular values of a fit of a slope, over the largest, below which they are round-off: points on a line."""
 
+_SHARES = 0.02, 0.98
+"""Least and largest share of a side at which a border is drawn: no part of a facet is without area."""
+
 
 @dataclass(frozen=True)
 class Zone:
@@ -166,3 +169,26 @@ def zone_area(facets: Int, area: Float, zone: Zone) -> float:
             part *= zone.share(one, other) if alone else 1.0 - zone.share(other, one)
         total += float(area[cut] @ (part if alone else 1.0 - part))
     return total
+
+
+def border_shares(pairs: Int, status: Int, zones: tuple[Zone, Zone] | None) -> Float:
+    """Return where the status changes on the way from one contact point to another, (k,) shares of it.
+
+    Parameters
+    ----------
+    pairs : (k, 2) contact points; -1: none, an open place whose gap is not known
+    zones : of contact and of stick; None: midway
+    """
+    shares = np.full(len(pairs), 0.5)
+    if zones is None:
+        return shares
+    state = np.where(pairs >= 0, status[pairs], OPEN)
+    known = (pairs >= 0).all(axis=1) & (state[:, 0] != state[:, 1])
+    contact, stick = zones
+    for zone in (contact, stick):  # a border of stick counts, where it is that of contact, too
+        for inner, outer in ((0, 1), (1, 0)):
+            on = np.flatnonzero(known)
+            on = on[zone.inside[pairs[on, inner]] & ~zone.inside[pairs[on, outer]]]
+            share = np.clip(zone.share(pairs[on, inner], pairs[on, outer]), *_SHARES)
+            shares[on] = share if inner == 0 else 1.0 - share
+    return shares

@@ -81,21 +81,21 @@ class ExactPath:
 
     def between(self, first: float, last: float) -> PathPoint:
         """Return the place at the share `last` of the path, reached from that at `first`."""
-        begin, passed = self._at(first)
+        begin, passed = self.at(first)
         if last > (self.events[-1].share if self.events else -1.0):
             state = self._state(begin.state)
             unsolved = self.events[-1].residual if self.outcome.ok else np.inf
             solution = ContactSolution(state, self.outcome, unsolved, 0, "none", self.detail)
             return PathPoint(solution, self._pose(begin), (0.0, 0.0))
-        end, done = self._at(last)
+        end, done = self.at(last)
         way = [begin, *self.events[passed:done], end]
         crossed = self.events[passed : done + 1]
         residual = max((event.residual for event in crossed), default=0.0)
         systems = end.systems - begin.systems
         solution = ContactSolution(self._state(end.state), Outcome.CONVERGED, residual, systems, "events")
-        return PathPoint(solution, self._pose(end), self._energies(way))
+        return PathPoint(solution, self._pose(end), self.energies(way))
 
-    def _at(self, share: float) -> tuple[Event, int]:
+    def at(self, share: float) -> tuple[Event, int]:
         """Return the state at a share as an event, and the number of events up to there."""
         done = bisect_right(self.events, share, key=lambda event: event.share)
         before = self.events[done - 1] if done else self.start
@@ -114,7 +114,7 @@ class ExactPath:
         pose = self.move.end if event.share == 1.0 else self.move.at(event.share)
         return replace(pose, depth_mm=pose.depth_mm + event.amplitude)
 
-    def _energies(self, events: Sequence[Event]) -> tuple[float, float]:
+    def energies(self, events: Sequence[Event]) -> tuple[float, float]:
         """Return work and dissipation (mJ) from first to last event, exact since forces are linear between events.
 
         What forces on points lose that move relative to the object is dissipated, in slip and where forces jump.

@@ -1,0 +1,218 @@
+"""Derivatives of the numbers of a press by the keys of its scene, and the effect of the uncertainty of each key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from finger3d._types import Tree, TreeView
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.free_keys import scene_with
+from finger3d.analyses.pressed_body import PressedBody
+from finger3d.errors import Finger3dError
+from finger3d.io import claimed, write_csv, write_json
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.sensitivity import Numbers, Variation, derivatives, refusal, variation
+from finger3d.progress import QUIET, Progress
+from finger3d.scene import Scene, Source, scene_of, tree
+from finger3d.scene.checks import headline_numbers
+
+_KEYS = re.compile(
+    r"friction\.mu|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm)"
+    r"|gauge\.\d+\.(x_mm|y_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm)"
+)
+"""Keys that numbers have derivatives by; others change the mesh or the object."""
+
+_STEP, _LEAST = 1e-5, 0.1
+"""Step of central differences of assembled matrices and of paths, over the value or over this if that is larger."""
+
+_PERCENT = 0.01
+"""Relative change of a key without a tolerance that the figure shows the effect of."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of numbers at the end of a press.
+
+    Attributes
+    ----------
+    title : of the scene
+    numbers : values of the numbers by name
+    keys : values of the keys
+    tolerances : standard deviations of those keys that have one (`finger3d.analyses.calibrate.tolerance_table`)
+    derivatives : of each number by each key, per unit of the key
+    without : keys of the scene that have no derivative, since they change the mesh or the object
+    """
+
+    title: str
+    numbers: Mapping[str, float]
+    keys: Mapping[str, float]
+    tolerances: Mapping[str, float]
+    derivatives: Mapping[str, Mapping[str, float]]
+    without: tuple[str, ...]
+
+    def change(self, key: str) -> float:
+        """Return the change of a key that effects are shown for: its tolerance, or 1 % of its value."""
+        return self.tolerances.get(key, _PERCENT * abs(self.keys[key]))
+
+    def as_dict(self) -> Tree:
+        """Return what sensitivity.json holds."""
+        return {
+            "title": self.title,
+            "numbers": dict(self.numbers),
+            "keys": dict(self.keys),
+            "tolerances": dict(self.tolerances),
+            "derivatives": {name: dict(row) for name, row in self.derivatives.items()},
+            "without_derivative": list(self.without),
+        }
+
+    def rows(self) -> list[Tree]:
+        """Return a row for each number and key, those first that change the number most."""
+        return [
+            {
+                "number": name,
+                "key": key,
+                "value": self.keys[key],
+                "derivative": slope,
+                "change": self.change(key),
+                "effect": slope * self.change(key),
+            }
+            for name, by_key in self.derivatives.items()
+            for key, slope in sorted(by_key.items(), key=lambda item: -abs(item[1] * self.change(item[0])))
+        ]
+
+
+def sensitivity(
+    scene: Source,
+    of: Sequence[str] = (),
+    out: str | Path | None = None,
+    report: Progress = QUIET,
+    overrides: Sequence[str] = (),
+) -> Sensitivity:
+    """Differentiate numbers at the end of a press by the keys of its scene.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    of : numbers of the press, such as "gauge_g36"; default: all that have error bars
+    out : folder for sensitivity.json, sensitivity.csv and sensitivity.png
+    report : receives the progress
+    overrides : other keys to set, such as ``"friction.mu=0.5"``
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    Finger3dError
+        If the press has no number of such a name, or its numbers have no derivatives.
+    """
+    scene = scene_of(scene, overrides)
+    model = scene.model()
+    names = headline_numbers(scene.tables, scene.domain == "solid", model.ends_at_force)
+    if unknown := [name for name in of if name not in names]:
+        raise Finger3dError(f"of = {unknown[0]!r}: no number of this press; must be one of {', '.join(names)}")
+    if text := refusal(model):
+        raise Finger3dError(f"sensitivity: {text}")
+    report.stage("meshing and pressing")
+    body = PressedBody(model, report)
+    end = body.steps()[-1]
+    if not end.outcome.ok:
+        raise Finger3dError(f"sensitivity: at depth {end.target.depth_mm:.4g} mm: {end.outcome}")
+    report.stage("differentiating")
+    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if _has_derivative(key, value, body.problem)}
+    variations = [varied(scene, body.problem, key) for key in keys]
+    steps, rows = derivatives(body.problem, variations)
+    values = table_row(body.problem.points, steps[-1])
+    found = _result(scene, keys, {name: values[name] for name in tuple(of) or names}, rows[-1])
+    if out is not None:
+        _write(Path(out), found)
+    return found
+
+
+def varied(scene: Scene, problem: Problem, key: str) -> Variation:
+    """Return the variation of a condensed body with a key of its scene; one-sided where a bound is nearer than a step.
+
+    Raises
+    ------
+    Finger3dError
+        If numbers have no derivative by the key.
+    """
+    given = scene.as_dict()
+    value = float(str(tree.value_at(given, key)))
+    step = _STEP * max(abs(value), _LEAST)
+    problems = []
+    for low in (value - step, value, value - 2.0 * step):
+        try:
+            first, last = (scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step))
+        except Finger3dError as error:
+            problems.append(str(error))
+        else:
+            return variation(problem, first, last, step)
+    raise Finger3dError(f"{key} = {value:g}: numbers have no derivative here: {problems[0]}")
+
+
+def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the dotted keys of a scene whose values are numbers that may change continuously."""
+    if isinstance(node, float):
+        yield place, node
+    elif isinstance(node, list | tuple):
+        node = dict(enumerate(node))
+    for key, child in node.items() if isinstance(node, Mapping) else ():
+        yield from _numbers_of(child, f"{place}.{key}" if place else str(key))
+
+
+def _has_derivative(key: str, value: float, problem: Problem) -> bool:
+    """Whether numbers have a derivative by a key; a slide of a mirrored press would break its symmetry."""
+    mirrored = key.endswith("slide_x_mm") and "x" in problem.axes
+    return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)
+
+
+def _result(scene: Scene, keys: Mapping[str, float], numbers: Numbers, rows: Sequence[Numbers]) -> Sensitivity:
+    """Return the derivatives (k,) of the last increment with the names of gauges and markers in place of numbers."""
+    given = scene.as_dict()
+    titles = {key: _named(key, given) for key in keys}
+    slopes = {name: {titles[key]: row[name] for key, row in zip(keys, rows, strict=True)} for name in numbers}
+    tolerances = {titles[key]: sd for key, value in keys.items() if (sd := _tolerance(key, value)) is not None}
+    without = [_named(key, given) for key, _ in _numbers_of(given) if key not in keys]
+    skipped = ("mesh.", "contact.", "effects.")
+    return Sensitivity(
+        title=scene.title,
+        numbers=numbers,
+        keys={titles[key]: value for key, value in keys.items()},
+        tolerances=tolerances,
+        derivatives=slopes,
+        without=tuple(key for key in without if not key.startswith(skipped)),
+    )
+
+
+def _named(key: str, given: TreeView) -> str:
+    """Return a key with the name of a gauge or marker in place of its number."""
+    kind, number, *rest = [*key.split("."), ""]
+    if kind not in ("gauge", "marker", "taxel") or not number.isdecimal():
+        return key
+    return ".".join([kind, str(tree.value_at(given, f"{kind}.{number}.name")), *rest]).rstrip(".")
+
+
+def _tolerance(key: str, value: float) -> float | None:
+    """Return the standard deviation of a key in a careful set-up; None if none is known."""
+    table, last = key.split(".")[0], key.split(".")[-1]
+    if last == "E_MPa":
+        return TOLERANCES["E_percent"][0] / 100.0 * value
+    name = f"gauge_{last}" if table == "gauge" else last
+    return TOLERANCES[name][0] if name in TOLERANCES and table != "marker" else None
+
+
+def _write(out: Path, found: Sensitivity) -> None:
+    """Write the results and the figure."""
+    from finger3d.plotting.sensitivity import draw  # matplotlib is loaded for a figure only
+
+    with claimed(out, "sensitivity") as folder:
+        write_json(folder / "sensitivity.json", found.as_dict())
+        rows = found.rows()
+        write_csv(folder / "sensitivity.csv", {name: [row[name] for row in rows] for name in rows[0]})
+        draw(folder / "sensitivity.png", found.title, found.numbers, rows)

@@ -1,0 +1,169 @@
+"""Tables of a scene's file, each checked by itself, and the objects that they stand for; mistakes are collected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from finger3d._ranges import PathName, one_line
+from finger3d._types import Tree, TreeView
+from finger3d.effects import effect_names, effect_type
+from finger3d.errors import Finger3dError
+from finger3d.geometry.design import Design
+from finger3d.geometry.files import SUFFIXES
+from finger3d.geometry.registry import designs
+from finger3d.objects import OBJECTS, RigidObject
+from finger3d.scene import files
+from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
+from finger3d.scene.tables import (
+    AutoTable,
+    LegsTable,
+    LegTable,
+    PressTable,
+    Record,
+    TomlTable,
+    record_of,
+    table_of,
+)
+
+AnyTable = TypeVar("AnyTable", bound=TomlTable)
+
+
+def checked(
+    table: type[AnyTable], values: TreeView, under: Place, mistakes: dict[Place, str], also: tuple[str, ...] = ()
+) -> AnyTable | None:
+    try:
+        return table.model_validate(values)
+    except ValidationError as error:
+        mistakes |= messages_from(error, table, values, under, also)
+        return None
+
+
+def built(record: type[Record], settings: TomlTable, place: Place, mistakes: dict[Place, str]) -> Record | None:
+    """Build a design or an effect; values that it refuses are collected as mistakes."""
+    try:
+        return record_of(record, settings)
+    except Finger3dError as error:
+        mistakes[place] = f"{dotted(place)}: {error}"
+        return None
+
+
+def design_of(geometry: str, dimensions: TomlTable | None, mistakes: dict[Place, str]) -> Design | None:
+    """Build the finger from a design, or read it from a file."""
+    if dimensions is None:
+        return None
+    if not files.is_file(geometry):
+        design: Design | None = built(designs()[geometry], dimensions, ("finger",), mistakes)
+        return design
+    try:
+        return files.finger(geometry, dimensions)
+    except Finger3dError as error:
+        mistakes["finger", "geometry"] = f"finger.geometry: {error}"
+        return None
+
+
+def object_of(shape: str, placed: TomlTable | None, mistakes: dict[Place, str]) -> RigidObject | None:
+    """Build the object; defects of its file are collected as mistakes."""
+    if placed is None:
+        return None
+    try:
+        return record_of(OBJECTS[shape], placed).read()
+    except Finger3dError as error:
+        hint = "; give its path from the scene's folder" if str(error).endswith("there is no such file") else ""
+        mistakes["object", "path"] = f"object.path: {error}{hint}"
+        return None
+
+
+def shaped(table: Any) -> Any:
+    """Return the [object] table, with the default shape if it names none."""
+    if not isinstance(table, Mapping) or "shape" in table or any(nearest(k, ("shape",)) for k in table):
+        return table
+    return {"shape": "plane", **table}
+
+
+def named(
+    document: TreeView, name: str, key: str, types: Mapping[str, type], mistakes: dict[Place, str]
+) -> tuple[str, TomlTable | None]:
+    """Check a table whose `key` says which other keys it takes."""
+    given_table = document.get(name)
+    if not isinstance(given_table, Mapping):
+        return "", None  # found by the check of the whole file
+    if key not in given_table:
+        misspelt = next((k for k in given_table if nearest(k, (key,))), None)
+        line = (
+            unknown((name, misspelt), given_table[misspelt], (key,))
+            if misspelt
+            else f"{name}.{key} is missing: must be {listed(types)}"
+        )
+        mistakes[name, misspelt or key] = line
+        return "", None
+    value, rest = given_table[key], {k: v for k, v in given_table.items() if k != key}
+    if isinstance(value, str) and not one_line(value):
+        mistakes[name, key] = f"{name}.{key} = {shown(value)}: must be {described(PathName)}"
+        return "", None
+    if name == "finger" and files.is_file(value):
+        if not Path(value).exists():
+            # Reported alone: the other keys may be those of the design that the file replaces.
+            mistakes[name, key] = (
+                f"{name}.{key}: {value}: there is no such file; give its path from the scene's folder, or a design: "
+                f"{listed(types)}"
+            )
+            return "", None
+        extra: dict[Place, str] = {}
+        table = checked(files.table_of_file(value), rest, (name,), extra, also=(key,))
+        mistakes |= {p: t.replace("no such key", "no such key beside this file, take it out") for p, t in extra.items()}
+        return value, table
+    if name == "finger" and isinstance(value, str) and "." in value:
+        mistakes[name, key] = f"{name}.{key} = {shown(value)}: a file must be named {listed(files.FINGER_SUFFIXES)}"
+    elif name == "object" and isinstance(value, str) and value.lower().endswith(SUFFIXES):
+        mistakes[name, key] = f'{name}.{key} = {shown(value)}: must be "mesh", and the file its path'
+    elif not isinstance(value, str) or value not in types:
+        mistakes[name, key] = choose((name, key), value, list(types))
+    else:
+        return value, checked(table_of(types[value]), rest, (name,), mistakes, also=(key,))
+    return "", None
+
+
+def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | LegsTable | None:
+    press = document.get("press")
+    if not isinstance(press, Mapping):
+        return None  # found by the check of the whole file
+    if "leg" not in press:
+        return checked(PressTable, press, ("press",), mistakes, also=("leg",))
+    if both := [k for k in press if k in LegTable.model_fields]:
+        mistakes["press", both[0]] = (
+            f"press.{both[0]} = {shown(press[both[0]])}: must not stand beside [[press.leg]]; "
+            "give either one press or its legs"
+        )
+        return None
+    return checked(LegsTable, press, ("press",), mistakes)
+
+
+def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:
+    """Check the effects that are present, the only ones that are imported; return their tables and their settings, and
+    whether they are used only where they are needed.
+    """
+    tables: dict[str, TomlTable] = {}
+    effects: Tree = {}
+    present = document.get("effects")
+    present = present if isinstance(present, Mapping) else {}
+    keys = {name: value for name, value in present.items() if name in AutoTable.model_fields}
+    auto = checked(AutoTable, keys, ("effects",), mistakes, also=effect_names())
+    if auto and auto.auto_tolerance and not auto.auto:
+        mistakes["effects", "auto_tolerance"] = (
+            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: only with effects.auto = true"
+        )
+    for name, settings in present.items():
+        if name in AutoTable.model_fields:
+            continue
+        place = ("effects", name)
+        if name not in effect_names():
+            mistakes[place] = unknown(place, settings, (*effect_names(), *AutoTable.model_fields), kind="effect")
+        elif not isinstance(settings, Mapping):
+            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
+        elif table := checked(table_of(effect_type(name)), settings, place, mistakes):
+            tables[name], effects[name] = table, built(effect_type(name), table, place, mistakes)
+    return tables, effects, auto
