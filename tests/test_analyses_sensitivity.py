@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import pytest
 
 import finger3d
-from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from tests.sensor_cases import scene
 
@@ -37,34 +33,6 @@ def test_at_the_bound_of_a_key_the_derivative_is_one_sided() -> None:
     near = finger3d.sensitivity(scene(**SECTION | {"material": {"E_MPa": 1.0, "nu": 0.4999}}), ["normal_force_N"])
     one, other = (f.derivatives["normal_force_N"]["material.nu"] for f in (found, near))
     assert one == pytest.approx(other, rel=0.05)
-
-
-def test_the_command_writes_table_json_and_figure(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    file = tmp_path / "scene.toml"
-    file.write_text(scene(**SECTION).to_toml(), encoding="utf-8")
-    out = tmp_path / "out"
-    assert main(["sensitivity", str(file), "--of", "gauge_g36,stick_area_mm2", "--out", str(out)]) == 0
-    assert "finger.radius_mm" in capsys.readouterr().out  # among the keys without a derivative
-    found = json.loads((out / "sensitivity.json").read_text())
-    assert set(found["derivatives"]) == {"gauge_g36", "stick_area_mm2"}
-    assert found["tolerances"]["press.depth_mm"] == 0.1
-    assert {p.name for p in out.iterdir()} >= {"sensitivity.csv", "sensitivity.png"}
-
-
-@pytest.mark.parametrize(
-    ("of", "key", "text"),
-    [
-        ("gauge_g3", "friction.mu=0.4", "must be one of normal_force_N, friction_sum_N"),
-        ("gauge_g36", "model.domain=solid", "derivatives need an exact path: a section"),
-    ],
-)
-def test_bad_input_is_one_line(of: str, key: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    file = tmp_path / "scene.toml"
-    file.write_text(scene(**SECTION).to_toml(), encoding="utf-8")
-    assert main(["sensitivity", str(file), "--of", of, "--set", key, "--out", str(tmp_path / "out")]) == 2
-    error = capsys.readouterr().err
-    assert text in error
-    assert error.count("\n") == 1
 
 
 def test_a_result_tells_its_derivatives() -> None:

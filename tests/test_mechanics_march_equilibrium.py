@@ -16,7 +16,6 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.objects import Plane, Sphere
 from tests.models import block, marched
 
@@ -107,17 +106,3 @@ def test_a_slide_after_a_force_begins_where_the_force_led() -> None:
     slides = [step["slide_x_mm"] for step in found[1:]]
     assert slides[0] > 0.0
     assert np.diff(slides) == pytest.approx(np.full(4, -0.25 * slides[0]))
-
-
-def test_the_slip_limit_of_a_flat_contact() -> None:
-    """mu N along every axis; mu times the pressure's first moment about its centre."""
-    problem = build(block(object=Plane(), legs=(PRESS, held(0.03, 0.04 * 0.5))))
-    *_, last = march(problem)
-    limit = slip_limit(problem.points, last.state, problem.model.friction)
-    assert limit is not None
-    assert limit.tangential_force_x_N == pytest.approx(MU * N, rel=1e-9)
-    assert limit.tangential_force_z_N == pytest.approx(MU * N, rel=1e-9)
-    p, x, z = last.state.force[:, 0], problem.points.points[:, 0], problem.points.points[:, 2]
-    arm = np.hypot(x - p @ x / p.sum(), z - p @ z / p.sum())
-    assert limit.moment_y_Nmm == pytest.approx(MU * p @ arm, rel=1e-9)
-    assert np.hypot(0.03, 0.02) / (MU * N) <= limit.used < 1.0

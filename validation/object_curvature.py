@@ -80,7 +80,7 @@ def run(quick: bool) -> Result:
             "curvatures add: 1e-3 of the finger's",
         ),
         Row(
-            "calibration on the plane is monotonic (1: yes)", "it is inverted", 1.0, float(monotonic), 0.0, "a statement",
+            "calibration on the plane is monotonic (1: yes)", "inverted", 1.0, float(monotonic), 0.0, "yes or no",
         ),
         Row(what, HALVED, rough[100.0], read[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
         Row(f"{what}; edges of {sizes[0]:g} mm, {steps} increments", f"{steps // 2} increments", fewer[100.0],

@@ -14,8 +14,9 @@ from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal
 from finger3d.mechanics.results.history import table_row
-from finger3d.mechanics.sensitivity import Numbers, Variation, derivatives, refusal, variation
+from finger3d.mechanics.small_strain.variations import Variation, variation
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 from finger3d.scene.checks import headline_numbers

@@ -299,10 +299,14 @@ class _Path:
             touch, limit, leave = (np.zeros_like(touch) for _ in range(3))
         force = line.force + step * line.force_rate
         force[leave] = 0.0
-        moved = self.displacement + step * line.displacement_rate
-        moved[(status != OPEN) | touch, 0] = 0.0
         share = 1.0 if ends and not too_far else self.share + step
-        if not self._record(force, moved, status, line.amplitude + step * line.amplitude_rate, share):
+        amplitude = line.amplitude + step * line.amplitude_rate
+        # from the forces, since rates would add up their round-off
+        moved = self._through_body(force) + self._start + share * self._rate
+        if more is not None:
+            moved = moved + amplitude * more.motion
+        moved[(status != OPEN) | touch, 0] = 0.0
+        if not self._record(force, moved, status, amplitude, share):
             return Outcome.NO_CONVERGENCE
         if too_far:
             return Outcome.FORCE_NOT_REACHED

@@ -12,12 +12,13 @@ from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.sensitivity import derivatives
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.mechanics.results.history import table_row
-from finger3d.mechanics.sensitivity import derivatives, variation
+from finger3d.mechanics.small_strain.variations import variation
 from finger3d.objects import Plane
 from tests.models import fig9
 
