@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from finger3d.accuracy.advice import advise, largest_principal_strain
 from finger3d.accuracy.changes import Change, ChangeEstimate
 from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.report.press import press_page
 from tests.models import half_cylinder
 from tests.scenes import HALF_CYLINDER, changed, words, written
@@ -27,14 +29,14 @@ DEEP = changed(HALF_CYLINDER, depth_mm=1.0, size_mm=0.2)
 
 def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
     changes = {
-        "normal_force_N": Change(10.0, 1.9, 0.2, significant=True),
-        "friction_sum_N": Change(4.0, 1.0, 0.9, significant=False),
-        "gauge_a": Change(-0.02, 0.0058, 0.0004, significant=True),  # its magnitude falls
-        "gauge_b": Change(0.001, 0.01, 0.001, significant=True),
-        "gauge_c": Change(0.01, 0.001, 0.0001, significant=True),
-        "gauge_d": Change(0.01, 0.002, 0.0001, significant=True),
+        "normal_force_N": Change(10.0, 1.9, 0.2, 0.1, significant=True),
+        "friction_sum_N": Change(4.0, 1.0, 0.9, 0.1, significant=False),
+        "gauge_a": Change(-0.02, 0.0058, 0.0004, 0.1, significant=True),  # its magnitude falls
+        "gauge_b": Change(0.001, 0.01, 0.001, 0.1, significant=True),
+        "gauge_c": Change(0.01, 0.001, 0.0001, 0.1, significant=True),
+        "gauge_d": Change(0.01, 0.002, 0.0001, 0.1, significant=True),
     }
-    model = half_cylinder(COARSE)
+    model = replace(half_cylinder(COARSE), gauges=tuple(Gauge(name, 1.0, 4.0) for name in "abcd"))
     large = advise(model, 0.2, ChangeEstimate(changes=changes))[0]
     told = [
         "+19 % (+17 to +21 %)", "gauge_b by +0.01 (+0.009 to +0.011)", "gauge_a by -29 % (-31 to -27 %)",
@@ -46,7 +48,7 @@ def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
 
 
 def test_without_a_known_change_no_number_is_told() -> None:
-    model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, significant=False)}
+    model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, 0.1, significant=False)}
     for estimate in (None, ChangeEstimate(method="no estimate: why"), ChangeEstimate(changes=unknown)):
         line, *_ = advise(model, 0.2, estimate)
         assert "0.2" in line

@@ -8,8 +8,7 @@ import pytest
 
 import finger3d
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.refine import relative_error
-from finger3d.accuracy.richardson import kinds_of
+from finger3d.accuracy.richardson import kinds_of, relative_error
 from finger3d.analyses.cost import ERRORS, Forecasts, _scaled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
@@ -76,5 +75,5 @@ def test_edges_of_all_meshes_are_in_proportion() -> None:
 
 
 def test_numbers_and_meshes_that_have_no_forecast_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(Finger3dError, match="of = 'force': no number of this press; must be one of normal_force_N, "):
+    with pytest.raises(Finger3dError, match='of = "force": no number of this press; must be one of normal_force_N, '):
         finger3d.cost(scene(**BASE), of=["force"])

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import finger3d
+from finger3d.accuracy.model_error import CoarsePresses
 from finger3d.analyses.effects_by_need import judge
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse
 from tests.scenes import HALF_CYLINDER, changed
@@ -86,3 +88,14 @@ def test_other_commands_ask_for_the_scene_that_a_press_writes() -> None:
 def test_mistakes_are_refused_in_one_line(effects: Any, why: str) -> None:
     with pytest.raises(Finger3dError, match=why):
         parse({**scene().given, "effects": effects})
+
+
+def test_a_press_too_shallow_for_coarser_meshes_is_judged_on_its_own() -> None:
+    """Large deformation does not matter at 0.4 % of the height."""
+    text = changed(HALF_CYLINDER, depth_mm=0.02, size_mm=0.3)
+    plain = parse(tomllib.loads(text)).model()
+    with pytest.raises(UnresolvedError):
+        CoarsePresses(plain, 2.0).numbers({})
+    found = judge(parse(tomllib.loads(text) | {"effects": {"auto": True}}), QUIET)
+    assert found.used == ()
+    assert abs(found.judged["large_deformation"].change) < 0.02

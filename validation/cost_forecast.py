@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.refine import relative_error
-from finger3d.accuracy.richardson import kinds_of
+from finger3d.accuracy.richardson import kinds_of, relative_error
 from finger3d.analyses.cost import CostRow, Forecasts
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.effects.large_deformation import Effect as LargeDeformation

@@ -7,6 +7,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings.columns import of_kind
 
 _LARGE_STRAIN = 0.1
 """Principal strain from which large deformation is advised without an estimate."""
@@ -34,7 +35,7 @@ def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> 
     """
     out = []
     if not model.finite_strain:
-        if large and (said := _changes(large.significant)):
+        if large and (said := _changes(large.significant, {c.key for c in of_kind(model.columns, "gauge")})):
             out.append(f"large deformation would change {said}: switch on [effects.large_deformation]")
         elif strain >= _LARGE_STRAIN:
             out.append(
@@ -44,13 +45,13 @@ def advise(model: Model, strain: float, large: ChangeEstimate | None = None) -> 
     return out + _width(model)
 
 
-def _changes(changes: dict[str, Change]) -> str:
+def _changes(changes: dict[str, Change], gauges: set[str]) -> str:
     """Return forces and the gauges that change most, each with its change and the interval of the change."""
     forces = [name for name in changes if name in _NAMES]
-    gauges = sorted((name for name in changes if name.startswith("gauge_")), key=lambda n: -abs(changes[n].change))
-    if not (forces or gauges):
+    strains = sorted(gauges & set(changes), key=lambda name: -abs(changes[name].change))
+    if not (forces or strains):
         return ""
-    said = [f"{_NAMES.get(name, name)} by {_change(changes[name])}" for name in forces + gauges[:_MOST_GAUGES]]
+    said = [f"{_NAMES.get(name, name)} by {_change(changes[name])}" for name in forces + strains[:_MOST_GAUGES]]
     return " and ".join(part for part in (", ".join(said[:-1]), said[-1]) if part)
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Tree
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.cost import forecast, without_output_s
+from finger3d.accuracy.richardson import Kind, relative_error
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -19,14 +20,11 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
 from finger3d.mechanics.results.history import StepResult, measure
 
-_OWN = ("depth_mm", *MAIN, *AREAS)
-"""Numbers whose changes are estimated beside readings."""
-
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
 
 _LEAST_CHANGE = 0.01
-"""Least significant change, see `scales`."""
+"""Least significant relative change, see `finger3d.accuracy.richardson.relative_error`."""
 
 _FACTORS = (2.0, 2.83, 4.0)
 """Edge lengths of a coarse mesh over those of the press; the first that is cheap enough is taken."""
@@ -41,12 +39,14 @@ class Change:
     value : the number in the press
     change : what is to be added to it, in the same unit
     error : half-width of the interval of `change`
+    relative : change over the scale that errors of such a number are relative to
     significant : whether the interval is narrow and the change large enough to be reported
     """
 
     value: float
     change: float
     error: float
+    relative: float
     significant: bool
 
     @property
@@ -98,8 +98,7 @@ def affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> floa
         If all coarse presses cost more.
     """
     for factor in _FACTORS:
-        cost = forecast(coarse(factor))
-        if cost["total_s"] - cost["start_s"] - cost["output_s"] <= budget_s:
+        if without_output_s(forecast(coarse(factor))) <= budget_s:
             return factor
     raise Finger3dError(f"it would take more than {budget_s:.2g} s")
 
@@ -136,33 +135,24 @@ def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
-def scales(values: Mapping[str, float]) -> dict[str, float]:
-    """Return what a change of each number is relative to: to itself, a length to that of contact, a reading to the
-    largest of its kind, and an area of stick that is zero to that of contact.
-    """
-    kind = {name: name.split("_")[0] for name in values if name not in _OWN}
-    largest = {k: max(abs(values[name]) for name in kind if kind[name] == k) for k in set(kind.values())}
-    found = {name: largest[kind[name]] if name in kind else abs(x) for name, x in values.items()}
-    for name, other in (("stick_half_length_mm", "contact_half_length_mm"), ("stick_area_mm2", "contact_area_mm2")):
-        if name in values and (name.endswith("mm") or not found[name]):
-            found[name] = abs(values[other])
-    return found
-
-
-def judged(values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, Change]:
+def judged(
+    values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float], kinds: Mapping[str, Kind]
+) -> dict[str, Change]:
     """Return the changes by name that are finite; those known within a factor of 1.5 and large are significant.
 
     Parameters
     ----------
     values : numbers of the press by name, as `changing_numbers` returns them
     changes, errors : estimated change of each, and half-width of its interval
+    kinds : of the numbers
     """
-    out, scale = {}, scales(values)
+    out = {}
     for name, value in values.items():
         change, error = changes[name], errors[name]
         if all(map(math.isfinite, (value, change, error))):
-            significant = error <= _SURE * abs(change) and abs(change) >= _LEAST_CHANGE * scale[name] > 0.0
-            out[name] = Change(value, change, error, significant)
+            relative = relative_error(values, kinds, name, change)
+            significant = error <= _SURE * abs(change) and _LEAST_CHANGE <= abs(relative) < math.inf
+            out[name] = Change(value, change, error, relative, significant)
     return out
 
 

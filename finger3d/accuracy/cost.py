@@ -125,6 +125,11 @@ def forecast(model: Model) -> Tree:
     }
 
 
+def without_output_s(expected: Tree) -> float:
+    """Return the seconds of a forecast without those to start and to draw."""
+    return float(expected["total_s"] - expected["start_s"] - expected["output_s"])
+
+
 def _runs(model: Model, size: PressSize) -> list[int]:
     """Increments of an automatic leg in every run that chooses them; the last is reported."""
     if not automatic(model):

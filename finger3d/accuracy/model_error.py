@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
 from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
+from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
@@ -29,9 +30,6 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
-
-_COARSER_STILL = 2.0
-"""Edge lengths of the coarser of both meshes over those of the other."""
 
 _STEPS = (5, 3)
 """Increments in each leg, on the coarse mesh and on the one that is coarser still."""
@@ -51,10 +49,12 @@ class CoarsePresses:
     ----------
     model : without them
     factor : edge lengths of the finer of both meshes over those of the model
+    still : edge lengths of the coarser of both over those of the other; 1: the same mesh, in fewer increments
     """
 
     model: Model
     factor: float
+    still: float = 2.0
     _known: dict[tuple[str, ...], tuple[dict[str, float], dict[str, float]]] = field(default_factory=dict)
 
     def numbers(self, effects: Mapping[str, Enriched]) -> tuple[dict[str, float], dict[str, float]]:
@@ -68,8 +68,8 @@ class CoarsePresses:
         key = tuple(sorted(effects))
         if key not in self._known:
             fine, finer = self._pressed(self.factor, _STEPS[0], effects)
-            coarse, coarser_still = self._pressed(_COARSER_STILL * self.factor, _STEPS[1], effects)
-            if edge_ratio(finer, coarser_still) < LEAST_RATIO:
+            coarse, coarser_still = self._pressed(self.still * self.factor, _STEPS[1], effects)
+            if self.still > 1.0 and edge_ratio(finer, coarser_still) < LEAST_RATIO:
                 raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
             self._known[key] = fine, coarse
         return self._known[key]
@@ -108,9 +108,9 @@ class CoarsePresses:
         }
         mesh = coarser(self.model, self.factor).mesh
         return ChangeEstimate(
-            changes=judged({name: values[name] for name in names}, change, errors),
+            changes=judged({name: values[name] for name in names}, change, errors, kinds_of(self.model.columns)),
             method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in "
-            f"{_STEPS[0]} increments a leg; error: with {_COARSER_STILL:g} times these edges in {_STEPS[1]} increments,"
+            f"{_STEPS[0]} increments a leg; error: with {self.still:g} times these edges in {_STEPS[1]} increments,"
             " and from how far the coarse press without it is from the press",
         )
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from finger3d._cost import BASE_MB, FIGURES_S, START_S, PressSize, meshing_s, rows_gb
+from finger3d.accuracy.richardson import ORDER
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.meshing.limits import check_memory
-
-ORDER = 1.1
-"""Usual order at which error bars fall with the edge length; bodies have bonded corners."""
 
 _FACTOR = (1.0 / 3.0) ** (1.0 / ORDER)
 

@@ -21,7 +21,7 @@ from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_border
 from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
-from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, largest_readings
+from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, relative_error
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -45,13 +45,6 @@ _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
 _AT_STICK = (1.5, 4.0)  # a round makes edges at the border of stick at least and at most so much shorter, by halving
-
-_IF_ZERO = {
-    Kind.AREA: "contact_area_mm2",
-    Kind.FRICTION_SUM: "normal_force_N",
-    Kind.DISSIPATION: "external_work_mJ",
-}
-_ROUND_OFF = 1e-9  # of the number in its place, below which a number is zero
 
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
 
@@ -208,27 +201,6 @@ def refine_mesh(
     stopped = "met" if best.error <= tolerance else stopped
     kept = meshes[rounds.index(best)]
     return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
-
-
-def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
-    """Return the relative error of a number.
-
-    That of a reading is relative to the largest of its kind, of a length to that of contact, of a component of the
-    force to the normal force, and of a moment to the normal force at the end of contact at least, since those vanish in
-    symmetric presses.  Where nothing sticks or slips, areas, friction and dissipation are relative to the area of
-    contact, the normal force and the work.
-    """
-    kind, force = kinds[name], abs(numbers["normal_force_N"])
-    scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
-    if kind.is_length:
-        scale = numbers["contact_half_length_mm"]
-    elif kind is Kind.FORCE:
-        scale = force
-    elif kind is Kind.MOMENT:
-        scale = max(scale, force * numbers["contact_half_length_mm"])
-    elif kind in _IF_ZERO and scale <= _ROUND_OFF * abs(numbers[_IF_ZERO[kind]]):
-        scale = abs(numbers[_IF_ZERO[kind]])
-    return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
 
 
 def _relative_errors(

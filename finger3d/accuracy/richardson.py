@@ -94,6 +94,14 @@ _READINGS = {
 }
 
 
+_IF_ZERO = {
+    Kind.AREA: "contact_area_mm2",
+    Kind.FRICTION_SUM: "normal_force_N",
+    Kind.DISSIPATION: "external_work_mJ",
+}
+_ROUND_OFF = 1e-9  # of the number in its place, below which a number is zero
+
+
 def kinds_of(readings: Iterable[Column]) -> dict[str, Kind]:
     """Return the kinds of all numbers of a press or a comparison by name, those of readings included."""
     return _KINDS | {column.key: _READINGS.get(column.kind, Kind.OTHER_READING) for column in readings}
@@ -107,6 +115,27 @@ def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind)
 def largest_readings(numbers: Mapping[str, float], kinds: Mapping[str, Kind]) -> dict[Kind, float]:
     """Return the largest magnitude of every kind of reading, to which errors of readings are relative."""
     return {kind: largest(numbers, kinds, kind) for kind in (*_READINGS.values(), Kind.OTHER_READING)}
+
+
+def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
+    """Return the relative error of a number.
+
+    That of a reading is relative to the largest of its kind, of a length to that of contact, of a component of the
+    force to the normal force, and of a moment to the normal force at the end of contact at least, since those vanish in
+    symmetric presses.  Where nothing sticks or slips, areas, friction and dissipation are relative to the area of
+    contact, the normal force and the work.
+    """
+    kind, force = kinds[name], abs(numbers["normal_force_N"])
+    scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
+    if kind.is_length:
+        scale = numbers["contact_half_length_mm"]
+    elif kind is Kind.FORCE:
+        scale = force
+    elif kind is Kind.MOMENT:
+        scale = max(scale, force * numbers["contact_half_length_mm"])
+    elif kind in _IF_ZERO and scale <= _ROUND_OFF * abs(numbers[_IF_ZERO[kind]]):
+        scale = abs(numbers[_IF_ZERO[kind]])
+    return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
 
 
 def gain(ratio: float, order: float = ORDER) -> float:

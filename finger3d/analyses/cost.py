@@ -18,11 +18,10 @@ from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.companions import coarser
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.price import ORDER
-from finger3d.accuracy.refine import ALL, relative_error
-from finger3d.accuracy.richardson import kinds_of
+from finger3d.accuracy.refine import ALL
+from finger3d.accuracy.richardson import ORDER, kinds_of, relative_error
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
@@ -31,7 +30,6 @@ from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Source, scene_of
-from finger3d.scene.checks import headline_numbers
 
 ERRORS = (0.1, 0.03, 0.01, 0.003)
 """Relative errors that `cost` forecasts a press for."""
@@ -181,9 +179,7 @@ def cost(
     model = scene.model()
     if isinstance(model.design, GivenMesh):
         raise Finger3dError("cost: the mesh of this finger is given; it has no edge lengths to choose")
-    names = [*headline_numbers(scene.tables, scene.domain == "solid", model.ends_at_force), ALL]
-    if unknown := [name for name in of if name not in names]:
-        raise Finger3dError(f"of = {unknown[0]!r}: no number of this press; must be one of {', '.join(names)}")
+    scene.check_numbers(of, ALL)
     goals = tuple(of) or ((scene.tables.mesh.goal,) if scene.tables.mesh.goal else ())
     forecasts = Forecasts.of(model, report)
     chosen = forecasts.numbers(goals)
@@ -356,7 +352,7 @@ class Forecasts:
 
 def _solving(expected: Tree) -> float:
     """Return the forecast seconds of a press without start, mesh and output."""
-    return float(expected["total_s"] - sum(expected[f"{stage}_s"] for stage in ("start", "mesh", "output")))
+    return without_output_s(expected) - float(expected["mesh_s"])
 
 
 def _through(coarse: _Pilot, fine: _Pilot, name: str) -> tuple[float, float]:

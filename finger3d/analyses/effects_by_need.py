@@ -14,11 +14,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Tree
-from finger3d.accuracy.changes import Change, ChangeEstimate, scales, two_digits
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
+from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
 from finger3d.effects import effect_names
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.model import Model
 from finger3d.progress import Progress
 from finger3d.scene import Scene
@@ -127,9 +127,8 @@ def judge(scene: Scene, report: Progress) -> Need:
     on: dict[str, Enriched] = {
         name: (effect or scene.with_effects([name]).effects[name]).apply for name, effect in settings.items()
     }
-    presses = CoarsePresses(plain, _factor(plain))
     report.stage("judging which effects the scene calls for")
-    presses.numbers({})
+    presses = _presses(plain)
     used = dict[str, Enriched]()
     judged, failed = dict[str, Judged](), dict[str, str]()
     for effects in (sorted(on), None):  # alone, and then what is left out beside the others
@@ -164,20 +163,20 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
     }
 
 
-def _factor(model: Model) -> float:
-    """Return the edge lengths of the coarse presses over those of the scene."""
-    expected = forecast(model)
-    return cheap_factor(model, expected["total_s"] - expected["start_s"] - expected["output_s"])
+def _presses(model: Model) -> CoarsePresses:
+    """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it."""
+    presses = CoarsePresses(model, cheap_factor(model, without_output_s(forecast(model))))
+    try:
+        presses.numbers({})
+    except UnresolvedError:
+        presses = CoarsePresses(model, 1.0, 1.0)
+        presses.numbers({})
+    return presses
 
 
 def _largest(changes: Mapping[str, Change]) -> tuple[str, float]:
     """Return the number that changes most relative to its scale, of those whose change has a sign, and its change."""
-    scale = scales({name: change.value for name, change in changes.items()})
-    known = {
-        name: change.change / scale[name]
-        for name, change in changes.items()
-        if abs(change.change) > change.error and scale[name] > 0.0
-    }
+    known = {name: change.relative for name, change in changes.items() if abs(change.change) > change.error}
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
 

@@ -19,7 +19,6 @@ from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.variations import Variation, variation
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
-from finger3d.scene.checks import headline_numbers
 
 _KEYS = re.compile(
     r"friction\.mu|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm)"
@@ -114,9 +113,7 @@ def sensitivity(
     """
     scene = scene_of(scene, overrides)
     model = scene.model()
-    names = headline_numbers(scene.tables, scene.domain == "solid", model.ends_at_force)
-    if unknown := [name for name in of if name not in names]:
-        raise Finger3dError(f"of = {unknown[0]!r}: no number of this press; must be one of {', '.join(names)}")
+    names = scene.check_numbers(of)
     if text := refusal(model):
         raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")

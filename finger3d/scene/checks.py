@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -63,9 +64,12 @@ def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[s
     if tables.mesh.tolerance is None:
         return [f"mesh.goal = {shown(goal)}: only with mesh.tolerance, for which the mesh is refined"]
     names = [*headline_numbers(tables, solid, legs[-1].force_N is not None), "all"]
-    if goal in names:
-        return []
-    return [f"mesh.goal = {shown(goal)}: no number of this press; must be one of {', '.join(names)}"]
+    return [] if goal in names else [no_such_number("mesh.goal", goal, names)]
+
+
+def no_such_number(key: str, value: str, names: Iterable[str]) -> str:
+    """Return a line about a number that a press has not."""
+    return f"{key} = {shown(value)}: no number of this press; must be one of {', '.join(names)}"
 
 
 def headline_numbers(tables: SceneTable, solid: bool, under_force: bool) -> list[str]:

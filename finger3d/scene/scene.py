@@ -102,6 +102,20 @@ class Scene:
         """Elastic constants of the finger, with the spread and the origin of Young's modulus."""
         return self.tables.material.constants
 
+    def check_numbers(self, of: Iterable[str], *others: str) -> tuple[str, ...]:
+        """Return the names of the numbers of its press that have error bars.
+
+        Raises
+        ------
+        Finger3dError
+            If one of those asked for is neither among them nor among `others`.
+        """
+        under_force = self.legs[-1].force_N is not None
+        names = checks.headline_numbers(self.tables, self.domain == "solid", under_force)
+        if unknown := [name for name in of if name not in (*names, *others)]:
+            raise Finger3dError(checks.no_such_number("of", unknown[0], (*names, *others)))
+        return tuple(names)
+
     def with_mesh(self, mesh: MeshOptions) -> Scene:
         """Return the scene with edge lengths in place of a tolerance.
 

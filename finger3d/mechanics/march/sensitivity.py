@@ -34,15 +34,13 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.force_control import deepest
 from finger3d.mechanics.march.path import stations
-from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.march.solve import Press
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.elastic import SmallStrain, linear_loads
-from finger3d.mechanics.small_strain.exact_path import ExactPath, NormalForce, has_exact_path, solve_path
+from finger3d.mechanics.small_strain.elastic import linear_loads
+from finger3d.mechanics.small_strain.exact_path import ExactPath, has_exact_path
 from finger3d.mechanics.small_strain.variations import Variation
 from finger3d.objects import Move, ObjectPose, vertical_frame
 
@@ -84,34 +82,23 @@ def derivatives(problem: Problem, variations: Sequence[Variation]) -> tuple[list
     """
     if text := refusal(problem.model):
         raise Finger3dError(text)
-    steps = list(march(problem))
-    if not steps[-1].outcome.ok:
-        raise Finger3dError(f"at depth {steps[-1].target.depth_mm:.4g} mm: {steps[-1].outcome}")
-    state, pose, rest, count = SmallStrain().start(problem), problem.origin, iter(steps), len(variations)
-    zero = np.zeros((count, *state.contact.force.shape))
+    press, steps, count = Press(problem), list[StepResult](), len(variations)
+    zero = np.zeros((count, *press.state.contact.force.shape))
     tangent, motion = _Tangent(zero, zero, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, rows = np.zeros((2, count)), list[list[Numbers]]()
-    for number, leg in enumerate(problem.model.legs):
-        follower = _PathTangents(
-            _path(problem, state, Move(pose, leg.end(pose)), leg), variations, tangent, motion, number
-        )
-        for station in stations((leg,)):
-            step = next(rest)
-            tangent, change = follower.at_share(station.share)
-            motion, total = follower.motion(tangent, station.share), energies + change
-            rows.append([_of_numbers(step, v, tangent, k, motion[k], total[:, k]) for k, v in enumerate(variations)])
-        state, pose, energies = step.meshed_state, step.target, total
-        tangent = replace(tangent, amplitude=np.zeros(count))
+    number, follower = 0, None
+    for station in stations(problem.model.legs):
+        steps.append(step := press.advance(station))
+        if press.has_failed or press.path is None:
+            raise Finger3dError(f"at depth {step.target.depth_mm:.4g} mm: {step.outcome}")
+        follower = follower or _PathTangents(press.path, variations, tangent, motion, number)
+        tangent, change = follower.at_share(station.share)
+        motion, total = follower.motion(tangent, station.share), energies + change
+        rows.append([_of_numbers(step, v, tangent, k, motion[k], total[:, k]) for k, v in enumerate(variations)])
+        if station.share == 1.0:
+            number, follower, energies = number + 1, None, total
+            tangent = replace(tangent, amplitude=np.zeros(count))
     return steps, rows
-
-
-def _path(problem: Problem, start: State[Float], move: Move, leg: Leg) -> ExactPath:
-    """Return the path of a leg from a state."""
-    if leg.force_N is None:
-        return solve_path(problem, start, move)
-    force = -float(problem.world_force(start.contact)[:, 1].sum())
-    most = deepest(problem.model.object, problem.system.first_contact_mm, problem.model.design.height_mm)
-    return solve_path(problem, start, move, NormalForce(force, leg.force_N, most))
 
 
 @dataclass(frozen=True)

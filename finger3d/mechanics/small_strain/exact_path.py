@@ -84,8 +84,7 @@ class ExactPath:
         begin, passed = self.at(first)
         if last > (self.events[-1].share if self.events else -1.0):
             state = self._state(begin.state)
-            unsolved = self.events[-1].residual if self.outcome.ok else np.inf
-            solution = ContactSolution(state, self.outcome, unsolved, 0, "none", self.detail)
+            solution = ContactSolution(state, self.outcome, np.inf, 0, "none", self.detail)
             return PathPoint(solution, self._pose(begin), (0.0, 0.0))
         end, done = self.at(last)
         way = [begin, *self.events[passed:done], end]
