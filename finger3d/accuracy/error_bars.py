@@ -97,5 +97,5 @@ def with_error(value: float, error: float | None = None, digits: int = 5, sign: 
         power = math.floor(math.log10(max(abs(value), error)))
         scale = 10.0**power
         return f"({with_error(value / scale, error / scale, digits, sign)}) 1e{power}"
-    value, error = round(value, places), round(error, places)
+    value, error = round(value, places) + 0.0, round(error, places)  # no negative zero
     return f"{value:.{max(places, 0)}f} {sign} {error:.{max(places, 0)}f}"

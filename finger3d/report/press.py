@@ -214,12 +214,18 @@ def _slip_limit(limit: TreeView) -> PageSection:
         "moment_y_Nmm": "moment of friction about the press axis (N mm)",
     }
     rows = [(text, limit[key]) for key, text in names.items() if limit[key] is not None]
+    used = f"{round(100.0 * limit['used'], 6):.3g} % of the friction available is used."
     said = (
-        "The largest net friction along x and along z, and the largest moment about the press axis through the centre "
-        "of pressure, each alone, that the last contact transmits before it slips as a whole: every point at its "
-        "friction limit, with its normal force as it is. Together they bound an ellipsoid (Howe and Cutkosky 1996), on "
-        f"which {100.0 * limit['used']:.3g} % of the friction available is used."
+        "What the last contact transmits at most before it slips as a whole: every point at its friction limit, with "
+        "its normal force as it is. "
     )
+    if limit["moment_y_Nmm"] is None:
+        said += used[0].upper() + used[1:]
+    else:
+        said += (
+            "The moment is about the press axis through the centre of pressure. Each value is that of the resultant "
+            f"alone; together they bound an ellipsoid (Howe and Cutkosky 1996), by which {used}"
+        )
     return PageSection("How near to slipping", [said, Table(("resultant", "largest"), rows)])
 
 
