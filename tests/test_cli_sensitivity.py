@@ -33,7 +33,7 @@ def test_the_command_writes_table_json_and_figure(tmp_path: Path, capsys: pytest
     ("of", "key", "text"),
     [
         ("gauge_g3", "friction.mu=0.4", "must be one of normal_force_N, friction_sum_N"),
-        ("gauge_g36", "model.domain=solid", "derivatives need an exact path: a section"),
+        ("gauge_g36", "effects.large_deformation.law=neo-hookean", "derivatives need linear elasticity"),
     ],
 )
 def test_bad_input_is_one_line(of: str, key: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -24,25 +24,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg import lu_factor, lu_solve
 
 from finger3d._types import Float
-from finger3d.contact.acceleration import assemble_in_place
-from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
-from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
-from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, block_diagonal, upright
 from finger3d.objects import Move, vertical_frame
 
 _ROUND_OFF = 1e-12
@@ -73,62 +68,6 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class LinearisedIncrement:
-    """Equations of the active set of one increment, in the directions of an upright object (c d contact directions).
-
-    Attributes
-    ----------
-    forces : (c d, k) sparse, P
-    weights : (k, c d) sparse, D
-    factor : LU factors of A
-    """
-
-    forces: Any
-    weights: Any
-    factor: tuple[Float, Float]
-
-    @classmethod
-    def of(cls, problem: Problem, before: ContactState, after: ContactState) -> LinearisedIncrement:
-        """Linearise the increment between two states."""
-        c, d = after.force.shape
-        rotations = after.own_bases @ vertical_frame(d).T
-        turn = _block_diagonal(rotations)
-        rho = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
-        slip = after.tangential_displacement - transported(before, after.own_bases).tangential_displacement
-        normal, friction = after.force[:, 0], np.linalg.norm(after.force[:, 1:], axis=1)
-        slips = after.status == SLIP
-        mu = np.divide(friction, normal, out=np.zeros(c), where=slips & (normal > 0.0))
-        moved = np.concatenate([after.gap[:, None], slip], axis=1)
-        augmented = after.force - rho * np.where(slips[:, None], moved, 0.0)
-        if (rotations == np.eye(d)).all():
-            points, delassus = np.arange(c), problem.delassus
-        else:
-            points = np.flatnonzero(after.status != OPEN)
-            delassus = rotated_delassus(problem.delassus, rotations[points], points)
-        k = len(points)
-        local = ContactProblem(
-            previous=before.of_points(points),
-            free_motion=moved[points],
-            delassus=delassus.reshape(k * d, k * d),
-            law=problem.model.contact_law,
-            length_scale=1.0,
-            friction=mu[points],
-            augmentation=rho[points],
-        )
-        active = ActiveSet.of(local, after.status[points], augmented[points])
-        matrix = cast("Float", assemble_in_place(local, active, np.float64))
-        factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)
-        turned = turn[(points[:, None] * d + np.arange(d)).ravel()]
-        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, factor)
-
-    def adjoint(self, gradient: Float) -> Float:
-        """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""
-        if not self.weights.shape[0]:
-            return np.zeros_like(gradient)
-        return np.asarray(self.weights.T @ lu_solve(self.factor, self.forces.T @ gradient, trans=1))
-
-
-@dataclass(frozen=True)
 class SlipReference:
     """Where slip in an increment is counted from, as a function of the displacements before it.
 
@@ -149,7 +88,7 @@ class SlipReference:
         end, bases = (state.contact.own_bases @ vertical_frame(d).T for state in (part.after, part.before))
         along = np.einsum("ctk,ctl->ckl", end[:, 1:], end[:, 1:])
         if part.before.last is None or problem.model.is_defined_by_increments:
-            return cls(_block_diagonal(along), _block_diagonal(np.zeros_like(along)))
+            return cls(block_diagonal(along), block_diagonal(np.zeros_like(along)))
         share, motion = part.before.share_until_touch(part.move), part.before.last[1]
         slope = np.zeros_like(motion[:, 1:])
         touches = (
@@ -160,7 +99,7 @@ class SlipReference:
         slope[touches] = motion[touches, 1:] / -motion[touches, :1]
         normal = np.einsum("ct,ctk,cl->ckl", slope, bases[:, 1:], bases[:, 0])
         moved = share[:, None, None] * (np.einsum("ctk,ctl->ckl", bases[:, 1:], bases[:, 1:]) + normal)
-        return cls(_block_diagonal(along @ (np.eye(d) + normal + moved)), _block_diagonal(-along @ moved))
+        return cls(block_diagonal(along @ (np.eye(d) + normal + moved)), block_diagonal(-along @ moved))
 
 
 def adjoint_loads(problem: Problem, steps: Sequence[StepResult], goals: Sequence[Goal]) -> Float:
@@ -205,7 +144,7 @@ def press_goals(problem: Problem, steps: Sequence[StepResult]) -> list[Goal]:
     shear[:, 1:] = last.force[:, 1:] * (count / np.where(friction > 0.0, friction, 1.0))[:, None]
     found = [
         Goal(name="normal_force_N", by_force=_at_end(zero, vertical), by_displacement=zero),
-        Goal(name="friction_sum_N", by_force=_at_end(zero, _upright(last, shear)), by_displacement=zero),
+        Goal(name="friction_sum_N", by_force=_at_end(zero, upright(last, shear)), by_displacement=zero),
         _work(problem, parts, count, zero),
         _dissipation(problem, parts, count, zero),
     ]
@@ -239,7 +178,7 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
             local[:, 0] = 0.0
         own = np.zeros((c, d))
         np.add.at(own, problem.symmetry.image_of, local)
-        return _upright(last, own)
+        return upright(last, own)
 
     found = {}
     for k, axis in enumerate("xyz"[:d]):
@@ -273,12 +212,6 @@ def _parts(problem: Problem, steps: Sequence[StepResult]) -> list[_Part]:
     return [_Part(before, after, Move(start, end)) for (start, before), (end, after) in pairwise(ends)]
 
 
-def _upright(state: ContactState, local: Float) -> Float:
-    """Return vectors (c, d) in the directions of an upright object."""
-    d = local.shape[1]
-    return np.asarray(np.einsum("ca,cak->ck", local, state.own_bases) @ vertical_frame(d).T)
-
-
 def _at_end(zero: Float, gradient: Float) -> Float:
     """Return gradients (N, c d) that are zero but in the last increment."""
     out = zero.copy()
@@ -305,8 +238,8 @@ def _work(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -
         slip, friction = np.zeros((c, d)), np.zeros((c, d))
         slip[:, 1:] = after.tangential_displacement - start.tangential_displacement
         friction[:, 1:] = (0.5 * (start.force + after.force))[:, 1:]
-        half_slip = 0.5 * _upright(after, count[:, None] * slip).ravel()
-        along = _upright(after, count[:, None] * friction).ravel()
+        half_slip = 0.5 * upright(after, count[:, None] * slip).ravel()
+        along = upright(after, count[:, None] * friction).ravel()
         by_force[k] -= half_slip
         if k:
             by_force[k - 1] -= half_slip
@@ -333,15 +266,9 @@ def _dissipation(problem: Problem, parts: Sequence[_Part], count: Float, zero: F
         along = np.zeros_like(after.force)
         share = 0.5 * count * (start.force[:, 0] + after.force[:, 0]) / end
         along[:, 1:] = np.where(slips[:, None], -after.force[:, 1:] * share[:, None], 0.0)
-        normal, along = _upright(after, normal).ravel(), _upright(after, along).ravel()
+        normal, along = upright(after, normal).ravel(), upright(after, along).ravel()
         by_force[k] += normal
         if k:
             by_force[k - 1] += normal
         _add_slip(by_displacement, k, along, SlipReference.of(problem, part))
     return Goal(name="dissipation_mJ", by_force=by_force, by_displacement=by_displacement)
-
-
-def _block_diagonal(blocks: Float) -> Any:
-    """Return the sparse matrix (c d, c d) of blocks (c, d, d)."""
-    c = len(blocks)
-    return sp.bsr_array((blocks, np.arange(c), np.arange(c + 1))).tocsr()

@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.free_keys import scene_with
-from finger3d.analyses.pressed_body import PressedBody
+from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal
+from finger3d.mechanics.march.path import stations
+from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, tangents
+from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.variations import Variation, variation
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 
 _KEYS = re.compile(
-    r"friction\.mu|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm)"
-    r"|gauge\.\d+\.(x_mm|y_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm)"
+    r"friction\.mu|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm|slide_z_mm)"
+    r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
+    r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
 
-_STEP, _LEAST = 1e-5, 0.1
-"""Step of central differences of assembled matrices and of paths, over the value or over this if that is larger."""
+_STEP, _NU_STEP, _LEAST = 1e-6, 1e-5, 0.1
+"""Step of central differences over the value, or over `_LEAST` if that is larger; that of nu is larger, since the bulk
+modulus is bounded at nu = 0.5."""
 
 _PERCENT = 0.01
 """Relative change of a key without a tolerance that the figure shows the effect of."""
@@ -118,15 +123,19 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")
     body = PressedBody(model, report)
-    end = body.steps()[-1]
-    if not end.outcome.ok:
-        raise Finger3dError(f"sensitivity: at depth {end.target.depth_mm:.4g} mm: {end.outcome}")
+    if scene.mesh.stick_refinement > 1.0:
+        body.refine_borders()
+    pressed = body.steps()
+    if not pressed[-1].outcome.ok:
+        raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
     report.stage("differentiating")
-    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if _has_derivative(key, value, body.problem)}
-    variations = [varied(scene, body.problem, key) for key in keys]
-    steps, rows = derivatives(body.problem, variations)
-    values = table_row(body.problem.points, steps[-1])
-    found = _result(scene, keys, {name: values[name] for name in tuple(of) or names}, rows[-1])
+    problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
+    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if _has_derivative(key, value, problem)}
+    variations = [varied(scene, problem, key) for key in keys]
+    *_, (step, sides) = tangents(problem, variations)
+    values = table_row(problem.points, step)
+    numbers = {name: values[name] for name in tuple(of) or names}
+    found = _result(scene, keys, numbers, derivatives(step, variations, sides))
     if out is not None:
         _write(Path(out), found)
     return found
@@ -142,15 +151,16 @@ def varied(scene: Scene, problem: Problem, key: str) -> Variation:
     """
     given = scene.as_dict()
     value = float(str(tree.value_at(given, key)))
-    step = _STEP * max(abs(value), _LEAST)
+    step = (_NU_STEP if key.endswith(".nu") else _STEP) * max(abs(value), _LEAST)
+    count = len(stations(problem.model.legs))
     problems = []
     for low in (value - step, value, value - 2.0 * step):
         try:
-            first, last = (scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step))
+            models = [scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step)]
+            first, last = (replace(m, legs=with_increments_of(m.legs, count), mesh=problem.model.mesh) for m in models)
+            return variation(problem, first, last, step)
         except Finger3dError as error:
             problems.append(str(error))
-        else:
-            return variation(problem, first, last, step)
     raise Finger3dError(f"{key} = {value:g}: numbers have no derivative here: {problems[0]}")
 
 
@@ -165,8 +175,14 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
 
 
 def _has_derivative(key: str, value: float, problem: Problem) -> bool:
-    """Whether numbers have a derivative by a key; a slide of a mirrored press would break its symmetry."""
-    mirrored = key.endswith("slide_x_mm") and "x" in problem.axes
+    """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
+    flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
+    if problem.dim == 2 and key.endswith("z_mm"):
+        return False
+    if key.startswith("object.") and (has_exact_path(problem.model) or flat):
+        return False
+    moved = {"slide_x_mm": "x", "slide_z_mm": "z", "object.x_mm": "x", "object.z_mm": "z", "tilt_deg": "x"}
+    mirrored = any(key.endswith(name) and axis in problem.axes for name, axis in moved.items())
     return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)
 
 

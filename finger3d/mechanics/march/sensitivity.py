@@ -1,54 +1,35 @@
-r"""Derivatives of the numbers of a press by its parameters, from the equations of the active sets along the exact path.
+"""Derivatives of the numbers of a press by its parameters, in small strain.
 
-Between two events the forces r and the relative displacements ``w = W r + q`` solve linear equations; s is the share of
-the path, and d' the derivative by a parameter p at fixed s::
-
-    open    dr = 0
-    stick   dw_n = 0,  dw_t = dw_t*
-    slip    dw_n = 0,  dr_t = sigma (mu dr_n + dmu r_n)        with  dw = W dr + dW r + dq
-
-w_t* is the tangential displacement where the point began to stick.  At an event a margin m (a gap, a normal force, or
-mu r_n - |r_t|) vanishes, so that the event moves by ``ds = -dm / (dm/ds)``, and what it leaves behind changes by
-``dw_t* = dw_t + (dw_t/ds) ds``.  Under a prescribed force the depth is one more unknown of the equations.
-
-The body enters by its compliance ``C = L K^-1 L^T``, condensed to the rows L of contact points and readings::
-
-    dC = -F^T dK F + dL F + F^T dL^T,   F = K^-1 L^T
-
-where dK and dL are central differences of assembled matrices.
+Along an exact path they are those of its events (`finger3d.mechanics.small_strain.path_tangents`), else those of its
+increments (`finger3d.mechanics.small_strain.increment_tangents`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
 
-from finger3d._types import Float
 from finger3d.contact.events import Event
-from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
-from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import stations
+from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.elastic import linear_loads
-from finger3d.mechanics.small_strain.exact_path import ExactPath, has_exact_path
-from finger3d.mechanics.small_strain.variations import Variation
-from finger3d.objects import Move, ObjectPose, vertical_frame
-
-_SAME_PLACE = 1e-12
-"""Difference of shares of the path below which two events are at the same place."""
-
-_JUMP = 1e-8
-"""Share of the path below which forces that change by more than this, over the largest, jump."""
+from finger3d.mechanics.small_strain.exact_path import has_exact_path
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
+from finger3d.mechanics.small_strain.path_tangents import (
+    PathTangent,
+    PathTangents,
+    compliance_changes,
+    moved_pose,
+)
+from finger3d.mechanics.small_strain.variations import Side, Variation
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
 """Numbers of an increment that have no derivative."""
@@ -59,279 +40,109 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if not has_exact_path(model):
-        return (
-            "derivatives need an exact path: a section (model.domain), in small strain, under a plane that never turns"
-        )
-    return "" if model.inclusions is None and model.object_compliance is None else "not with an elastic object or foils"
+    if not model.is_linear_elastic:
+        return "derivatives need linear elasticity: small strain, without viscosity"
+    if model.inclusions is not None or model.object_compliance is not None:
+        return "derivatives are not known with an elastic object or foils"
+    if model.rule != "projection":
+        return 'derivatives need contact.rule = "projection"'
+    if any(leg.turn_x or leg.turn_y or leg.turn_z for leg in model.legs):
+        return "derivatives are not known where the object turns"
+    if any(leg.force_x_N is not None or leg.force_z_N is not None for leg in model.legs):
+        return "derivatives are not known under a tangential force"
+    return ""
 
 
-def derivatives(problem: Problem, variations: Sequence[Variation]) -> tuple[list[StepResult], list[list[Numbers]]]:
-    """Return the increments of a press, and the derivatives of their numbers by p parameters.
-
-    Returns
-    -------
-    steps : (N,)
-    derivatives : (N, p)
-        Of the columns of history.csv, by their names, per unit of each parameter.
+def tangents(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
+    """Yield every increment of a press, and the sides (2 p,) of p variations at its end.
 
     Raises
     ------
     Finger3dError
-        If the path of the press is not exact, or an increment does not converge.
+        If the numbers of this press have no derivatives, or an increment does not converge.
     """
     if text := refusal(problem.model):
         raise Finger3dError(text)
-    press, steps, count = Press(problem), list[StepResult](), len(variations)
-    zero = np.zeros((count, *press.state.contact.force.shape))
-    tangent, motion = _Tangent(zero, zero, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
-    energies, rows = np.zeros((2, count)), list[list[Numbers]]()
-    number, follower = 0, None
+    follow = _on_exact_path if has_exact_path(problem.model) else _by_increments
+    yield from follow(problem, variations)
+
+
+def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sequence[Side]) -> list[Numbers]:
+    """Return the derivatives (p,) of the numbers of an increment, per unit of each parameter.
+
+    The numbers are the columns of history.csv, by their names.
+    """
+    return [_of_numbers(step, *one) for one in zip(variations, sides[::2], sides[1::2], strict=True)]
+
+
+def _advanced(press: Press, station: Station) -> StepResult:
+    step = press.advance(station)
+    if press.has_failed:
+        raise Finger3dError(f"at depth {step.target.depth_mm:.4g} mm: {step.outcome}")
+    return step
+
+
+def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
+    press, tangents = Press(problem), IncrementTangents(problem, variations)
     for station in stations(problem.model.legs):
-        steps.append(step := press.advance(station))
-        if press.has_failed or press.path is None:
-            raise Finger3dError(f"at depth {step.target.depth_mm:.4g} mm: {step.outcome}")
-        follower = follower or _PathTangents(press.path, variations, tangent, motion, number)
-        tangent, change = follower.at_share(station.share)
-        motion, total = follower.motion(tangent, station.share), energies + change
-        rows.append([_of_numbers(step, v, tangent, k, motion[k], total[:, k]) for k, v in enumerate(variations)])
+        step = _advanced(press, station)
+        yield step, tangents.advance(step)
+
+
+def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
+    press, count = Press(problem), len(variations)
+    zero = np.zeros((count, *press.state.contact.force.shape))
+    tangent, motion = PathTangent(zero, zero, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
+    energies, number, follower = np.zeros((2, count)), 0, None
+    changes = compliance_changes(problem, variations)
+    for station in stations(problem.model.legs):
+        step = _advanced(press, station)
+        if press.path is None:
+            raise Finger3dError("the path of the press is not exact")
+        follower = follower or PathTangents(press.path, variations, changes, tangent, motion, number)
+        tangent, added = follower.at_share(station.share)
+        motion, total = follower.motion(tangent, station.share), energies + added
+        here = Event(0.0, 0.0, step.meshed_state.contact, 0.0, 0)
+        force, sides = problem.upright_force(step.meshed_state.contact).ravel(), []
+        for k, one in enumerate(variations):
+            change = changes[k]
+            read = change[1] @ force if change else np.zeros(len(problem.system.reading_rows))
+            for end, t in zip(one.ends, (-one.step, one.step), strict=True):
+                contact = tangent.changed(here, k, t).state
+                sides.append(
+                    Side(
+                        end,
+                        replace(step.meshed_state, contact=contact),
+                        moved_pose(step.target, t * motion[k]),
+                        t * read + problem.system.reading_rows @ problem.upright_force(contact).ravel(),
+                        step.external_work_mJ + t * total[0, k],
+                        step.dissipation_mJ + t * total[1, k],
+                    )
+                )
+        yield step, sides
         if station.share == 1.0:
             number, follower, energies = number + 1, None, total
             tangent = replace(tangent, amplitude=np.zeros(count))
-    return steps, rows
 
 
-@dataclass(frozen=True)
-class _Tangent:
-    """Derivatives at a place of the path by p parameters.
+def _of_numbers(step: StepResult, one: Variation, low: Side, high: Side) -> Numbers:
+    """Return the derivatives of the numbers of an increment, by differences of their formulas."""
 
-    Attributes
-    ----------
-    force, displacement : (p, c, 2), of forces, and of gaps and tangential displacements
-    share, amplitude : (p,), of the place, and of the depth that follows from a prescribed force
-    """
-
-    force: Float
-    displacement: Float
-    share: Float
-    amplitude: Float
-
-    def changed(self, event: Event, k: int, t: float) -> Event:
-        """Return the place with parameter k changed by t."""
-        moved = t * self.displacement[k]
-        state = replace(
-            event.state,
-            force=event.state.force + t * self.force[k],
-            gap=event.state.gap + moved[:, 0],
-            tangential_displacement=event.state.tangential_displacement + moved[:, 1:],
-        )
-        share, amplitude = event.share + t * self.share[k], event.amplitude + t * self.amplitude[k]
-        return event._replace(share=share, amplitude=amplitude, state=state)
-
-
-class _PathTangents:
-    """Derivatives along the path of a leg, at its events and between them.
-
-    Parameters
-    ----------
-    path : of the leg
-    variations : of p parameters
-    start : derivatives of the state at the start of the leg
-    motion : (p, 2), those of the displacement of the object there
-    leg : number of the leg
-    """
-
-    def __init__(
-        self, path: ExactPath, variations: Sequence[Variation], start: _Tangent, motion: Float, leg: int
-    ) -> None:
-        self.path, self.variations = path, variations
-        self._delassus = self._local(path.problem)
-        self._changes = [
-            None
-            if one.low.delassus is one.high.delassus
-            else one.difference(self._local(one.low), self._local(one.high))
-            for one in variations
-        ]
-        self._mu = np.array(
-            [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
-        )
-        legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
-        ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
-        end = np.array([one.difference(low, high) for one, (low, high) in zip(variations, ends, strict=True)])
-        end = end.reshape(-1, 2)
-        self._weights: Float | None = None
-        if path.problem.model.legs[leg].force_N is not None:
-            self._weights = -path.count[:, None] * path.bases[:, :, 1]
-            end[:, 1] = motion[:, 1]
-            at_end = [
-                one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
-            ]
-            self._force_slopes = np.einsum("ca,pca->p", self._weights, start.force), np.array(at_end)
-        self._motions = motion, end
-        self._events, self._tangents = [path.start], [start]
-        for piece, event in enumerate(path.events):
-            self._tangents.append(self._at_event(piece, event))
-            self._events.append(event)
-
-    def at_share(self, share: float) -> tuple[_Tangent, Float]:
-        """Return the derivatives at a share of the path, and those (2, p) of work and dissipation since its start."""
-        place, done = self.path.at(share)
-        piece = done - 1 if place is self._events[done] else done
-        events = [*self._events[: piece + 1], place]
-        tangents = [*self._tangents[: piece + 1], self._solved(piece, place)]
-        out = np.zeros((2, len(self.variations)))
-        for k, one in enumerate(self.variations):
-            low, high = (
-                self._moved_path(k, t).energies([x.changed(e, k, t) for x, e in zip(tangents, events, strict=True)])
-                for t in (-one.step, one.step)
-            )
-            out[:, k] = one.difference(np.array(low), np.array(high))
-        return tangents[-1], out
-
-    def motion(self, tangent: _Tangent, share: float) -> Float:
-        """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
-        out: Float = (1.0 - share) * self._motions[0] + share * self._motions[1]
-        out[:, 1] -= tangent.amplitude
-        return out
-
-    def _local(self, problem: Problem) -> Float:
-        """Return the compliance (2 c, 2 c) in the directions of the points."""
-        c = len(self.path.bases)
-        turned = rotated_delassus(problem.delassus, self.path.bases @ vertical_frame(2).T, np.arange(c))
-        return np.asarray(turned.reshape(2 * c, 2 * c))
-
-    def _moved_path(self, k: int, t: float) -> ExactPath:
-        move = self.path.move
-        start, end = (_moved(p, t * m[k]) for p, m in zip((move.start, move.end), self._motions, strict=True))
-        return replace(self.path, move=Move(start, end))
-
-    def _at_event(self, piece: int, event: Event) -> _Tangent:
-        """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""
-        before, last = self._events[piece], self._tangents[piece]
-        way = event.share - before.share
-        if way <= _SAME_PLACE:
-            return self._at_touch(event, last) if event.amplitude > before.amplitude else last
-        force, moved = event.state.force - before.state.force, _relative(event.state) - _relative(before.state)
-        if way <= _JUMP and np.abs(force).max() > _JUMP * np.abs(event.state.force).max():
-            raise Finger3dError("the forces jump on the path of this press, and have no derivatives there")
-        found = self._solved(piece, event)
-        if piece + 1 == len(self.path.events):
-            return found
-        old, new = event.state.status, self.path.events[piece + 1].state.status
-        points = np.flatnonzero((old != new) & ((old != SLIP) | (new == OPEN)))
-        if not len(points):
-            return found
-        change, rate = (
-            self._margin(old[points[0]], new[points[0]], event.state.force[points[0]], *both)
-            for both in (
-                (found.force[:, points[0]], found.displacement[:, points[0]], self._mu),
-                (force[None, points[0]] / way, moved[None, points[0]] / way, np.zeros(1)),
-            )
-        )
-        share = -change / rate
-        return _Tangent(
-            found.force + share[:, None, None] * (force / way),
-            found.displacement + share[:, None, None] * (moved / way),
-            share,
-            found.amplitude + share * (event.amplitude - before.amplitude) / way,
-        )
-
-    def _margin(self, old: int, new: int, at: Float, force: Float, moved: Float, mu: Float) -> Float:
-        """Return the change (p,) of what vanishes as a point leaves its set, by changes (p, 2) of its state."""
-        if old == OPEN:
-            return moved[:, 0]
-        if new == OPEN:
-            return force[:, 0]
-        own = self.path.problem.model.friction.mu
-        return np.asarray(own * force[:, 0] + mu * at[0] - np.sign(at[1]) * force[:, 1])
-
-    def _at_touch(self, event: Event, last: _Tangent) -> _Tangent:
-        """Return the derivatives where the object touches first, to which it moves before there is any force."""
-        point = int(np.argmin(event.state.gap))
-        closing = self.path.bases[:, :, 1]
-        amplitude = -last.displacement[:, point, 0] / closing[point, 0]
-        return replace(
-            last,
-            displacement=last.displacement + amplitude[:, None, None] * closing,
-            amplitude=last.amplitude + amplitude,
-        )
-
-    def _solved(self, piece: int, event: Event) -> _Tangent:
-        """Return the derivatives at a place within a piece of the path that itself does not move."""
-        status, force, last = event.state.status, event.state.force, self._tangents[piece]
-        c, count, share = len(status), len(self.variations), event.share
-        touches, sticks, slips = (np.flatnonzero(m) for m in (status != OPEN, status == STICK, status == SLIP))
-        sign = np.zeros(c)
-        slid = _relative(event.state)[:, 1] - _relative(self._events[piece].state)[:, 1]
-        sign[slips] = np.sign(np.where(force[:, 1] != 0.0, force[:, 1], -slid))[slips]
-        base = np.zeros((count, c, 2))
-        base[:, slips, 1] = (self._mu[:, None] * (sign * force[:, 0]))[:, slips]
-        fixed = replace(last, amplitude=np.zeros(count))
-        free = -np.einsum("cak,pk->pca", self.path.bases, self.motion(fixed, share))
-        for k, change in enumerate(self._changes):
-            if change is not None:
-                free[k] += (change @ force.ravel()).reshape(c, 2)
-        free += (base.reshape(count, -1) @ self._delassus.T).reshape(base.shape)
-        rows = np.concatenate([2 * touches, 2 * sticks + 1])
-        unknowns = sp.csr_array(
-            (
-                np.concatenate([np.ones(len(rows)), self.path.problem.model.friction.mu * sign[slips]]),
-                (
-                    np.concatenate([rows, 2 * slips + 1]),
-                    np.concatenate([np.arange(len(rows)), np.searchsorted(touches, slips)]),
-                ),
-            ),
-            shape=(2 * c, len(rows)),
-        )
-        through = self._delassus @ unknowns
-        target = np.zeros((count, c, 2))
-        target[:, sticks, 1] = last.displacement[:, sticks, 1]
-        matrix, right = through[rows], (target - free).reshape(count, -1)[:, rows]
-        motion = np.zeros((2 * c, 0))
-        if self._weights is not None:
-            motion = self.path.bases[:, :, 1].reshape(-1, 1)
-            resultant = unknowns.T @ self._weights.ravel()
-            wanted = (1.0 - share) * self._force_slopes[0] + share * self._force_slopes[1]
-            wanted = wanted - np.einsum("ca,pca->p", self._weights, base)
-            matrix = np.block([[matrix, motion[rows]], [resultant[None], np.zeros((1, 1))]])
-            right = np.column_stack([right, wanted])
-        solved = np.linalg.solve(matrix, right.T) if len(matrix) else np.zeros((0, count))
-        own, amplitude = solved[: len(rows)], solved[len(rows) :]
-        moved = free + (through @ own + motion @ amplitude).T.reshape(count, c, 2)
-        still = np.zeros(count)
-        return _Tangent(
-            base + (unknowns @ own).T.reshape(count, c, 2), moved, still, amplitude[0] if len(amplitude) else still
-        )
-
-
-def _relative(state: ContactState) -> Float:
-    """Return gap and tangential displacement (c, 2)."""
-    return np.column_stack([state.gap, state.tangential_displacement])
-
-
-def _moved(pose: ObjectPose, motion: Float) -> ObjectPose:
-    return replace(pose, slide_x_mm=pose.slide_x_mm + float(motion[0]), depth_mm=pose.depth_mm - float(motion[1]))
-
-
-def _of_numbers(step: StepResult, one: Variation, tangent: _Tangent, k: int, motion: Float, energies: Float) -> Numbers:
-    """Return the derivatives of the numbers of an increment by parameter k, by differences of their formulas."""
-
-    def numbers(problem: Problem, t: float) -> Numbers:
-        event = tangent.changed(Event(0.0, 0.0, step.meshed_state.contact, 0.0, 0), k, t)
-        contact, pose = event.state, _moved(step.target, t * motion)
-        moment = linear_loads(problem, contact, step.meshed_state.body).moment
+    def numbers(side: Side) -> Numbers:
+        problem, contact = side.problem, side.state.contact
+        moment = linear_loads(problem, contact, side.state.body).moment
         changed = replace(
             step,
-            target=pose,
+            target=side.pose,
             state=problem.symmetry.unfold(contact),
-            lowest=problem.placed(pose).lowest,
+            lowest=problem.placed(side.pose).lowest,
             moment=problem.symmetry.total_moment(moment),
-            readings=in_order(problem.read(problem.upright_force(contact))),
-            external_work_mJ=step.external_work_mJ + t * energies[0],
-            dissipation_mJ=step.dissipation_mJ + t * energies[1],
+            readings=in_order(dict(zip(problem.model.columns, side.readings.tolist(), strict=True))),
+            external_work_mJ=side.work_mJ,
+            dissipation_mJ=side.dissipation_mJ,
         )
         row = table_row(problem.points, changed)
         return {name: value for name, value in row.items() if isinstance(value, float) and name not in _NONE}
 
-    low, high = numbers(one.low, -one.step), numbers(one.high, one.step)
-    return {name: float(one.difference(low[name], high[name])) for name in high}
+    below, above = numbers(low), numbers(high)
+    return {name: float(one.difference(below[name], above[name])) for name in above}

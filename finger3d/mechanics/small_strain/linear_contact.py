@@ -87,7 +87,7 @@ def solve_increment(
         Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
         directions at the displacement found agree with those that the forces were solved with.
     """
-    increment = _Increment(problem, state, move, body, workspace.tracker)
+    increment = Increment(problem, state, move, body, workspace.tracker)
     gap_before = state.contact.gap
     if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
         return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
@@ -142,7 +142,7 @@ def solve_linearised(
     if problem.contact_geometry is None or move.end not in problem.contact_geometry:
         return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
     geometry, expansion_point = problem.contact_geometry[move.end]
-    increment = _Increment(problem, state, move, body, DistanceTracker())
+    increment = Increment(problem, state, move, body, DistanceTracker())
     solution = increment.solve(geometry, expansion_point, guess)
     if not solution.outcome.ok:
         return solution.with_state(state)
@@ -162,7 +162,7 @@ def _extrapolated(tried: list[Float], results: list[Float]) -> Float:
 
 
 @dataclass(frozen=True)
-class _Increment:
+class Increment:
     """An increment from a state, as the object moves."""
 
     problem: Problem
@@ -195,7 +195,7 @@ class _Increment:
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
         start = transported(self.state.contact, bases)
-        free_displacement = self._relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
+        free_displacement = self.relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free_displacement[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
         rule, law = RULES[problem.model.rule], problem.model.contact_law
@@ -213,7 +213,7 @@ class _Increment:
         force[near], status[near] = part.state.force, part.state.status
         return replace(part, state=replace(start, force=force, status=status))
 
-    def _relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
+    def relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
         """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one.
 
         Points that close in the increment slip from where they touch.
@@ -246,7 +246,7 @@ class _Increment:
         gap: Float | None,
     ) -> State[Float]:
         """Return the state at the end of the increment, with gaps (c,) or those linearised at a displacement."""
-        relative = self._relative(geometry, expansion_point, displacement)
+        relative = self.relative(geometry, expansion_point, displacement)
         if gap is not None:
             relative[:, 0] = gap
         reached = advanced(self.state, replace(contact, bases=geometry.bases), relative, self._until_touch, self.move)

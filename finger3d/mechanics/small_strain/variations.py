@@ -1,9 +1,13 @@
-"""Variations of a condensed section: what a small change of a key changes in its compliance and its readings."""
+"""Variations of a condensed body: what a small change of a parameter changes in its displacements and its readings.
+
+The displacements of contact points and readings under loads are ``L K^-1 f``.  Their derivative is
+``L K^-1 (-dK u) + dL u`` with ``u = K^-1 f``, where dK and dL are central differences of assembled matrices.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,32 +16,68 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.mechanics.discretise.build import contact_rows
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
+from finger3d.mechanics.results.state import State
+from finger3d.objects import ObjectPose
 
-_SAME_PLACE = 1e-12
-"""Difference of shares of the path below which two events are at the same place."""
 
-_JUMP = 1e-8
-"""Share of the path below which forces that change by more than this, over the largest, jump."""
+class Side(NamedTuple):
+    """A press at a parameter less or plus its step, to first order, at the end of an increment.
 
-_NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
-"""Numbers of an increment that have no derivative."""
+    Attributes
+    ----------
+    problem, state, pose : of the press
+    readings : (g,)
+    work_mJ, dissipation_mJ : since its start
+    """
 
-Numbers: TypeAlias = dict[str, float]
-"""Numbers of an increment by the names of their columns in history.csv, or their derivatives."""
+    problem: Problem
+    state: State[Float]
+    pose: ObjectPose
+    readings: Float
+    work_mJ: float
+    dissipation_mJ: float
+
+
+@dataclass(frozen=True)
+class BodyChange:
+    """Derivatives by a parameter of the stiffness (N, N) of a body and of the rows (g, N) of its readings."""
+
+    stiffness: Any
+    rows: Any
+
+    def of(self, problem: Problem, unknowns: Float) -> tuple[Float, Float]:
+        """Return the derivatives of contact displacements (c d, k) and readings (g, k) under the loads of a solution.
+
+        Parameters
+        ----------
+        unknowns : (N, k), of the body under each of k loads
+        """
+        active = problem.system.active_dofs
+        moved = problem.body.condensed.eliminated(-(self.stiffness @ unknowns)).displacement
+        displacement = np.zeros((problem.surface.points.size, unknowns.shape[1]))
+        displacement[active] = moved[: len(active)]
+        return displacement, moved[len(active) :][: self.rows.shape[0]] + self.rows @ unknowns
 
 
 @dataclass(frozen=True)
 class Variation:
-    """A parameter of a press, by the problem at its value less and plus a small step, with the same contact points."""
+    """A parameter of a press, by the problem at its value less and plus a small step, with the same contact points.
+
+    Attributes
+    ----------
+    low, high : with the compliance of the press itself
+    step : of the parameter
+    body : what changes in the body; None if nothing does
+    """
 
     low: Problem
     high: Problem
     step: float
+    body: BodyChange | None
 
     @property
     def ends(self) -> tuple[Problem, Problem]:
@@ -50,7 +90,9 @@ class Variation:
 
 
 def variation(problem: Problem, low: Model, high: Model, step: float) -> Variation:
-    """Return the variation between two models with the mesh of a problem: of friction, path, materials or readings.
+    """Return the variation between two models with the mesh of a problem.
+
+    They may differ in friction, path, object, materials and readings.
 
     Raises
     ------
@@ -58,15 +100,18 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         If the models differ in anything else.
     """
     own = problem.model
-    changed = {"friction", "legs", "material", "parts", "gauges", "markers", "taxels"}
+    changed = {"friction", "legs", "object", "material", "parts", "gauges", "markers", "taxels"}
     for model in (low, high):
         if replace(model, **{name: getattr(own, name) for name in changed}) != own:
-            raise Finger3dError("it changes the mesh or the object")
+            raise Finger3dError("it changes the mesh")
     ends = [replace(problem, model=replace(own, **{n: getattr(m, n) for n in changed})) for m in (low, high)]
+    if any(end.model.object != own.object for end in ends):
+        systems = [replace(problem.system, first_contact_mm=m.first_contact.first_contact_mm) for m in (low, high)]
+        ends = [replace(end, system=system) for end, system in zip(ends, systems, strict=True)]
     names = ("material", "parts", "gauges", "markers", "taxels")
     if all(getattr(end.model, name) == getattr(own, name) for name in names for end in ends):
-        return Variation(ends[0], ends[1], step)
-    body, system = problem.body, problem.system
+        return Variation(ends[0], ends[1], step, None)
+    body = problem.body
     elastics = [
         elasticity_of(end.model.materials(body.mesh.part_labels), body.mesh, own.domain == "plane-stress")
         for end in ends
@@ -78,26 +123,13 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         _reading_rows(end, MeshedBody(body.mesh, problem.axes, matrix, body.thickness, moduli_of(elastic)))
         for end, matrix, elastic in zip(ends, matrices, elastics, strict=True)
     ]
-    fields = body.condensed.unknowns(np.eye(len(body.condensed.compliance)))
-    slope = matrices[1].upper - matrices[0].upper
-    compliance = -(fields.T @ ((slope + sp.triu(slope, 1).T) @ fields))
-    active = len(system.active_dofs)
-    compliance[active:, :active] += (rows[1] - rows[0]) @ fields[:, :active]
-    delassus, reading_rows = contact_rows(0.5 * compliance, system.active_dofs, system.surface, len(own.columns))
-    unmoved = np.setdiff1d(np.arange(delassus.shape[0] * delassus.shape[1]), system.active_dofs)
-    square = delassus.reshape(reading_rows.shape[1], -1)
-    square[unmoved, unmoved] = 0.0
+    slope = (matrices[1].upper - matrices[0].upper) / (2.0 * step)
+    change = BodyChange((slope + sp.triu(slope, 1).T).tocsr(), (rows[1] - rows[0]) / (2.0 * step))
     out = []
-    for sign, end, elastic in zip((-1.0, 1.0), ends, elastics, strict=True):
-        points = unfold_points(end.model, body.mesh, system.surface, problem.axes, elastic)[1]
-        changed_system = replace(
-            system,
-            points=points,
-            delassus=system.delassus + sign * delassus,
-            reading_rows=system.reading_rows + sign * reading_rows,
-        )
-        out.append(replace(end, system=changed_system))
-    return Variation(out[0], out[1], step)
+    for end, elastic in zip(ends, elastics, strict=True):
+        points = unfold_points(end.model, body.mesh, problem.surface, problem.axes, elastic)[1]
+        out.append(replace(end, system=replace(problem.system, points=points)))
+    return Variation(out[0], out[1], step, change)
 
 
 def _reading_rows(problem: Problem, body: MeshedBody) -> sp.csr_matrix:

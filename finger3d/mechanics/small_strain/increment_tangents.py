@@ -1,0 +1,234 @@
+r"""Derivatives of the increments of a press by its parameters, from the equations of their active sets.
+
+The forces of an increment are linear functions r = P x of the unknowns of its active set, and the displacements of the
+contact points are ``U = W B^T r``, with the directions B of the points.  Gap and slip w depend on U through the
+geometry of the contact, and on the parameters through the state before and the motion of the object.  In ::
+
+    D w + E x = 0,   dU = W (B^T (P dx + dmu e r_n) + dB^T r) + dW B^T r
+
+(`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
+parameter less and plus its step to first order.  They hold the curvature of the object, and where points touch within
+the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration.
+
+Under a prescribed force an increment is differentiated by its depth, too, which changes so that the force is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.contact.friction import SLIP
+from finger3d.contact.state import pressure
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.parts import Substep, energies
+from finger3d.mechanics.march.path import Station, stations
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
+from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
+
+_CHANGE, _ROUND_OFF, _MOST = 1e-7, 1e-5, 60
+"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
+and the largest number of iterations."""
+
+_STEP = 1e-6
+"""Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Part of an increment, linearised, between two shares of its motion."""
+
+    before: State[Float]
+    after: State[Float]
+    linear: LinearisedIncrement
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class _End:
+    """Side at the end of a part of an increment, with gap and slip (c, d) mm and forces (c, d) N in its directions."""
+
+    side: Side
+    relative: Float
+    turned_force: Float
+
+    @classmethod
+    def of(
+        cls, side: Side, move: Move, after: State[Float], force: Float, displacement: Float, readings: Float
+    ) -> _End:
+        """Return the end of a motion.
+
+        Forces and displacements (c, d) differ by so much from those of a state, readings (g,) from those under forces.
+        """
+        contact = replace(after.contact, force=after.contact.force + force)
+        body, place = LinearBody(side.problem.delassus, np.zeros_like(after.body)), after.body + displacement
+        increment = Increment(side.problem, side.state, move, body, DistanceTracker())
+        geometry = increment.geometry(place, np.inf)
+        state = increment.reached(geometry, place, place, contact, None)
+        work, lost = energies(side.problem, [Substep(side.state, state, move)])
+        read = readings + side.problem.system.reading_rows @ side.problem.upright_force(state.contact).ravel()
+        end = Side(side.problem, state, move.end, read, side.work_mJ + work, side.dissipation_mJ + lost)
+        turned = np.einsum("ca,cak->ck", after.contact.force, geometry.bases)
+        return cls(end, increment.relative(geometry, place, place), turned)
+
+
+class IncrementTangents:
+    """Derivatives of a press, one increment after another.
+
+    Parameters
+    ----------
+    problem : of the press
+    variations : of p parameters
+
+    Attributes
+    ----------
+    sides : (2 p,) below and above each parameter, at the end of the last increment
+    """
+
+    def __init__(self, problem: Problem, variations: Sequence[Variation]) -> None:
+        self.problem = problem
+        self._steps = np.array([t for one in variations for t in (-one.step, one.step)])
+        ends = [end for one in variations for end in one.ends]
+        self.sides = [_begun(end) for end in ends]
+        self._bodies = [one.body for one in variations]
+        self._stations = [stations(end.model.legs) for end in ends]
+        self._state, self._pose, self._number = SmallStrain().start(problem), problem.origin, 0
+        self._leg_start_N = np.zeros(len(ends))
+
+    def advance(self, step: StepResult) -> list[Side]:
+        """Return the sides at the end of the next increment, which has this result.
+
+        Raises
+        ------
+        Finger3dError
+            If the equations of an active set are singular, or the geometry of the contact has no derivative.
+        """
+        targets = [own[self._number] for own in self._stations]
+        parts, poses = self._parts(step), [target.pose for target in targets]
+        if any(target.load for target in targets):
+            poses = self._at_force(step, parts, targets)
+        self.sides = self._through(parts, self.sides, self._steps, poses)
+        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
+        return self.sides
+
+    def _parts(self, step: StepResult) -> list[_Part]:
+        """Return the parts of an increment, linearised."""
+        whole, parts = Move(self._pose, step.target).change, list[_Part]()
+        before, start = self._state, 0.0
+        for pose, after in step.parts:
+            share = float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
+            try:
+                linear = LinearisedIncrement.of(self.problem, before.contact, after.contact)
+            except np.linalg.LinAlgError:
+                raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
+            parts.append(_Part(before, after, linear, start, share))
+            before, start = after, share
+        return parts
+
+    def _at_force(self, step: StepResult, parts: Sequence[_Part], targets: Sequence[Station]) -> list[ObjectPose]:
+        """Return the poses at the end of an increment whose depth follows from a prescribed force."""
+        depth = step.target.depth_mm
+        h, here = _STEP * max(depth, 1.0), _begun(self.problem)._replace(state=self._state, pose=self._pose)
+        fixed = [replace(target.pose, depth_mm=depth) for target in targets]
+        deeper = [replace(step.target, depth_mm=depth + t) for t in (-h, h)]
+        found = self._through(parts, [*self.sides, here, here], np.array([*self._steps, -h, h]), [*fixed, *deeper])
+        *reached, low, high = (_normal_force(side) for side in found)
+        wanted = np.zeros(len(targets))
+        for k, (side, target) in enumerate(zip(self.sides, targets, strict=True)):
+            assert target.load is not None
+            if target.load.begins:
+                self._leg_start_N[k] = _normal_force(side)
+            start = self._leg_start_N[k]
+            wanted[k] = start + target.load.share * (target.load.forces[0] - start)
+        missing = 0.5 * np.diff((wanted - reached).reshape(-1, 2), axis=1).ravel() * (2.0 * h) / (high - low)
+        return [
+            replace(pose, depth_mm=depth + change)
+            for pose, change in zip(fixed, np.column_stack([-missing, missing]).ravel().tolist(), strict=True)
+        ]
+
+    def _through(
+        self, parts: Sequence[_Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
+    ) -> list[Side]:
+        """Return the sides after all parts of an increment, which ends in these poses."""
+        moves = [Move(side.pose, pose) for side, pose in zip(sides, poses, strict=True)]
+        for part in parts:
+            sides = self._after(part, sides, steps, [Move(move.at(part.start), move.at(part.end)) for move in moves])
+        return list(sides)
+
+    def _after(self, part: _Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
+        """Return the sides after a part of an increment."""
+        contact, linear, frame = part.after.contact, part.linear, vertical_frame(self.problem.dim)
+        (c, d), p = contact.force.shape, len(sides) // 2
+        delassus, size = self.problem.delassus.reshape(c * d, c * d), steps[1::2]
+        largest = np.abs(contact.force).max(initial=0.0)
+
+        def slope(values: Sequence[Float]) -> Float:
+            """Return the derivatives (c d, p) of values (2 p, c, d)."""
+            array = np.reshape(values, (2 * p, c * d))
+            return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
+
+        other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
+        if any(self._bodies):
+            unknowns = self.problem.unknowns(self.problem.upright_force(contact))[:, None]
+            for k, body in enumerate(self._bodies):
+                if body:
+                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, unknowns)
+        rubbed = self._rubbed(part)
+        direct = slope([upright(contact, rubbed * _coefficients(side)[:, None]) for side in sides])
+        unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
+        errors = [np.full(p, np.inf)] * 2  # unknowns and directions are corrected in turn
+        for _ in range(_MOST):
+            fixed_basis = linear.forces @ unknowns + direct
+            moved = delassus @ (fixed_basis + turned) + other
+            force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
+            place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
+            ends = [
+                _End.of(side, move, part.after, t * force[k // 2], t * place[k // 2], t * readings[:, k // 2])
+                for k, (side, move, t) in enumerate(zip(sides, moves, steps, strict=True))
+            ]
+            turns = slope([end.turned_force @ frame.T for end in ends])
+            change = linear.correction(slope([upright(contact, end.relative) for end in ends]), unknowns)
+            error = np.abs(np.concatenate([change, turns - turned])).max(axis=0, initial=0.0)
+            unknowns, turned = unknowns - change, turns
+            scale = np.maximum(np.abs(unknowns).max(axis=0, initial=0.0), 0.1 * _STEP * largest / size)
+            if (error <= np.where(error > 0.5 * errors[-2], _ROUND_OFF, _CHANGE) * scale).all():
+                return [end.side for end in ends]
+            errors.append(error)
+        raise Finger3dError(
+            f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
+            "abruptly where it touches"
+        )
+
+    def _rubbed(self, part: _Part) -> Float:
+        """Return the friction (c, d) N of slipping points for a coefficient of friction of one."""
+        after, before = part.after.contact, part.before.contact
+        slid, along = after.accumulated_slip - before.accumulated_slip, after.force[:, 1:]
+        along = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, -slid)
+        length = np.linalg.norm(along, axis=1)
+        slips = (length > 0.0) & (after.status == SLIP)
+        share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
+        return np.column_stack([np.zeros(len(along)), along * share[:, None]])
+
+
+def _begun(problem: Problem) -> Side:
+    return Side(problem, SmallStrain().start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+
+
+def _normal_force(side: Side) -> float:
+    return -float(side.problem.world_force(side.state.contact)[:, 1].sum())
+
+
+def _coefficients(side: Side) -> Float:
+    """Return the coefficients of friction (c,) of the next increment."""
+    contact = side.state.contact
+    return side.problem.model.friction.coefficients(contact.status, pressure(contact.force, side.problem.surface.area))

@@ -1,0 +1,277 @@
+r"""Derivatives of the state along an exact path by parameters, from the equations of its active sets.
+
+Between two events the forces r and the relative displacements ``w = W r + q`` solve linear equations; s is the share of
+the path, and d' the derivative by a parameter p at fixed s::
+
+    open    dr = 0
+    stick   dw_n = 0,  dw_t = dw_t*
+    slip    dw_n = 0,  dr_t = sigma (mu dr_n + dmu r_n)        with  dw = W dr + dW r + dq
+
+w_t* is the tangential displacement where the point began to stick.  At an event a margin m (a gap, a normal force, or
+mu r_n - |r_t|) vanishes, so that the event moves by ``ds = -dm / (dm/ds)``, and what it leaves behind changes by
+``dw_t* = dw_t + (dw_t/ds) ds``.  Under a prescribed force the depth is one more unknown of the equations.
+
+The body enters by its compliance ``C = L K^-1 L^T``, condensed to the rows L of contact points and readings::
+
+    dC = -F^T dK F + dL F + F^T dL^T,   F = K^-1 L^T
+
+where dK and dL are central differences of assembled matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float
+from finger3d.contact.events import Event
+from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.state import ContactState
+from finger3d.errors import Finger3dError
+from finger3d.fem.tensors import rotated_delassus
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.small_strain.exact_path import ExactPath
+from finger3d.mechanics.small_strain.variations import Variation
+from finger3d.objects import Move, ObjectPose, vertical_frame
+
+_SAME_PLACE = 1e-12
+"""Difference of shares of the path below which two events are at the same place."""
+
+_JUMP = 1e-8
+"""Share of the path below which forces that change by more than this, over the largest, jump."""
+
+
+@dataclass(frozen=True)
+class PathTangent:
+    """Derivatives at a place of the path by p parameters.
+
+    Attributes
+    ----------
+    force, displacement : (p, c, 2), of forces, and of gaps and tangential displacements
+    share, amplitude : (p,), of the place, and of the depth that follows from a prescribed force
+    """
+
+    force: Float
+    displacement: Float
+    share: Float
+    amplitude: Float
+
+    def changed(self, event: Event, k: int, t: float) -> Event:
+        """Return the place with parameter k changed by t."""
+        moved = t * self.displacement[k]
+        state = replace(
+            event.state,
+            force=event.state.force + t * self.force[k],
+            gap=event.state.gap + moved[:, 0],
+            tangential_displacement=event.state.tangential_displacement + moved[:, 1:],
+        )
+        share, amplitude = event.share + t * self.share[k], event.amplitude + t * self.amplitude[k]
+        return event._replace(share=share, amplitude=amplitude, state=state)
+
+
+def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> list[tuple[Float, Float] | None]:
+    """Return the derivatives of compliance (c d, c d) and reading rows (g, c d) by p parameters.
+
+    They are in the directions of an upright object; None where a parameter changes nothing in the body.
+    """
+    active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
+    if not any(one.body for one in variations):
+        return [None] * len(variations)
+    unknowns = problem.body.condensed.unknowns(np.eye(count, len(active)))
+
+    def dense(rows: Float) -> Float:
+        out = np.zeros((len(rows), problem.surface.points.size))
+        out[:, active] = rows
+        return out
+
+    found = [one.body.of(problem, unknowns) if one.body else None for one in variations]
+    return [(dense(pair[0]), dense(pair[1])) if pair else None for pair in found]
+
+
+class PathTangents:
+    """Derivatives along the path of a leg, at its events and between them.
+
+    Parameters
+    ----------
+    path : of the leg
+    variations : of p parameters
+    changes : (p,), see `compliance_changes`
+    start : derivatives of the state at the start of the leg
+    motion : (p, 2), those of the displacement of the object there
+    leg : number of the leg
+    """
+
+    def __init__(
+        self,
+        path: ExactPath,
+        variations: Sequence[Variation],
+        changes: Sequence[tuple[Float, Float] | None],
+        start: PathTangent,
+        motion: Float,
+        leg: int,
+    ) -> None:
+        self.path, self.variations = path, variations
+        self._delassus = self._local(path.problem.delassus)
+        self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
+        self._mu = np.array(
+            [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
+        )
+        legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
+        ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
+        end = np.array([one.difference(low, high) for one, (low, high) in zip(variations, ends, strict=True)])
+        end = end.reshape(-1, 2)
+        self._weights: Float | None = None
+        if path.problem.model.legs[leg].force_N is not None:
+            self._weights = -path.count[:, None] * path.bases[:, :, 1]
+            end[:, 1] = motion[:, 1]
+            at_end = [
+                one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
+            ]
+            self._force_slopes = np.einsum("ca,pca->p", self._weights, start.force), np.array(at_end)
+        self._motions = motion, end
+        self._events, self._tangents = [path.start], [start]
+        for piece, event in enumerate(path.events):
+            self._tangents.append(self._at_event(piece, event))
+            self._events.append(event)
+
+    def at_share(self, share: float) -> tuple[PathTangent, Float]:
+        """Return the derivatives at a share of the path, and those (2, p) of work and dissipation since its start."""
+        place, done = self.path.at(share)
+        piece = done - 1 if place is self._events[done] else done
+        events = [*self._events[: piece + 1], place]
+        tangents = [*self._tangents[: piece + 1], self._solved(piece, place)]
+        out = np.zeros((2, len(self.variations)))
+        for k, one in enumerate(self.variations):
+            low, high = (
+                self._moved_path(k, t).energies([x.changed(e, k, t) for x, e in zip(tangents, events, strict=True)])
+                for t in (-one.step, one.step)
+            )
+            out[:, k] = one.difference(np.array(low), np.array(high))
+        return tangents[-1], out
+
+    def motion(self, tangent: PathTangent, share: float) -> Float:
+        """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
+        out: Float = (1.0 - share) * self._motions[0] + share * self._motions[1]
+        out[:, 1] -= tangent.amplitude
+        return out
+
+    def _local(self, compliance: Float) -> Float:
+        """Return a compliance (2 c, 2 c) in the directions of the points; given (c, 2, c, 2), of an upright object."""
+        c = len(self.path.bases)
+        turned = rotated_delassus(compliance, self.path.bases @ vertical_frame(2).T, np.arange(c))
+        return np.asarray(turned.reshape(2 * c, 2 * c))
+
+    def _moved_path(self, k: int, t: float) -> ExactPath:
+        move = self.path.move
+        start, end = (moved_pose(p, t * m[k]) for p, m in zip((move.start, move.end), self._motions, strict=True))
+        return replace(self.path, move=Move(start, end))
+
+    def _at_event(self, piece: int, event: Event) -> PathTangent:
+        """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""
+        before, last = self._events[piece], self._tangents[piece]
+        way = event.share - before.share
+        if way <= _SAME_PLACE:
+            return self._at_touch(event, last) if event.amplitude > before.amplitude else last
+        force, moved = event.state.force - before.state.force, _relative(event.state) - _relative(before.state)
+        if way <= _JUMP and np.abs(force).max() > _JUMP * np.abs(event.state.force).max():
+            raise Finger3dError("the forces jump on the path of this press, and have no derivatives there")
+        found = self._solved(piece, event)
+        if piece + 1 == len(self.path.events):
+            return found
+        old, new = event.state.status, self.path.events[piece + 1].state.status
+        points = np.flatnonzero((old != new) & ((old != SLIP) | (new == OPEN)))
+        if not len(points):
+            return found
+        change, rate = (
+            self._margin(old[points[0]], new[points[0]], event.state.force[points[0]], *both)
+            for both in (
+                (found.force[:, points[0]], found.displacement[:, points[0]], self._mu),
+                (force[None, points[0]] / way, moved[None, points[0]] / way, np.zeros(1)),
+            )
+        )
+        share = -change / rate
+        return PathTangent(
+            found.force + share[:, None, None] * (force / way),
+            found.displacement + share[:, None, None] * (moved / way),
+            share,
+            found.amplitude + share * (event.amplitude - before.amplitude) / way,
+        )
+
+    def _margin(self, old: int, new: int, at: Float, force: Float, moved: Float, mu: Float) -> Float:
+        """Return the change (p,) of what vanishes as a point leaves its set, by changes (p, 2) of its state."""
+        if old == OPEN:
+            return moved[:, 0]
+        if new == OPEN:
+            return force[:, 0]
+        own = self.path.problem.model.friction.mu
+        return np.asarray(own * force[:, 0] + mu * at[0] - np.sign(at[1]) * force[:, 1])
+
+    def _at_touch(self, event: Event, last: PathTangent) -> PathTangent:
+        """Return the derivatives where the object touches first, to which it moves before there is any force."""
+        point = int(np.argmin(event.state.gap))
+        closing = self.path.bases[:, :, 1]
+        amplitude = -last.displacement[:, point, 0] / closing[point, 0]
+        return replace(
+            last,
+            displacement=last.displacement + amplitude[:, None, None] * closing,
+            amplitude=last.amplitude + amplitude,
+        )
+
+    def _solved(self, piece: int, event: Event) -> PathTangent:
+        """Return the derivatives at a place within a piece of the path that itself does not move."""
+        status, force, last = event.state.status, event.state.force, self._tangents[piece]
+        c, count, share = len(status), len(self.variations), event.share
+        touches, sticks, slips = (np.flatnonzero(m) for m in (status != OPEN, status == STICK, status == SLIP))
+        sign = np.zeros(c)
+        slid = _relative(event.state)[:, 1] - _relative(self._events[piece].state)[:, 1]
+        sign[slips] = np.sign(np.where(force[:, 1] != 0.0, force[:, 1], -slid))[slips]
+        base = np.zeros((count, c, 2))
+        base[:, slips, 1] = (self._mu[:, None] * (sign * force[:, 0]))[:, slips]
+        fixed = replace(last, amplitude=np.zeros(count))
+        free = -np.einsum("cak,pk->pca", self.path.bases, self.motion(fixed, share))
+        for k, change in enumerate(self._changes):
+            if change is not None:
+                free[k] += (change @ force.ravel()).reshape(c, 2)
+        free += (base.reshape(count, -1) @ self._delassus.T).reshape(base.shape)
+        rows = np.concatenate([2 * touches, 2 * sticks + 1])
+        unknowns = sp.csr_array(
+            (
+                np.concatenate([np.ones(len(rows)), self.path.problem.model.friction.mu * sign[slips]]),
+                (
+                    np.concatenate([rows, 2 * slips + 1]),
+                    np.concatenate([np.arange(len(rows)), np.searchsorted(touches, slips)]),
+                ),
+            ),
+            shape=(2 * c, len(rows)),
+        )
+        through = self._delassus @ unknowns
+        target = np.zeros((count, c, 2))
+        target[:, sticks, 1] = last.displacement[:, sticks, 1]
+        matrix, right = through[rows], (target - free).reshape(count, -1)[:, rows]
+        motion = np.zeros((2 * c, 0))
+        if self._weights is not None:
+            motion = self.path.bases[:, :, 1].reshape(-1, 1)
+            resultant = unknowns.T @ self._weights.ravel()
+            wanted = (1.0 - share) * self._force_slopes[0] + share * self._force_slopes[1]
+            wanted = wanted - np.einsum("ca,pca->p", self._weights, base)
+            matrix = np.block([[matrix, motion[rows]], [resultant[None], np.zeros((1, 1))]])
+            right = np.column_stack([right, wanted])
+        solved = np.linalg.solve(matrix, right.T) if len(matrix) else np.zeros((0, count))
+        own, amplitude = solved[: len(rows)], solved[len(rows) :]
+        moved = free + (through @ own + motion @ amplitude).T.reshape(count, c, 2)
+        still = np.zeros(count)
+        return PathTangent(
+            base + (unknowns @ own).T.reshape(count, c, 2), moved, still, amplitude[0] if len(amplitude) else still
+        )
+
+
+def _relative(state: ContactState) -> Float:
+    """Return gap and tangential displacement (c, 2)."""
+    return np.column_stack([state.gap, state.tangential_displacement])
+
+
+def moved_pose(pose: ObjectPose, motion: Float) -> ObjectPose:
+    return replace(pose, slide_x_mm=pose.slide_x_mm + float(motion[0]), depth_mm=pose.depth_mm - float(motion[1]))

@@ -1,0 +1,77 @@
+"""Derivatives of presses, and their comparison with central differences of presses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import pytest
+
+from finger3d.contact.friction import Coulomb
+from finger3d.fem.solids.material import Isotropic
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.sensitivity import Numbers, derivatives, tangents
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.mechanics.small_strain.variations import Variation, variation
+
+STEP, DIFFERENCE = 1e-6, 2e-6
+
+
+def with_leg(model: Model, number: int, name: str) -> Callable[[float], Model]:
+    def changed(h: float) -> Model:
+        legs = list(model.legs)
+        legs[number] = replace(legs[number], **{name: getattr(legs[number], name) + h})
+        return replace(model, legs=tuple(legs))
+
+    return changed
+
+
+def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
+    """The model with each of its parameters changed by h."""
+    mu, nu, (gauge, other) = model.friction.mu, model.material.nu, model.gauges
+    found = {
+        "mu": lambda h: replace(model, friction=Coulomb(mu + h)),
+        "E": lambda h: replace(model, material=Isotropic(1.0 + h, nu)),
+        "nu": lambda h: replace(model, material=Isotropic(1.0, nu + h)),
+        "x": lambda h: replace(model, gauges=(replace(gauge, x_mm=gauge.x_mm + h), other)),
+        "angle": lambda h: replace(model, gauges=(replace(gauge, angle=gauge.angle + h), other)),
+    }
+    for number, leg in enumerate(model.legs):
+        found[f"goal {number}"] = with_leg(model, number, "depth_mm" if leg.force_N is None else "force_N")
+        if leg.slide_x_mm:
+            found[f"slide {number}"] = with_leg(model, number, "slide_x_mm")
+    return found
+
+
+def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[list[StepResult], list[list[Numbers]]]:
+    """All increments of a press, and the derivatives of their numbers by each parameter."""
+    found = [(step, derivatives(step, variations, sides)) for step, sides in tangents(problem, variations)]
+    return [step for step, _ in found], [slopes for _, slopes in found]
+
+
+def compare(problem: Problem, ways: Mapping[str, Callable[[float], Model]]) -> None:
+    """Compare all derivatives with central differences of presses, whose bodies are condensed again if they change."""
+    h = DIFFERENCE if problem.model.object.is_flat else 10.0 * DIFFERENCE  # curved contact is solved to 1e-9
+    variations = [variation(problem, way(-STEP), way(STEP), STEP) for way in ways.values()]
+    steps, slopes = differentiated(problem, variations)
+    values = [table_row(problem.points, step) for step in steps]
+    for k, (name, way) in enumerate(ways.items()):
+        ends = []
+        near = variation(problem, way(-h), way(h), h)
+        for end, t in zip(near.ends, (-h, h), strict=True):
+            other = build(way(t)) if near.body else end
+            ends.append((other, list(march(other))))
+        for number, (low, high) in enumerate(zip(*(found for _, found in ends), strict=True)):
+            assert (low.state.status == high.state.status).all()
+            rows = [table_row(p.points, step) for (p, _), step in zip(ends, (low, high), strict=True)]
+            for column, slope in slopes[number][k].items():
+                size = 1e-3 if column.startswith("gauge") else 0.1  # of numbers that are zero
+                largest = max(abs(slope), size, *(abs(row[column]) for row in values))
+                assert (rows[1][column] - rows[0][column]) / (2.0 * h) == pytest.approx(slope, abs=1e-6 * largest), (
+                    name,
+                    number,
+                    column,
+                )

@@ -1,0 +1,50 @@
+"""Derivatives of increments: against central differences of presses, where the active sets do not change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finger3d.contact.friction import Coulomb
+from finger3d.fem.solids.material import Isotropic
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Marker
+from finger3d.objects import Cylinder, Plane
+from tests.differences import compare, parameters
+from tests.models import block, small_section
+
+READINGS = {
+    "gauges": (Gauge("g", 0.7, 2.3, 0.2, 0.5), Gauge("l", -1.0, 1.5, 0.0, 0.3, length_mm=1.0)),
+    "markers": (Marker("m1", 0.5, 2.9),),
+}
+SOLID = block(symmetry=(), material=Isotropic(1.0, 0.3), mesh=MeshOptions(1.0, 1.5, "swept"), **READINGS)
+TILTED = replace(SOLID, object=Plane(tilt=0.03))
+SLIDE = (
+    Leg(0.3, steps=2),
+    Leg(0.3, slide_x_mm=0.05, slide_z_mm=0.02, steps=2),
+    Leg(0.1, slide_x_mm=0.05, slide_z_mm=0.02, steps=1),
+)
+FORCE = (Leg(0.3, force_N=1.0, steps=2), Leg(0.3, slide_x_mm=0.1, force_N=1.2, steps=1))
+CASES = {
+    "plane": replace(TILTED, legs=(Leg(0.3, steps=2),)),
+    "slide": replace(TILTED, legs=SLIDE, friction=Coulomb(0.3)),
+    "force": replace(TILTED, legs=FORCE),
+    "ball": replace(SOLID, legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.2, steps=2))),
+    "bar": small_section(object=Cylinder(radius_mm=3.0, axis="z"), symmetry=(), legs=(Leg(0.4, steps=3),)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_derivative_is_that_of_presses(case: str) -> None:
+    model = CASES[case]
+    ways, thing = parameters(model), model.object
+    if hasattr(thing, "radius_mm"):
+        ways["radius"] = lambda h: replace(model, object=replace(thing, radius_mm=thing.radius_mm + h))
+        ways["place"] = lambda h: replace(model, object=replace(thing, x_mm=thing.x_mm + h))
+    else:
+        ways["tilt"] = lambda h: replace(model, object=replace(thing, tilt=thing.tilt + np.deg2rad(h)))
+    compare(build(model), ways)
