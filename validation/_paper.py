@@ -32,9 +32,6 @@ Float = NDArray[np.float64]
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 NUS = (0.3, 0.45, 0.49)
 STRESS, STRAIN = "plane stress", "plane strain"
-STEPS, QUICK_STEPS = 160, 10
-"""Increments where strains are compared between coefficients of friction; the paper's .1 mm leaves too large an error
-there (calibration_z_scores.py)."""
 BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
 PAPER = "Maeno 2004"
 
@@ -80,26 +77,6 @@ def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = N
     if not frames[-1].outcome.ok:
         raise AssertionError(f"mu = {law.mu:g}, {frames[-1].target}: {frames[-1].outcome}")
     return frames
-
-
-def settled(problem: Problem, friction: FrictionLaw | float, quick: bool = False) -> tuple[StepResult, StepResult]:
-    """Last frames with enough increments and with half as many, for strains that are compared between coefficients.
-
-    The error of the strain falls as 1 / increments, so that of the first is what the second changes.
-    """
-    steps = QUICK_STEPS if quick else STEPS
-    fine, half = (under(problem, friction, n)[-1] for n in (steps, steps // 2))
-    return fine, half
-
-
-def steps_row(what: str, error: Float, change: float, quick: bool = False) -> Row:
-    """The largest of the errors by increments over the change of the strain that a study judges."""
-    steps = QUICK_STEPS if quick else STEPS
-    text = f"{what}: largest error by {steps} increments, over its largest change with mu"
-    share = float(np.abs(error).max() / change)
-    return Row(
-        text, f"{steps // 2} increments", 0.05, share, 0.0, "small compared with the signal", "statement", "at most"
-    )
 
 
 @dataclass(frozen=True)

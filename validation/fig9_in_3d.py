@@ -2,7 +2,8 @@
 
 Source: Maeno 2004; Sec. III computes plane strain, Sec. IV builds the finger 20 mm wide and presses it 10 mm.  The
 statements about Figs. 10 to 12 are tested on the solid with free end faces, at nu = 0.45 and 0.49.  Like the paper, the
-study uses small strain; large deformation changes the results by as much again.
+study uses small strain; large deformation changes the results by as much again.  The solid is pressed in 40
+increments: in ten, f_t has a peak at the points that came into contact first in each of them.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from .fig12_gauge_angles import ANGLES, gauges, statements
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)
+STEPS = {SOLID: 40, STRAIN: 1, STRESS: 1}
 
 
 def run(quick: bool) -> Result:
@@ -46,7 +48,7 @@ def run(quick: bool) -> Result:
     for nu in nus:
         for plane in PLANES:
             problem = fig9(nu, plane, size, [*line(x, design, BELOW_FIG9), *gauges()])
-            frames = [under(problem, mu)[-1] for mu in MUS]
+            frames = [under(problem, mu, STEPS[plane])[-1] for mu in MUS]
             shear[plane, nu] = np.array([strains(f, count)[2] for f in frames])
             gauge[plane, nu] = {t: np.array([f.gauges[f"{BELOW_FIG9}:{t}"] for f in frames]) for t in ANGLES}
             middle[plane, nu] = [Profile.of(problem, f) for f in frames]
@@ -72,7 +74,7 @@ def _checks(nu: float, size: float, numbers: dict) -> list[Row]:
     coarse = fig9(nu, SOLID, 1.5 * size)
     held = fig9(nu, SOLID, size)
     held = build(replace(held.model, held_ends=True))
-    found = [measure(p.points, under(p, 0.25)[-1])["normal_force_N"] / 20.0 for p in (coarse, held)]
+    found = [measure(p.points, under(p, 0.25, STEPS[SOLID])[-1])["normal_force_N"] / 20.0 for p in (coarse, held)]
     here = f"N per mm, mu = .25, nu = {nu:g}"
     what = f"force, 20 mm wide, edges of {1.5 * size:g} mm against {size:g} mm, {here}"
     why = "singular corners of the base: order 1.2"
