@@ -214,7 +214,7 @@ def _draw(figure: Any, lifts: list[Lift]) -> None:
     acted = [x for x in lifts if math.isfinite(x.normal)]
     mu, noise, ratio, slips = (np.array([getattr(x, k) for x in acted]) for k in ("mu", "noise", "ratio", "slips"))
     drawn = left.scatter(mu, ratio, c=1e3 * noise, s=14)
-    figure.colorbar(drawn, ax=left, label="standard deviation of the strain, 1e-3", pad=0.01)
+    figure.colorbar(drawn, ax=left, pad=0.01).ax.set_title("noise,\n1e-3", fontsize=8)
     for which, label in ((mu < SURE, f"mu below {SURE:g}"), (mu >= SURE, f"mu of {SURE:g} and more")):
         right.plot(1e3 * noise[which], ratio[which], "o", ms=4, label=label)
     for axes, x in ((left, mu), (right, 1e3 * noise)):
@@ -228,4 +228,4 @@ def _draw(figure: Any, lifts: list[Lift]) -> None:
         axes.legend(fontsize=8)
     held = f"{np.sum(~slips)} of {len(acted)} lifted without slip"
     left.set(xlabel="mu of the object", ylabel="normal force over the least", title=held)
-    right.set(xlabel="standard deviation of the strain, 1e-3")
+    right.set(xlabel="noise: standard deviation of the strain, 1e-3")
