@@ -33,7 +33,6 @@ from ._paper import columns
 from ._rows import Result, Row
 from .hard_cases import DEPTH, MU, finger
 
-BY_NAME = True
 STIFFER = 100.0
 LIMIT_S = 900.0
 RESULTS = Path(__file__).resolve().parent / "results"
