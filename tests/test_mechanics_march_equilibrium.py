@@ -7,17 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import STICK, Coulomb
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Leg
-from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held, numbers, pressed
 from tests.models import block, marched
+from validation import cattaneo_mindlin
 
 
 @pytest.mark.parametrize("shape", [Plane(), Sphere(radius_mm=4.0)], ids=["plane", "ball"])
@@ -47,6 +50,49 @@ def test_a_flat_contact_slips_as_a_whole_at_mu_times_the_normal_force(domain: st
     assert [step.outcome.ok for step in steps] == [True, True, True, False]
     assert steps[-1].outcome is Outcome.SLIPS
     assert steps[-1].detail == f"{asked:.6g} N asked; the contact holds at most {MU * N:.9g} N, 100 % of it"
+
+
+def test_a_cylinder_held_by_forces_sticks_as_one_that_is_slid() -> None:
+    """The problem of Cattaneo and Mindlin, whose stick zone `validation.cattaneo_mindlin` compares with theirs."""
+    problem = cattaneo_mindlin.problem(10)
+    depth, mu = cattaneo_mindlin.DEPTH, cattaneo_mindlin.MU
+    legs = (Leg(depth, steps=3), Leg(depth, mu * depth, steps=4), Leg(depth, -mu * depth, steps=4))
+    by_slide = _measured(problem, legs)
+    assert 0.4 * mu < by_slide[-1][1]["force_x_N"] / -by_slide[-1][1]["normal_force_N"] < mu
+    forces = [(found["normal_force_N"], found["force_x_N"]) for _, found in by_slide]
+    press = [Leg(depth * (k + 1) / 3, steps=1) for k in range(3)]
+    by_force = _measured(problem, (*press, *(Leg(depth, steps=1, force_N=n, force_x_N=x) for n, x in forces[3:])))
+    for (one, found), (other, again) in zip(by_slide, by_force, strict=True):
+        np.testing.assert_array_equal(one.state.status == STICK, other.state.status == STICK)
+        np.testing.assert_allclose(other.state.force, one.state.force, rtol=0.0, atol=1e-8 * found["normal_force_N"])
+        assert again["depth_mm"] == pytest.approx(found["depth_mm"], rel=1e-8)
+        assert again["slide_x_mm"] == pytest.approx(found["slide_x_mm"], abs=1e-8 * mu * depth)
+        assert again["stick_area_mm2"] == pytest.approx(found["stick_area_mm2"], rel=1e-8)
+        assert again["dissipation_mJ"] == pytest.approx(found["dissipation_mJ"], rel=1e-8, abs=1e-12)
+
+
+def _measured(problem: Problem, legs: tuple[Leg, ...]) -> list[tuple[StepResult, dict[str, float]]]:
+    model = replace(problem.model, legs=legs, friction=Coulomb(cattaneo_mindlin.MU))
+    steps = marched(replace(problem, model=model))
+    return [(step, measure(problem.points, step)) for step in steps]
+
+
+def test_a_resolved_ball_slips_at_mu_times_the_normal_force() -> None:
+    """Within the square of the largest tilt a/R of the normals."""
+    radius, force = 20.0, 0.5
+    press = Leg(0.1, steps=1, force_N=force)
+    shape = {"half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 8.0}
+    ball = block(
+        design=designs()["block"](**shape), mesh=MeshOptions(0.5, 1.5, "swept"), object=Sphere(radius_mm=radius)
+    )
+    steps, found = pressed(replace(ball, legs=(press, replace(press, force_x_N=0.99 * MU * force, steps=2))))
+    assert [step.outcome.ok for step in steps] == [True, True, True]
+    tolerance = found[-1]["contact_area_mm2"] / np.pi / radius**2
+    steps, _ = pressed(replace(ball, legs=(press, replace(press, force_x_N=1.01 * MU * force, steps=2))))
+    assert steps[-1].outcome is Outcome.SLIPS
+    told = float(steps[-1].detail.split("at most ")[1].split(" N")[0])
+    assert told == pytest.approx(MU * force, rel=tolerance)
+    assert tolerance < 0.01
 
 
 def test_a_ball_slips_at_its_limit() -> None:

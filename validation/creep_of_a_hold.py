@@ -1,0 +1,202 @@
+"""How far does an object of 45 g creep in a minute between two pads that press it with 12 N, at mu = 1?
+
+Each pad carries half of the weight, 0.22 N, under a limit of 12 N.  finger3d: one pad, a cube of 20 mm, E = 1 MPa and
+nu = 0.45, fixed behind, is pressed on a plane with 12 N, then loaded with 0.22 N, then held for 60 s in 60 increments;
+without viscosity nothing depends on time.  The creep is the largest change in the hold of the depth, a slide, or the
+gap, slip or displacement of a contact point.
+
+MuJoCo, with default settings unless the table says otherwise (Newton's solver, Euler, a time step of 2 ms, solref
+0.02 1, solimp 0.9 0.95 0.001 0.5 2), but with the elliptic cone, which is Coulomb's: a free box of 40 x 40 x 120 mm and
+45 g, gravity 9.81 m/s2 along -z, between two cubes of 20 mm and 1 kg on slide joints along x, each pushed by a motor
+with 12 N; sliding friction 1, condim 3; each pad touches in 4 points from the start.  The creep is the fall of the
+object from t = 1 s, when all is settled, to 61 s.  These choices favour MuJoCo: light pads, and ellipsoids, which touch
+in one point each, creep more; both are in the table, with a longer box that they do not leave, as are other time steps
+and ratios of the impedance of friction to that of normal forces (impratio).
+
+That creep is no error of MuJoCo: friction is a soft constraint there.  Its documentation (Computation, Solver
+parameters) gives the velocity at which a contact that carries the friction f creeps, v = R f / b, with
+R = (1 - d) A / (d impratio), A the sum of the inverse masses of both bodies, b = 2 / (0.95 * 0.02 s), and d the
+impedance, 0.95 where the overlap is above 1 mm.  It does not depend on the time step.  The post-solver that
+noslip_iterations turns on is meant to remove the creep.  Both pads and objects of MuJoCo are rigid bodies with soft
+contacts, those of finger3d an elastic body on a rigid plane.  Where MuJoCo is not installed the committed results are
+judged.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.friction import Coulomb
+from finger3d.errors import MissingError
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+
+from ._paper import columns
+from ._rows import Result, Row
+from .held_weights import largest_change
+
+MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
+LOAD = 0.5 * MASS * G
+DOCS = "MuJoCo documentation, Computation, Solver parameters"
+COLUMNS = "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min"
+TEXT = ("program", "pads")
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A model of MuJoCo: pads and their mass (kg), half the object's length (m), and settings of the solver."""
+
+    pads: str = "box"
+    pad_kg: float = 1.0
+    step_s: float = 0.002
+    impratio: float = 1.0
+    noslip: int = 0
+    half_length_m: float = 0.06
+
+    def xml(self) -> str:
+        """The model as MuJoCo reads it."""
+        geom = f'<geom type="{self.pads}" size=".01 .01 .01" mass="{self.pad_kg}" friction="{MU}"/>'
+        return f"""<mujoco>
+<option cone="elliptic" timestep="{self.step_s}" impratio="{self.impratio}" noslip_iterations="{self.noslip}"/>
+<worldbody>
+<body><freejoint/>
+<geom type="box" size=".02 .02 {self.half_length_m}" mass="{MASS}" friction="{MU}"/></body>
+<body pos="-.03 0 0"><joint name="left" type="slide" axis="1 0 0"/>{geom}</body>
+<body pos=".03 0 0"><joint name="right" type="slide" axis="-1 0 0"/>{geom}</body>
+</worldbody>
+<actuator><motor joint="left"/><motor joint="right"/></actuator>
+</mujoco>"""
+
+    def formula(self) -> float:
+        """Creep by the documentation, mm a minute, with the load equal on all contacts, each above 1 mm deep."""
+        contacts = 8 if self.pads == "box" else 2
+        inverse = 1.0 / MASS + 1.0 / self.pad_kg
+        return 60e3 * (1.0 - 0.95) / 0.95 * inverse / self.impratio * MASS * G / contacts / (2.0 / (0.95 * 0.02))
+
+
+LONG = 0.2
+GRIPS = (
+    Grip(),
+    Grip(noslip=10),
+    *(Grip(step_s=s) for s in (0.0005, 0.001, 0.004)),
+    *(Grip(impratio=r) for r in (10.0, 100.0)),
+    Grip(impratio=10.0, noslip=10),
+    *(Grip(pad_kg=kg, half_length_m=LONG) for kg in (0.02, 10.0)),
+    Grip("ellipsoid", half_length_m=LONG),
+    Grip("ellipsoid", half_length_m=LONG, noslip=10),
+)
+
+
+def mujoco_creep(grip: Grip, seconds: float) -> tuple[float, int]:
+    """Fall (mm a minute) of the object in a time that begins at 1 s, and the number of contacts at its end."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(grip.xml())
+    data = mujoco.MjData(model)
+    data.ctrl[:] = NORMAL
+    per_second = round(1.0 / grip.step_s)
+    mujoco.mj_step(model, data, per_second)
+    start = float(data.qpos[2])
+    mujoco.mj_step(model, data, round(seconds * per_second))
+    return 1e3 * (start - float(data.qpos[2])) * 60.0 / seconds, int(data.ncon)
+
+
+def finger3d_creep(size: float, increments: int) -> float:
+    """Largest change in the hold, mm."""
+    pad = designs()["block"](half_length_mm=10.0, height_mm=20.0, width_mm=20.0)
+    press = Leg(1.0, steps=2, duration_s=1.0, force_N=NORMAL)
+    load = Leg(1.0, steps=2, duration_s=1.0, force_N=NORMAL, force_x_N=LOAD)
+    hold = Leg(1.0, steps=increments, duration_s=HOLD_S, force_N=NORMAL, force_x_N=LOAD)
+    mesh = MeshOptions(size, 2.0 * size, "swept")
+    problem = build(Model(pad, Isotropic(1.0, 0.45), mesh, (press, load, hold), friction=Coulomb(MU)))
+    steps = list(march(problem))
+    assert all(step.outcome.ok for step in steps)
+    return largest_change(problem, steps[3:])
+
+
+def run(quick: bool) -> Result:
+    """Quick: a coarse pad, and 2 s of two of MuJoCo's models."""
+    ours = finger3d_creep(5.0 if quick else 2.5, 6 if quick else 60)
+    if importlib.util.find_spec("mujoco") is None:
+        theirs = _committed()
+    else:
+        theirs = [_line(grip, *mujoco_creep(grip, 2.0 if quick else HOLD_S)) for grip in GRIPS[: 2 if quick else None]]
+    lines = [("finger3d", "block, E = 1 MPa", 0.0, 0.0, 0.0, 0.0, 0.0, ours, 0.0), *theirs]
+    table = columns(COLUMNS, lines)
+    return Result(tuple(_rows(ours, theirs)), table, lambda figure: _draw(figure, table))
+
+
+def _line(grip: Grip, creep: float, contacts: int) -> tuple[Any, ...]:
+    formula = np.nan if grip.noslip else grip.formula()
+    shown = 1e3 * grip.step_s, grip.impratio, float(grip.noslip), float(contacts)
+    return "MuJoCo", grip.pads, grip.pad_kg, *shown, creep, formula
+
+
+def _committed() -> list[tuple[Any, ...]]:
+    """MuJoCo's lines of the committed table, with a word of why."""
+    path = Path(__file__).resolve().parent / "results" / "creep_of_a_hold_table.csv"
+    how = "pip install mujoco, or the extra dev"
+    if not path.is_file():
+        raise MissingError(f"creep_of_a_hold: needs MuJoCo, and there are no committed results; {how}")
+    print(f"creep_of_a_hold: MuJoCo is not installed ({how}); the committed results stay", file=sys.stderr)
+    with path.open(newline="", encoding="utf-8") as stream:
+        lines = [line for line in csv.DictReader(stream) if line["program"] == "MuJoCo"]
+    return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
+
+
+def _rows(ours: float, theirs: list[tuple[Any, ...]]) -> list[Row]:
+    t = [dict(zip(COLUMNS.split(), line, strict=True)) for line in theirs]
+    default, noslip = t[0], t[1]
+    soft = [line for line in t if not line["noslip_iterations"]]
+    ratios = [line["creep_mm_per_min"] / line["formula_mm_per_min"] for line in soft]
+    here = "MuJoCo, default settings"
+    found = [
+        Row("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours, 0.0,
+            "a bound above round-off", measure="at most"),
+        Row(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], 0.0, "a micron",
+            "sensitivity", "at least"),
+        Row("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}", default["creep_mm_per_min"],
+            abs(noslip["creep_mm_per_min"]), 0.0, "what it is made for", "sensitivity", "at most"),
+        Row(f"creep of MuJoCo over v = R f / b, models without noslip: {len(soft)}, furthest from 1", DOCS, 1.0,
+            ratios[int(np.argmax(np.abs(np.array(ratios) - 1.0)))], 0.01, "overlap and load of all contacts are equal"),
+    ]  # fmt: skip
+    steps = [line["creep_mm_per_min"] for line in soft if line["time_step_ms"] != default["time_step_ms"]]
+    if steps:
+        away = max(abs(creep / default["creep_mm_per_min"] - 1.0) for creep in steps)
+        found.append(
+            Row("change of that creep with time steps of 0.5, 1 and 4 ms, largest", f"{DOCS}: none", 0.0, away, 1e-3,
+                "the formula has no time step", "sensitivity", "absolute")
+        )  # fmt: skip
+    return found
+
+
+def _label(line: tuple[Any, ...]) -> str:
+    program, pads, kg, step, ratio, noslip, *_ = line
+    if program == "finger3d":
+        return "finger3d"
+    usual = {"pads": "box", "kg": 1.0, "step": 2.0, "impratio": 1.0, "noslip": 0.0}
+    now = {"pads": pads, "kg": kg, "step": step, "impratio": ratio, "noslip": noslip}
+    units = {"pads": "{} pads", "kg": "pads of {:g} kg", "step": "step {:g} ms", "impratio": "impratio {:g}",
+             "noslip": "noslip {:g}"}  # fmt: skip
+    changed = [units[k].format(v) for k, v in now.items() if v != usual[k]]
+    return ", ".join(["MuJoCo", *(changed or ["default"])])
+
+
+def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
+    """Creep of every model on a logarithmic axis, on which finger3d's round-off is seen too."""
+    axes = figure.subplots()
+    lines = list(zip(*table.values(), strict=True))[::-1]
+    creep = np.maximum(np.abs([line[COLUMNS.split().index("creep_mm_per_min")] for line in lines]), 1e-16)
+    bars = axes.barh([_label(line) for line in lines], creep, left=0.0, color=["C1"] * (len(lines) - 1) + ["C0"])
+    axes.bar_label(bars, [f" {value:.0f}" if value >= 10.0 else f" {value:.2g}" for value in creep], fontsize=8)
+    axes.set(xscale="log", xlim=(1e-16, 1e5), xlabel="creep in a minute (mm): 45 g held with 12 N, mu = 1")

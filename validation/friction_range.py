@@ -1,0 +1,161 @@
+"""Over which range of mu do increments settle, and how far does a hold creep, here, by the paper's rule and in peers?
+
+finger3d and the paper's rule: the increments of all histories of hard_cases.py, read from its committed table; those of
+the paper's rule count up to its first cycle.  CalculiX 2.20: the deck that `finger3d export --solver calculix` writes
+for the Fig. 9 section of hard_cases.py (4 mm, nu = 0.45, E = 1 MPa, plane strain), pressed 10 mm in ten increments,
+which it may halve; what counts is the share of the press that is done when it ends.  Its penalty contact needs a stick
+slope, the shear stress over the displacement of a point that sticks.  The deck's is 8 MPa/mm, with which the shear
+stress of 0.11 MPa at mu = 1 moves a sticking point by 0.014 mm; it is raised a hundred times, to 800 MPa/mm, to come
+nearer to points that do not move.  The creep is that of creep_of_a_hold.py, from its committed table.  Where ccx is not
+installed the committed results are judged.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.analyses.calculix.deck import printed_forces, program, solve
+from finger3d.analyses.calculix.press import press_deck
+from finger3d.contact.friction import Coulomb
+from finger3d.errors import MissingError
+from finger3d.mechanics.model import Leg
+
+from ._paper import columns
+from ._rows import Result, Row
+from .hard_cases import DEPTH, MU, finger
+
+STIFFER = 100.0
+LIMIT_S = 900.0
+RESULTS = Path(__file__).resolve().parent / "results"
+COLUMNS = "mu increments settled paper_settled calculix_share calculix_stiff_share"
+SHOWN = {  # pads, impratio, noslip_iterations of creep_of_a_hold
+    "MuJoCo,\ndefault": ("box", 1.0, 0.0),
+    "MuJoCo,\nimpratio 10": ("box", 10.0, 0.0),
+    "MuJoCo,\nnoslip 10": ("box", 1.0, 10.0),
+    "MuJoCo, noslip\n10, ellipsoids": ("ellipsoid", 1.0, 10.0),
+}
+
+
+def committed(name: str) -> list[dict[str, str]]:
+    """Lines of the committed table of a study."""
+    path = RESULTS / f"{name}_table.csv"
+    if not path.is_file():
+        raise MissingError(f"friction_range: needs the results of {name}; run python -m validation {name}")
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def share_done(mu: float, stiffer: float) -> float:
+    """Share of the press that CalculiX has done when it ends."""
+    model = replace(finger(2, 0.45, 4.0).model, friction=Coulomb(mu), legs=(Leg(DEPTH, steps=10),))
+    deck = replace(press_deck(model).deck, fields=False)
+    contact = replace(deck.contact, stick=stiffer * deck.contact.stick)
+    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
+        file = Path(folder) / "press.inp"
+        file.write_text(replace(deck, contact=contact).text(), encoding="ascii")
+        try:
+            solve(file, LIMIT_S)
+        except RuntimeError:
+            pass  # it gave up, which is what is measured: the forces printed so far say how far it came
+        times, _ = printed_forces(file.with_suffix(".dat"))
+    return float(times[-1]) if len(times) else 0.0
+
+
+def run(quick: bool) -> Result:
+    """Quick: CalculiX at one mu only, as the deck is."""
+    theirs = _calculix(quick)
+    lines = [(*_counted(mu), *theirs.get(mu, (np.nan, np.nan))) for mu in MU]
+    table = columns(COLUMNS, lines)
+    creeps = _creeps()
+    return Result(tuple(_rows(table, creeps)), table, lambda figure: _draw(figure, table, creeps))
+
+
+def _counted(mu: float) -> tuple[float, int, int, int]:
+    chosen = [line for line in committed("hard_cases") if float(line["mu"]) == mu]
+    increments, settled, paper = (sum(int(x[k]) for x in chosen) for k in ("increments", "settled", "paper_settled"))
+    return mu, increments, settled, paper
+
+
+def _calculix(quick: bool) -> dict[float, tuple[float, float]]:
+    """Shares by mu, with the deck's stick slope and the stiffer one."""
+    if quick and program() is not None:
+        return {0.25: (share_done(0.25, 1.0), np.nan)}
+    if program() is not None:
+        return {mu: (share_done(mu, 1.0), share_done(mu, STIFFER)) for mu in MU}
+    lines = committed("friction_range")
+    print(
+        "friction_range: ccx is not installed (apt install calculix-ccx); the committed results stay", file=sys.stderr
+    )
+    return {float(x["mu"]): (float(x["calculix_share"]), float(x["calculix_stiff_share"])) for x in lines}
+
+
+def _creeps() -> dict[str, float]:
+    """Creep in a minute, mm, by program and setting."""
+    lines = committed("creep_of_a_hold")
+    found = {"finger3d": float(next(x["creep_mm_per_min"] for x in lines if x["program"] == "finger3d"))}
+    keys = ("pad_kg", "time_step_ms", "impratio", "noslip_iterations")
+    for name, (pads, impratio, noslip) in SHOWN.items():
+        wanted = (1.0, 2.0, impratio, noslip)
+        match = (x for x in lines if x["pads"] == pads and tuple(float(x[k]) for k in keys) == wanted)
+        found[name] = abs(float(next(match)["creep_mm_per_min"]))
+    return found
+
+
+def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
+    total, settled, paper = (sum(table[k]) for k in ("increments", "settled", "paper_settled"))
+    here = f"{total} increments at mu = 0 to 1e6"
+
+    def least(what: str, tried: Sequence[float]) -> Row:
+        return Row(f"least share of the press that CalculiX does, {what}, {np.isfinite(tried).sum()} values of mu",
+                   "finger3d: 1", 1.0, float(np.nanmin(tried)), 0.0, "a bound", "sensitivity", "at most")  # fmt: skip
+
+    rows = [
+        Row(f"increments that settle, finger3d, of {here}", "hard_cases", total, settled, 0.0, "all"),
+        Row(f"the same by the paper's rule, of {here}", "hard_cases, finger3d", settled, paper, 0.0, "a bound",
+            "sensitivity", "at most"),
+        least("stick slope of its deck", table["calculix_share"]),
+        Row("creep of a hold in a minute, finger3d (mm)", "creep_of_a_hold", 1e-12, creeps["finger3d"], 0.0,
+            "a bound above round-off", measure="at most"),
+    ]  # fmt: skip
+    if np.isfinite(table["calculix_stiff_share"]).any():
+        rows.append(least("stick slope a hundred times that", table["calculix_stiff_share"]))
+    return rows
+
+
+def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+    names = [f"{mu:g}" for mu in table["mu"]]
+    t: dict[str, Float] = {k: np.array(v, dtype=float) for k, v in table.items()}
+    for share, style, size, label in (
+        (t["settled"] / t["increments"], "o-", 9, "finger3d"),
+        (t["calculix_share"], "v:", 4, "CalculiX, stick slope of its deck, 8 MPa/mm"),
+        (t["calculix_stiff_share"], "^:", 6, "CalculiX, stick slope 800 MPa/mm"),
+        (t["paper_settled"] / t["increments"], "s--", 6, "rule of the 2004 paper"),
+    ):
+        left.plot(names, 100.0 * share, style, ms=size, label=label)
+    left.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
+    left.legend(fontsize=8, loc="upper left")
+    left.set_title("increments that settle; CalculiX: share of the press", fontsize=10)
+    values = np.maximum(list(creeps.values()), 1e-16)
+    bars = right.bar(list(creeps), values, color=["C0"] + ["C4"] * (len(creeps) - 1))
+    right.bar_label(bars, [_told(v) for v in creeps.values()], fontsize=8)
+    right.set(yscale="log", ylim=(1e-16, 1e5), ylabel="creep in a minute (mm)")
+    right.tick_params(axis="x", labelsize=8)
+    right.set_title("object of 45 g held with 12 N, mu = 1", fontsize=10)
+    total, settled, paper = (int(t[k].sum()) for k in ("increments", "settled", "paper_settled"))
+    figure.supxlabel(
+        f"finger3d settles {settled} of {total} increments, the paper's rule {paper} up to its first cycles", fontsize=9
+    )
+
+
+def _told(mm: float) -> str:
+    return "0 (round-off)" if mm < 1e-12 else f"{mm:.2g}"
