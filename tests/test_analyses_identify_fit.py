@@ -22,6 +22,20 @@ def test_an_interval_follows_a_response_that_saturates() -> None:
     assert found.high[0] == 1.0
 
 
+def test_an_error_of_the_simulation_shifts_the_values_and_correlates_them() -> None:
+    scales = [Scale("a", 0.0, 1.0), Scale("b", 0.0, 2.0)]
+    slope = np.diag([100.0, 400.0])
+    found = uncertainty(
+        scales, np.array([0.5, 0.5]), slope, lambda v: slope @ (np.array([v[0], 0.5 * v[1]]) - np.array([0.5, 0.5]))
+    )
+    # an error of 3 deviations in both residuals: 3 / 100 of a, and 3 / 400 of the range of b
+    with_error = found.with_errors(scales, slope, np.array([[3.0, 3.0]]))
+    assert with_error.numerical == pytest.approx([0.03, 0.015], rel=2e-3)
+    assert with_error.stds == pytest.approx(np.hypot(found.stds, with_error.numerical))
+    assert with_error.correlation[0, 1] == pytest.approx(9.0 / 10.0, rel=2e-2)
+    assert with_error.high[0] - with_error.values[0] == pytest.approx(np.hypot(0.01, 0.03), rel=1e-2)
+
+
 def test_dependent_and_independent_values() -> None:
     scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
     assert scales[1].is_logarithmic

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import finger3d
+from finger3d.analyses.identify.fit import FittedValues
 from finger3d.errors import MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.results.journal import Journal
@@ -27,11 +28,18 @@ def scene_file(tmp_path: Path) -> Path:
     return written(tmp_path, scene(press=PRESS).to_toml())
 
 
+def noise_sds(fitted: FittedValues) -> np.ndarray:
+    """Standard deviations without the part of mesh and increments."""
+    return np.sqrt(fitted.stds**2 - fitted.numerical**2)
+
+
 def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:
     found = finger3d.identify(scene_file, bench(tmp_path / "bench.csv"), FREE, tmp_path / "out")
     for value, std, true in zip(found.fitted.values, found.fitted.stds, TRUE.values(), strict=True):
         assert value == pytest.approx(true, abs=4.0 * std)
-        assert std < 0.15 * true
+    for sd, true in zip(noise_sds(found.fitted), TRUE.values(), strict=True):
+        assert sd < 0.15 * true
+    assert (found.fitted.numerical > 0.0).all()
     assert found.notes == ()
     data = json.loads((tmp_path / "out" / "identify.json").read_text())
     assert data["values"]["friction.mu"]["value"] == found.fitted.values[1]
@@ -48,7 +56,8 @@ def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> N
     for seed in range(30):
         measured = bench(tmp_path / f"bench{seed}.csv", seed, stds=True)
         fitted = finger3d.identify(scene_file, measured, FREE, tmp_path / f"out{seed}").fitted
-        inside += [low <= t <= high for low, high, t in zip(fitted.low, fitted.high, TRUE.values(), strict=True)]
+        errors = np.abs(fitted.values - list(TRUE.values()))
+        inside += list(errors <= noise_sds(fitted))  # the benches have the mesh of the scene
     # a share of 60 has a standard deviation of 0.06
     assert np.mean(inside) == pytest.approx(0.683, abs=0.15)
 

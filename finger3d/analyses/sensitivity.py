@@ -130,7 +130,7 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
-    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if _has_derivative(key, value, problem)}
+    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if has_derivative(key, value, problem)}
     variations = [varied(scene, problem, key) for key in keys]
     *_, (step, sides) = tangents(problem, variations)
     values = table_row(problem.points, step)
@@ -174,7 +174,7 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
         yield from _numbers_of(child, f"{place}.{key}" if place else str(key))
 
 
-def _has_derivative(key: str, value: float, problem: Problem) -> bool:
+def has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
     flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
     if problem.dim == 2 and key.endswith("z_mm"):

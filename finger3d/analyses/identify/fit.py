@@ -8,14 +8,17 @@ a quarter of the range or more is a combination of values that the data do not d
 The response to friction saturates, so that the curvature at the solution may not hold one standard deviation away.
 Each value is therefore varied, and the others with it according to their covariance, until the sum of squares has
 increased by one: these are the ends of its 68 % interval, and the root mean square of their distances from the value
-is the reported standard deviation.
+is the standard deviation that the noise leaves.
+
+Errors b of the simulation shift the values by ``(J^T J)^-1 J^T b``.  Those of the mesh and of the increments are
+proportional to a column, and independent between columns.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
@@ -93,6 +96,7 @@ class FittedValues:
     correlation : (k, k)
     shares : (k,) of the ranges
     untold : remarks on values that the data do not determine, that are strongly correlated, or that are at a bound
+    numerical : (k,) standard deviations that errors of mesh and increments leave, a part of `stds`
     """
 
     values: Float
@@ -102,13 +106,46 @@ class FittedValues:
     correlation: Float
     shares: Float
     untold: tuple[str, ...]
+    numerical: Float
+
+    def with_errors(self, scales: Sequence[Scale], derivative: Float, errors: Float) -> FittedValues:
+        """Return the values with standard deviations to which errors of the simulation are added.
+
+        Parameters
+        ----------
+        derivative : (n, k) of the residuals by shares
+        errors : (m, n) standard deviations of m independent errors, each of which shifts all residuals at once
+        """
+        fisher = derivative.T @ derivative + 12.0 * np.eye(len(self.values))  # see `uncertainty`
+        slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, self.shares, strict=True)])
+        shifts = np.linalg.solve(fisher, derivative.T @ errors.T).T * slopes
+        numerical = np.linalg.norm(shifts, axis=0)
+        covariance = self.correlation * np.outer(self.stds, self.stds) + shifts.T @ shifts
+        stds = np.sqrt(np.diag(covariance))
+        ends = [
+            np.hypot(side, numerical) * sign + self.values
+            for side, sign in ((self.values - self.low, -1.0), (self.high - self.values, 1.0))
+        ]
+        bounds = np.array([[scale.low, scale.high] for scale in scales]).T
+        low, high = (np.clip(end, *bounds) for end in ends)
+        correlation = covariance / np.outer(stds, stds)
+        return replace(self, stds=stds, low=low, high=high, correlation=correlation, numerical=numerical)
 
 
 Residuals = Callable[[Float], Float]
 """Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
 
+Slopes = Callable[[Float], "Float | None"]
+"""Derivatives (n, k) of the residuals by the values; None where they are not known."""
 
-def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, announce: Callable[[Float], None]) -> Float:
+
+def fit(
+    scales: Sequence[Scale],
+    start: Float,
+    residuals: Residuals,
+    slopes: Slopes,
+    announce: Callable[[Float], None],
+) -> Float:
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
 
     `announce` is called with the values of each iteration.
@@ -123,7 +160,7 @@ def fit(scales: Sequence[Scale], start: Float, residuals: Residuals, announce: C
 
     def slope(shares: Float) -> Float:
         announce(values_at(scales, shares))
-        return jacobian(scales, shares, residuals)
+        return jacobian(scales, shares, residuals, slopes)
 
     inside = np.clip(start, _INSIDE, 1.0 - _INSIDE)
     found = optimize.least_squares(
@@ -137,8 +174,11 @@ def values_at(scales: Sequence[Scale], shares: Float) -> Float:
     return np.array([scale.value(float(share)) for scale, share in zip(scales, shares, strict=True)])
 
 
-def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals) -> Float:
-    """Return the derivatives (n, k) of residuals by shares, central differences within the bounds."""
+def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, slopes: Slopes) -> Float:
+    """Return the derivatives (n, k) of residuals by shares; central differences where those by values are not known."""
+    known = slopes(values_at(scales, shares))
+    if known is not None:
+        return known * [scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)]
     columns = []
     for i in range(len(scales)):
         ends = [float(np.clip(shares[i] + step, 0.0, 1.0)) for step in (-_STEP, _STEP)]
@@ -163,7 +203,8 @@ def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, resid
         *_bound(scales, shares),
     ]
     stds = np.sqrt(np.mean((ends - values[:, None]) ** 2, axis=1))
-    return FittedValues(values, stds, ends[:, 0], ends[:, 1], correlation, shares, tuple(told))
+    none = np.zeros(len(scales))
+    return FittedValues(values, stds, ends[:, 0], ends[:, 1], correlation, shares, tuple(told), none)
 
 
 def _interval(

@@ -33,10 +33,11 @@ from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 
-DEVIATIONS = (
-    "of the noise of the data alone; errors of the mesh and of the increments come on top: fit on a finer mesh, too"
-)
+DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
 """What the standard deviations of an identification contain."""
+
+_BAR = 1.645
+"""Error bar over the standard deviation of the error: nine of ten errors are within a bar."""
 
 _SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
@@ -85,6 +86,7 @@ class Identification:
                 key: {
                     "value": float(fitted.values[i]),
                     "std": float(fitted.stds[i]),
+                    "std_numerical": float(fitted.numerical[i]),
                     "low": float(fitted.low[i]),
                     "high": float(fitted.high[i]),
                 }
@@ -199,6 +201,10 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         simulated = simulation.at(values, data)
         return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
 
+    def slopes(values: Float) -> Float | None:
+        found = simulation.slopes(values, data)
+        return None if found is None else np.concatenate([found[n] / stds[n][:, None] for n in data.columns])
+
     def announce(values: Float) -> None:
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
@@ -206,17 +212,27 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
     costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
     shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
-    shares = fit(scales, shares, residuals, announce)
+    shares = fit(scales, shares, residuals, slopes, announce)
     weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     if weighted:
         stds |= weighted
-        shares = fit(scales, shares, residuals, announce)
+        shares = fit(scales, shares, residuals, slopes, announce)
         stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     values = values_at(scales, shares)
-    fitted = uncertainty(scales, shares, jacobian(scales, shares, residuals), residuals)
+    derivative = jacobian(scales, shares, residuals, slopes)
+    report.stage("errors of mesh and increments")
+    fitted = uncertainty(scales, shares, derivative, residuals)
     simulated = simulation.at(values, data)
+    bars = simulation.errors(values)
+    unknown = sorted(set(data.columns) - set(bars))
+    errors = np.zeros((len(data.columns), data.count))
+    for k, name in enumerate(data.columns):
+        rows = slice(k * len(data.at), (k + 1) * len(data.at))
+        errors[k, rows] = bars.get(name, 0.0) / _BAR * simulated[name] / stds[name]
+    fitted = fitted.with_errors(scales, derivative, errors)
     reduced = _reduced_chi_square(data, simulated, len(scales))
-    notes = [*fitted.untold, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
+    missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
+    notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
     return Identification(
         scene=simulation.scene(values),
         keys=tuple(f.key for f in simulation.free),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,19 +14,23 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float, Tree, TreeView
+from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
-from finger3d.analyses.pressed_body import PressedBody
+from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.sensitivity import has_derivative, varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
+from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
 from finger3d.mechanics.results.history import table_row
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
-from finger3d.scene import Scene
+from finger3d.scene import Scene, tree
 
 OFFSET = "depth_offset_mm"
 """Key that is added to the measured depth; it needs no solution of its own."""
@@ -47,6 +52,9 @@ _UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
 """Last parts of the names of numbers of an increment."""
 
 _MAX_STORED = 4  # bodies
+
+_STEP, _LEAST = 1e-5, 0.1
+"""Step of central differences of interpolated curves, over the value or over `_LEAST` if that is larger."""
 
 Curve = Mapping[str, Float]
 """Columns of history.csv, a value for each increment."""
@@ -95,6 +103,17 @@ class Simulation:
         """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
         return fitted_scene(self.given, self.free, values, self.path)
 
+    def _point(self, values: Sequence[float] | Float) -> tuple[tuple[float, ...], float]:
+        """Return the values that a press is solved with, and the factor of its forces."""
+        wanted, factor = [float(v) for v in values], 1.0
+        for i, free in enumerate(self.free):
+            if free.key == OFFSET:
+                wanted[i] = 0.0
+            if free.key in MODULI and self.scales_with_modulus:
+                modulus = MODULI[free.key]
+                factor, wanted[i] = modulus(wanted[i]) / modulus(free.middle), free.middle
+        return tuple(wanted), factor
+
     def curve(self, values: Sequence[float] | Float) -> Curve:
         """Return the simulated curve, which begins at first touch, where everything is zero.
 
@@ -103,14 +122,7 @@ class Simulation:
         Finger3dError
             If the press fails.
         """
-        wanted, factor = [float(v) for v in values], 1.0
-        for i, free in enumerate(self.free):
-            if free.key == OFFSET:
-                wanted[i] = 0.0
-            if free.key in MODULI and self.scales_with_modulus:
-                modulus = MODULI[free.key]
-                factor, wanted[i] = modulus(wanted[i]) / modulus(free.middle), free.middle
-        point = tuple(wanted)
+        point, factor = self._point(values)
         if point not in self._known:
             row = self._solve(point)
             self.journal.append(row)
@@ -118,7 +130,7 @@ class Simulation:
         found = self._known[point]
         if isinstance(found, str):
             raise Finger3dError(found)
-        return {name: factor * v if name.endswith(_SCALED) else v for name, v in found.items()}
+        return _scaled(found, factor)
 
     def at(self, values: Sequence[float] | Float, measured: MeasuredPress) -> dict[str, Float]:
         """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
@@ -130,8 +142,67 @@ class Simulation:
         offset = float(offset) if measured.index == "depth_mm" else 0.0
         if text := _beyond(measured, offset, float(at[-1])):
             raise Finger3dError(text)
-        where = np.clip(measured.at + offset, 0.0, at[-1])
-        return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
+        return _at_rows(curve, measured, offset)
+
+    def slopes(self, values: Float, measured: MeasuredPress) -> dict[str, Float] | None:
+        """Return the derivatives (n, k) of the simulated values by the free keys.
+
+        They are None where numbers have no derivative by a key of the scene.
+        """
+        curve, (point, factor) = self.curve(values), self._point(values)
+        costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
+        known = self._derivatives(point, len(curve["step"]) - 1, [f.numbered(self.given) for f in costly])
+        if known is None:
+            return None
+        by_key = dict(zip((f.key for f in costly), known, strict=True))
+        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
+        offset = float(offset) if measured.index == "depth_mm" else 0.0
+        out = {name: np.zeros((len(measured.at), len(self.free))) for name in measured.columns}
+        for k, free in enumerate(self.free):
+            h = _STEP * max(abs(float(values[k])), _LEAST)
+            ends = []
+            for t in (-h, h):
+                moved = values + t * (np.arange(len(values)) == k)
+                if free.key in by_key:
+                    slope = _scaled(by_key[free.key], factor)
+                    changed: Curve = {n: v + t * slope[n] if n in slope else v for n, v in curve.items()}
+                else:
+                    changed = curve if free.key == OFFSET else self.curve(moved)
+                ends.append(_at_rows(changed, measured, offset + (t if free.key == OFFSET else 0.0)))
+            for name, column in out.items():
+                column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
+        return out
+
+    def errors(self, values: Float) -> dict[str, float]:
+        """Return the errors of mesh and increments by number at the end of the press, over the number."""
+        point, _ = self._point(values)
+        scene = self.scene(point)
+        model = scene.model()
+        body = self._body(scene, model)
+        problem = under(body.problem, model.friction, rule=model.rule)
+        steps = body.steps(model.friction, model.rule)
+        found = estimate(problem, steps, numbers=press_numbers).totals()
+        row = table_row(problem.points, steps[-1])
+        return {n: e / abs(float(row[n])) for n, e in found.items() if math.isfinite(e) and row.get(n)}
+
+    def _derivatives(self, point: tuple[float, ...], count: int, keys: Sequence[str]) -> list[Curve] | None:
+        """Return the derivatives of a curve of `count` increments by keys of the scene; None where one has none."""
+        if not keys:
+            return []
+        scene = self.scene(point)
+        model, given = scene.model(), scene.as_dict()
+        problem = under(
+            self._body(scene, model).problem, model.friction, with_increments_of(model.legs, count), model.rule
+        )
+        values = [float(str(tree.value_at(given, key) or 0.0)) for key in keys]
+        if refusal(model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
+            return None
+        try:
+            variations = [varied(scene, problem, key) for key in keys]
+            rows = [derivatives(step, variations, sides) for step, sides in tangents(problem, variations)]
+        except Finger3dError:  # forces that jump have no derivatives; differences of presses have
+            return None
+        return [{n: np.array([0.0, *(row[k][n] for row in rows)]) for n in rows[0][k]} for k in range(len(keys))]
 
     def _solve(self, point: tuple[float, ...]) -> Tree:
         try:
@@ -170,6 +241,18 @@ class Simulation:
 
     def _named(self, point: tuple[float, ...]) -> str:
         return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
+
+
+def _scaled(curve: Curve, factor: float) -> Curve:
+    """Return a curve with forces times a factor."""
+    return {name: factor * v if name.endswith(_SCALED) else v for name, v in curve.items()}
+
+
+def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, Float]:
+    """Return the values of every measured column at its rows."""
+    at = curve[measured.index]
+    where = np.clip(measured.at + offset, 0.0, at[-1])
+    return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
 
 
 def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[float] | Float, path: Path | None) -> Scene:

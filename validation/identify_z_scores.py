@@ -1,0 +1,145 @@
+"""Do the standard deviations that an identification states agree with the errors of its values?
+
+No source; the measured curves are presses of the same finger on a mesh 1.5 to 4 times finer, with noise.  The finger of
+Fig. 9 is pressed 10 mm, as a section in plane strain and as a solid 20 mm wide; normal force and gauge strain are read
+at ten depths.  Young's modulus, friction, Poisson's ratio, the edges of the mesh, and the noise are drawn; one to three
+of the first are free.  z is (identified - true) / stated standard deviation, with and without the part of mesh and
+increments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from finger3d.analyses.identify.run import identify
+from finger3d.analyses.press import press
+from finger3d.io import write_csv
+
+from ._paper import columns
+from ._rows import Result, Row
+
+FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.02, 1.0), "material.nu": (0.3, 0.495)}
+DEPTHS = np.linspace(1.0, 10.0, 10)
+CASES = {"plane-strain": 80, "solid": 20}
+SIZES = {"plane-strain": (1.0, 3.0), "solid": (3.5, 5.0)}
+FINER = {"plane-strain": (1.5, 4.0), "solid": (1.5, 2.0)}
+NOISE = 1e-3, 2e-2  # of the largest value of a column
+_NONE = 1e-12  # standard deviation of nothing
+
+
+class Fitted(NamedTuple):
+    """One value of one identification."""
+
+    domain: str
+    free: int
+    key: str
+    finer: float
+    noise: float
+    true: float
+    found: float
+    std: float
+    std_numerical: float
+
+    @property
+    def z(self) -> float:
+        """Error over the stated standard deviation."""
+        return (self.found - self.true) / self.std
+
+    @property
+    def z_of_noise(self) -> float:
+        """Error over the part of the noise."""
+        return (self.found - self.true) / max(np.sqrt(max(self.std**2 - self.std_numerical**2, 0.0)), _NONE)
+
+
+def scene(domain: str, size: float, values: dict[str, float], steps: int) -> dict[str, Any]:
+    """The finger of Fig. 9 with a gauge."""
+    return {
+        "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6,
+                   "width_mm": 20.0},
+        "material": {"E_MPa": values["material.E_MPa"], "nu": values["material.nu"]},
+        "friction": {"mu": values["friction.mu"]},
+        "press": {"depth_mm": 10.0, "steps": steps},
+        "model": {"domain": domain},
+        "mesh": {"size_mm": size, "base_size_mm": 4.0 * size, "mesher": "swept"},
+        "gauge": [{"name": "g36", "x_mm": 36.0, "y_mm": 40.0, "angle_deg": 30.0}],
+    }  # fmt: skip
+
+
+def case(domain: str, random: np.random.Generator) -> Iterator[Fitted]:
+    """Values identified from one curve."""
+    true = {"material.E_MPa": random.uniform(0.1, 2.0), "friction.mu": random.uniform(0.06, 0.4),
+            "material.nu": random.uniform(0.4, 0.48)}  # fmt: skip
+    free = list(FREE)[: random.integers(1, 4)]
+    size, finer = random.uniform(*SIZES[domain]), random.uniform(*FINER[domain])
+    noise = float(np.exp(random.uniform(*np.log(NOISE))))
+    pressed = press(scene(domain, size / finer, true, 20), error=False)
+    table: dict[str, Any] = {"depth_mm": DEPTHS}
+    depths = [0.0, *(step.depth_mm for step in pressed.steps)]
+    for name, values in (
+        ("normal_force_N", [step.normal_force_N for step in pressed.steps]),
+        ("gauge_g36", [step.gauges["g36"] for step in pressed.steps]),
+    ):
+        std = noise * float(np.abs(values).max())
+        table[name] = PchipInterpolator(depths, [0.0, *values])(DEPTHS) + random.normal(0.0, std, len(DEPTHS))
+        table[f"{name}_std"] = np.full(len(DEPTHS), std)
+    start = true | {key: 0.5 * sum(FREE[key]) for key in free}
+    with TemporaryDirectory() as folder:
+        write_csv(Path(folder) / "bench.csv", table)
+        found = identify(
+            scene(domain, size, start, 20), Path(folder) / "bench.csv", {k: FREE[k] for k in free}, Path(folder) / "out"
+        ).fitted
+    for k, key in enumerate(free):
+        told = float(found.values[k]), float(found.stds[k]), float(found.numerical[k])
+        yield Fitted(domain, len(free), key, finer, noise, true[key], *told)
+
+
+def run(quick: bool) -> Result:
+    """Quick: two sections."""
+    random = np.random.default_rng(20261126)
+    counts = {"plane-strain": 2} if quick else CASES
+    found = [one for domain, count in counts.items() for _ in range(count) for one in case(domain, random)]
+    rows = list(_rows(found, quick))
+    table = columns(" ".join(Fitted._fields), found)
+    return Result(tuple(rows), table, lambda figure: _draw(figure, found))
+
+
+def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
+    groups = {"all": found}
+    if not quick:
+        groups |= {f"{d}, {k}": [f for f in found if (f.domain, f.key) == (d, k)] for d in CASES for k in FREE}
+    for name, some in groups.items():
+        z, bare = (np.array([getattr(f, which) for f in some]) for which in ("z", "z_of_noise"))
+        what = f"{name}, {len(some)} values"
+        if len(some) >= 8 or quick:
+            yield Row(f"largest |z|: {what}", "normally distributed errors", 4.0, float(np.abs(z).max()), 0.0,
+                      "one in 16 000 is beyond", measure="at most")  # fmt: skip
+        if len(some) >= 8:
+            rms, of_noise = (float(np.sqrt(np.mean(v**2))) for v in (z, bare))
+            yield Row(f"rms of z: {what}", "deviations that hold", 1.0, rms, 0.2, "goal of this project", "statement",
+                      "absolute")  # fmt: skip
+            yield Row(f"rms of z, noise alone: {what}", "deviations that hold", 1.0, of_noise, 0.2,
+                      "goal of this project", "statement", "absolute")  # fmt: skip
+
+
+def _draw(figure: Any, found: list[Fitted]) -> None:
+    left, right = figure.subplots(1, 2, sharey=True)
+    for axes, which, title in (
+        (left, "z_of_noise", "deviation of the noise alone"),
+        (right, "z", "deviation as stated"),
+    ):
+        for k, key in enumerate(FREE):
+            for domain, mark in (("plane-strain", "o"), ("solid", "s")):
+                some = [f for f in found if (f.key, f.domain) == (key, domain)]
+                label = f"{key}, {domain.replace('-', ' ')}"
+                axes.plot([f.noise for f in some], [abs(getattr(f, which)) for f in some], mark, color=f"C{k}", ms=4,
+                          mfc=f"C{k}" if mark == "o" else "none", label=label)  # fmt: skip
+        axes.axhline(1.0, color="k", lw=0.8)
+        axes.set(xscale="log", yscale="log", xlabel="noise over the largest value", title=title, ylim=(1e-3, None))
+    left.set_ylabel("|identified - true| / standard deviation")
+    right.legend(fontsize=7)
