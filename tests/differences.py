@@ -29,6 +29,13 @@ def with_leg(model: Model, number: int, name: str) -> Callable[[float], Model]:
     return changed
 
 
+def with_dimension(model: Model, name: str) -> Callable[[float], Model]:
+    def changed(h: float) -> Model:
+        return replace(model, design=replace(model.design, **{name: getattr(model.design, name) + h}))
+
+    return changed
+
+
 def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
     """The model with each of its parameters changed by h."""
     mu, nu, (gauge, other) = model.friction.mu, model.material.nu, model.gauges
@@ -39,6 +46,9 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
         "x": lambda h: replace(model, gauges=(replace(gauge, x_mm=gauge.x_mm + h), other)),
         "angle": lambda h: replace(model, gauges=(replace(gauge, angle=gauge.angle + h), other)),
     }
+    for name in ("radius_mm", "edge_height_mm", "width_mm"):
+        if hasattr(model.design, name) and not isinstance(getattr(type(model.design), name, None), property):
+            found[name] = with_dimension(model, name)
     for number, leg in enumerate(model.legs):
         found[f"goal {number}"] = with_leg(model, number, "depth_mm" if leg.force_N is None else "force_N")
         if leg.slide_x_mm:

@@ -21,7 +21,7 @@ READINGS = {
     "gauges": (Gauge("g", 0.7, 2.3, 0.2, 0.5), Gauge("l", -1.0, 1.5, 0.0, 0.3, length_mm=1.0)),
     "markers": (Marker("m1", 0.5, 2.9),),
 }
-SOLID = block(symmetry=(), material=Isotropic(1.0, 0.3), mesh=MeshOptions(1.0, 1.5, "swept"), **READINGS)
+SOLID = block(symmetry=(), material=Isotropic(1.0, 0.3), mesh=MeshOptions(0.97, 1.45, "swept"), **READINGS)
 TILTED = replace(SOLID, object=Plane(tilt=0.03))
 SLIDE = (
     Leg(0.3, steps=2),

@@ -24,7 +24,7 @@ def test_a_modulus_changes_the_compliance_in_inverse_proportion() -> None:
     assert found.body is not None
     size = problem.surface.points.size
     force = np.random.default_rng(0).normal(size=size)
-    moved, _ = found.body.of(problem, problem.unknowns(force.reshape(-1, 2))[:, None])
+    moved, _ = found.body.of(problem, problem.unknowns(force.reshape(-1, 2))[:, None], force[:, None])
     assert moved[:, 0] == pytest.approx(-(problem.delassus.reshape(size, size) @ force) / e, rel=1e-5)
 
 

@@ -24,7 +24,7 @@ from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 
 _KEYS = re.compile(
-    r"friction\.mu|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm|slide_z_mm)"
+    r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm|slide_z_mm)"
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
 )
@@ -130,8 +130,16 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
-    keys = {key: value for key, value in _numbers_of(scene.as_dict()) if has_derivative(key, value, problem)}
-    variations = [varied(scene, problem, key) for key in keys]
+    keys, variations = dict[str, float](), list[Variation]()
+    for key, value in _numbers_of(scene.as_dict()):
+        if has_derivative(key, value, problem):
+            try:
+                variations.append(varied(scene, problem, key))
+            except Finger3dError:  # dimensions that change the cells of the mesh
+                if not key.startswith("finger."):
+                    raise
+                continue
+            keys[key] = value
     *_, (step, sides) = tangents(problem, variations)
     values = table_row(problem.points, step)
     numbers = {name: values[name] for name in tuple(of) or names}
@@ -177,7 +185,8 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
 def has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
     flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
-    if problem.dim == 2 and key.endswith("z_mm"):
+    unstructured = problem.dim == 3 and problem.model.mesh.mesher != "swept"  # its cells are others each time
+    if (problem.dim == 2 and key.endswith("z_mm")) or (unstructured and key.startswith("finger.")):
         return False
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
         return False

@@ -87,7 +87,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     bars = _bars(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
     readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, report)
-    rows = sp.vstack([_widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
+    rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
     report.say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
     fixed = held_dofs(mesh, axes, model.held_ends)
@@ -208,7 +208,7 @@ def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, report:
     return [*(reading.rows(body) for reading in others), bars.gauge_weights @ bars.rows, bars.rows]
 
 
-def _widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
+def widened(rows: sp.csr_matrix, size: int) -> sp.csr_matrix:
     """Return rows (k, n d) on displacements as rows (k, N) on all unknowns."""
     rows = sp.csr_matrix(rows)
     return sp.csr_matrix((rows.data, rows.indices, rows.indptr), (rows.shape[0], size))

@@ -20,7 +20,7 @@ from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.elastic import linear_loads
+from finger3d.mechanics.small_strain.elastic import at_rest, linear_loads
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.path_tangents import (
@@ -91,15 +91,18 @@ def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Iterato
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
     press, count = Press(problem), len(variations)
-    zero = np.zeros((count, *press.state.contact.force.shape))
-    tangent, motion = PathTangent(zero, zero, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
+    c = len(press.state.contact.gap)
+    ends = [[at_rest(end).gap for end in one.ends] for one in variations]
+    rest = np.array([one.difference(*gaps) for one, gaps in zip(variations, ends, strict=True)]).reshape(count, c)
+    moved = np.stack([rest, np.zeros_like(rest)], axis=2)
+    tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
     changes = compliance_changes(problem, variations)
     for station in stations(problem.model.legs):
         step = _advanced(press, station)
         if press.path is None:
             raise Finger3dError("the path of the press is not exact")
-        follower = follower or PathTangents(press.path, variations, changes, tangent, motion, number)
+        follower = follower or PathTangents(press.path, variations, changes, rest, tangent, motion, number)
         tangent, added = follower.at_share(station.share)
         motion, total = follower.motion(tangent, station.share), energies + added
         here = Event(0.0, 0.0, step.meshed_state.contact, 0.0, 0)

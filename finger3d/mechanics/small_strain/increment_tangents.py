@@ -179,10 +179,11 @@ class IncrementTangents:
 
         other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
         if any(self._bodies):
-            unknowns = self.problem.unknowns(self.problem.upright_force(contact))[:, None]
+            flat = self.problem.upright_force(contact)
+            unknowns = self.problem.unknowns(flat)[:, None]
             for k, body in enumerate(self._bodies):
                 if body:
-                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, unknowns)
+                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, unknowns, flat.reshape(-1, 1))
         rubbed = self._rubbed(part)
         direct = slope([upright(contact, rubbed * _coefficients(side)[:, None]) for side in sides])
         unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))

@@ -81,13 +81,15 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
     if not any(one.body for one in variations):
         return [None] * len(variations)
     unknowns = problem.body.condensed.unknowns(np.eye(count, len(active)))
+    force = np.zeros((problem.surface.points.size, len(active)))
+    force[active, np.arange(len(active))] = 1.0
 
     def dense(rows: Float) -> Float:
         out = np.zeros((len(rows), problem.surface.points.size))
         out[:, active] = rows
         return out
 
-    found = [one.body.of(problem, unknowns) if one.body else None for one in variations]
+    found = [one.body.of(problem, unknowns, force) if one.body else None for one in variations]
     return [(dense(pair[0]), dense(pair[1])) if pair else None for pair in found]
 
 
@@ -99,6 +101,7 @@ class PathTangents:
     path : of the leg
     variations : of p parameters
     changes : (p,), see `compliance_changes`
+    rest : (p, c), derivatives of the gaps at rest
     start : derivatives of the state at the start of the leg
     motion : (p, 2), those of the displacement of the object there
     leg : number of the leg
@@ -109,11 +112,12 @@ class PathTangents:
         path: ExactPath,
         variations: Sequence[Variation],
         changes: Sequence[tuple[Float, Float] | None],
+        rest: Float,
         start: PathTangent,
         motion: Float,
         leg: int,
     ) -> None:
-        self.path, self.variations = path, variations
+        self.path, self.variations, self._rest = path, variations, rest
         self._delassus = self._local(path.problem.delassus)
         self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
         self._mu = np.array(
@@ -232,6 +236,7 @@ class PathTangents:
         base[:, slips, 1] = (self._mu[:, None] * (sign * force[:, 0]))[:, slips]
         fixed = replace(last, amplitude=np.zeros(count))
         free = -np.einsum("cak,pk->pca", self.path.bases, self.motion(fixed, share))
+        free[:, :, 0] += self._rest
         for k, change in enumerate(self._changes):
             if change is not None:
                 free[k] += (change @ force.ravel()).reshape(c, 2)

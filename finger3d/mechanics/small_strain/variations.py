@@ -1,7 +1,7 @@
 """Variations of a condensed body: what a small change of a parameter changes in its displacements and its readings.
 
-The displacements of contact points and readings under loads are ``L K^-1 f``.  Their derivative is
-``L K^-1 (-dK u) + dL u`` with ``u = K^-1 f``, where dK and dL are central differences of assembled matrices.
+The displacements of contact points and readings under contact forces r are ``L u`` with ``u = K^-1 L_c^T r``.  Their
+derivative is ``L K^-1 (dL_c^T r - dK u) + dL u``, where dK and dL are central differences of assembled matrices.
 """
 
 from __future__ import annotations
@@ -16,12 +16,22 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.surface.traces import local_rows, restrict
+from finger3d.mechanics.discretise.build import mesh_part, widened
+from finger3d.mechanics.discretise.problem import Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
-from finger3d.objects import ObjectPose
+from finger3d.objects import ObjectPose, vertical_frame
+
+_FARTHEST = 1e-2
+"""Motion of the vertices, over the least size of the body, beyond which they are others."""
+
+_IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
+_CHANGES = (*_IN_BODY, "friction", "legs", "object")
+"""What a parameter may change in a model, in the body and elsewhere."""
 
 
 class Side(NamedTuple):
@@ -44,23 +54,33 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True)
 class BodyChange:
-    """Derivatives by a parameter of the stiffness (N, N) of a body and of the rows (g, N) of its readings."""
+    """Derivatives of a body by a parameter.
+
+    Attributes
+    ----------
+    stiffness : (N, N) sparse
+    contact : (c d, N) sparse, of the rows of the contact points
+    readings : (g, N) sparse, of the rows of the readings
+    """
 
     stiffness: Any
-    rows: Any
+    contact: Any
+    readings: Any
 
-    def of(self, problem: Problem, unknowns: Float) -> tuple[Float, Float]:
-        """Return the derivatives of contact displacements (c d, k) and readings (g, k) under the loads of a solution.
+    def of(self, problem: Problem, unknowns: Float, force: Float) -> tuple[Float, Float]:
+        """Return the derivatives of contact displacements (c d, k) and readings (g, k) in several solutions.
 
         Parameters
         ----------
         unknowns : (N, k), of the body under each of k loads
+        force : (c d, k) N, contact forces that are these loads
         """
-        active = problem.system.active_dofs
-        moved = problem.body.condensed.eliminated(-(self.stiffness @ unknowns)).displacement
-        displacement = np.zeros((problem.surface.points.size, unknowns.shape[1]))
-        displacement[active] = moved[: len(active)]
-        return displacement, moved[len(active) :][: self.rows.shape[0]] + self.rows @ unknowns
+        active, body = problem.system.active_dofs, problem.body
+        load = self.contact.T @ force - self.stiffness @ unknowns
+        moved = body.condensed.eliminated(load).displacement
+        displacement = np.zeros_like(force)
+        displacement[active] = moved[: len(active)] + (self.contact @ unknowns)[active]
+        return displacement, moved[len(active) :][: self.readings.shape[0]] + self.readings @ unknowns
 
 
 @dataclass(frozen=True)
@@ -90,9 +110,9 @@ class Variation:
 
 
 def variation(problem: Problem, low: Model, high: Model, step: float) -> Variation:
-    """Return the variation between two models with the mesh of a problem.
+    """Return the variation between two models; the mesh moves with the dimensions of the design.
 
-    They may differ in friction, path, object, materials and readings.
+    They may differ in friction, path, object, materials, readings, and in dimensions that keep the cells of the mesh.
 
     Raises
     ------
@@ -100,41 +120,67 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         If the models differ in anything else.
     """
     own = problem.model
-    changed = {"friction", "legs", "object", "material", "parts", "gauges", "markers", "taxels"}
+    kept = {name: getattr(own, name) for name in _CHANGES}
     for model in (low, high):
-        if replace(model, **{name: getattr(own, name) for name in changed}) != own:
+        if replace(model, **kept) != own or type(model.design) is not type(own.design):
             raise Finger3dError("it changes the mesh")
-    ends = [replace(problem, model=replace(own, **{n: getattr(m, n) for n in changed})) for m in (low, high)]
-    if any(end.model.object != own.object for end in ends):
-        systems = [replace(problem.system, first_contact_mm=m.first_contact.first_contact_mm) for m in (low, high)]
-        ends = [replace(end, system=system) for end, system in zip(ends, systems, strict=True)]
-    names = ("material", "parts", "gauges", "markers", "taxels")
-    if all(getattr(end.model, name) == getattr(own, name) for name in names for end in ends):
+    models = [replace(own, **{name: getattr(model, name) for name in _CHANGES}) for model in (low, high)]
+    if any(model.object != own.object or model.design != own.design for model in models):
+        touches = [model.first_contact.first_contact_mm for model in (low, high)]
+    else:
+        touches = [problem.system.first_contact_mm] * 2
+    ends = [
+        replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
+        for model, touch in zip(models, touches, strict=True)
+    ]
+    if all(getattr(end.model, name) == getattr(own, name) for name in _IN_BODY for end in ends):
         return Variation(ends[0], ends[1], step, None)
-    body = problem.body
-    elastics = [
-        elasticity_of(end.model.materials(body.mesh.part_labels), body.mesh, own.domain == "plane-stress")
-        for end in ends
-    ]
-    if any(elastic.mixed != body.elastic.mixed for elastic in elastics):
+    below, above = (_assembled(problem, end) for end in ends)
+    change = BodyChange(
+        *((high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True))
+    )
+    return Variation(below.problem, above.problem, step, change)
+
+
+class _Assembled(NamedTuple):
+    """Problem with another body on the same cells, and its matrices as in a `BodyChange`."""
+
+    problem: Problem
+    matrices: tuple[Any, Any, Any]
+
+
+def _moved(mesh: Mesh, other: Mesh) -> Mesh:
+    """Return a mesh with the points of another one; where that has other diagonals, with those of its vertices."""
+    if mesh.cells.shape != other.cells.shape or mesh.points.shape != other.points.shape:
+        raise Finger3dError("it changes the cells of the mesh")
+    if (mesh.cells == other.cells).all():
+        return other
+    moved, corners = other.points - mesh.points, mesh.cells[:, : mesh.dim + 1]
+    moved[mesh.cells[:, mesh.dim + 1 :]] = 0.5 * moved[mesh.cells[:, mesh.element.edges]].sum(axis=2)
+    if np.abs(moved[corners]).max() > _FARTHEST * np.ptp(mesh.points, axis=0).min():
+        raise Finger3dError("it numbers the points of the mesh anew")
+    return replace(mesh, points=mesh.points + moved)
+
+
+def _assembled(problem: Problem, end: Problem) -> _Assembled:
+    """Return the problem of a changed model, with the compliance of another."""
+    model, body, face = end.model, problem.body, problem.surface
+    mesh, thickness = body.mesh, body.thickness
+    if model.design != problem.model.design:
+        mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
+        thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
+        free, own = (free_surface(problem.model, one, thickness) for one in (mesh, body.mesh))
+        place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}
+        face = restrict(free, np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)]))
+    elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
+    if elastic.mixed != body.elastic.mixed:
         raise Finger3dError("it switches between elements for compressible and nearly incompressible materials")
-    matrices = [stiffness(body.mesh, elastic, body.thickness) for elastic in elastics]
-    rows = [
-        _reading_rows(end, MeshedBody(body.mesh, problem.axes, matrix, body.thickness, moduli_of(elastic)))
-        for end, matrix, elastic in zip(ends, matrices, elastics, strict=True)
-    ]
-    slope = (matrices[1].upper - matrices[0].upper) / (2.0 * step)
-    change = BodyChange((slope + sp.triu(slope, 1).T).tocsr(), (rows[1] - rows[0]) / (2.0 * step))
-    out = []
-    for end, elastic in zip(ends, elastics, strict=True):
-        points = unfold_points(end.model, body.mesh, problem.surface, problem.axes, elastic)[1]
-        out.append(replace(end, system=replace(problem.system, points=points)))
-    return Variation(out[0], out[1], step, change)
-
-
-def _reading_rows(problem: Problem, body: MeshedBody) -> sp.csr_matrix:
-    """Return the rows (g, N) of the readings."""
-    size = body.stiffness.upper.shape[0]
-    parts = [sp.csr_matrix(reading.rows(body)) for reading in problem.model.readings]
-    wide = [sp.csr_matrix((p.data, p.indices, p.indptr), (p.shape[0], size)) for p in parts]
-    return sp.vstack(wide, format="csr") if wide else sp.csr_matrix((0, size))
+    matrix = stiffness(mesh, elastic, thickness)
+    upper = matrix.upper
+    rows = [local_rows(face, vertical_frame(mesh.dim))]
+    rows += [r.rows(MeshedBody(mesh, problem.axes, matrix, thickness, moduli_of(elastic))) for r in model.readings]
+    contact, *readings = (widened(part, upper.shape[0]) for part in rows)
+    read = sp.vstack(readings, format="csr") if readings else sp.csr_matrix((0, upper.shape[0]))
+    points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
+    system = replace(end.system, surface=face, points=points)
+    return _Assembled(replace(end, system=system), ((upper + sp.triu(upper, 1).T).tocsr(), contact, read))
