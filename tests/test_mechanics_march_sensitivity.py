@@ -33,7 +33,7 @@ def test_forces_are_proportional_to_the_modulus_and_places_are_not() -> None:
 def test_what_changes_the_mesh_and_what_increments_define_is_refused() -> None:
     model = fig9(domain="plane-strain", mesh=MeshOptions(4.0, 10.0), friction=Coulomb(0.4), legs=PRESS)
     problem = build(model)
-    other = replace(model, design=replace(model.design, radius_mm=101.0))
+    other = replace(model, mesh=MeshOptions(3.0, 10.0))
     with pytest.raises(Finger3dError, match="changes the mesh"):
         variation(problem, model, other, STEP)
     with pytest.raises(Finger3dError, match="rule"):
