@@ -79,7 +79,7 @@ def check_memory(need_gb: float, what: str) -> None:
     if need_gb > MEMORY_SHARE * have:
         raise Finger3dError(
             f"{what}: forecast {need_gb:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
-            "choose a larger mesh.size_mm, fewer steps or fewer gauges"
+            "choose a larger mesh.size_mm, fewer increments or fewer gauges"
         )
 
 
