@@ -70,8 +70,8 @@ def fold_warnings(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
     place = mesh.points[mesh.cells[cell, : mesh.dim + 1]].mean(axis=0)
     return [
         f"the cell at {_text(place)} mm is folded over at a node, most in increment {number}: equilibrium holds, "
-        "stress and strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer edges "
-        "there avoid it"
+        "stress and strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer "
+        "edges there avoid it"
     ]
 
 
