@@ -137,9 +137,35 @@ def errors(figure: Figure) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
+def derivatives(figure: Figure) -> None:
+    """Draw a reading along a press at two friction coefficients, and their difference; lines bend at events."""
+    left, right = figure.subplots(1, 2)
+    path = np.array([0.0, 0.25, 0.6, 1.0])
+    low, high = np.array([0.0, 0.12, 0.42, 0.6]), np.array([0.0, 0.12, 0.5, 0.85])
+    for values, colour, text in ((low, INK, "at \u03bc"), (high, SLIP, "at \u03bc + d\u03bc")):
+        left.plot(path, values, "o-", color=colour, ms=4)
+        left.text(1.03, values[-1], text, color=colour, va="center")
+    left.annotate("", (1.0, high[-1] - 0.02), (1.0, low[-1] + 0.02), arrowprops={"arrowstyle": "<->", "color": STICK})
+    left.annotate(
+        "event: a point\nbegins to slip",
+        (0.6, 0.42),
+        (0.72, 0.12),
+        ha="center",
+        arrowprops={"arrowstyle": "-", "lw": 0.7},
+    )
+    left.set_title("a reading", fontsize=10)
+    right.plot(path, high - low, "o-", color=STICK, ms=4)
+    right.set_title("its derivative by \u03bc: the difference over d\u03bc", fontsize=10)
+    for axes in (left, right):
+        axes.set(xlabel="depth", xticks=[], yticks=[], xlim=(0.0, 1.3), ylim=(0.0, 1.0))
+        axes.spines[["top", "right"]].set_visible(False)
+    right.set(xlim=(0.0, 1.05), ylim=(0.0, 0.3))
+
+
 SKETCHES: dict[str, tuple[float, Callable[[Figure], None]]] = {
     "contact": (2.8, contact), "condensation": (2.2, condensation), "gaps": (2.8, gaps), "parts": (2.2, parts),
     "large_deformation": (2.0, large_deformation), "relaxation": (2.0, relaxation), "errors": (2.6, errors),
+    "derivatives": (2.3, derivatives),
 }  # fmt: skip
 """Page -> height of its sketch in inches, and the function that draws it."""
 

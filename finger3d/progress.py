@@ -68,7 +68,7 @@ class PlainProgress(Progress):
     def step(self, done: int, total: int, text: str = "") -> None:
         """Print the step and its remark."""
         super().step(done, total, text)
-        self._line(f"step {done} of {total}" + (f": {text}" if text else ""))
+        self._line(f"{done} of {total}" + (f": {text}" if text else ""))
 
     def remark(self, text: str) -> None:
         """Print the remark, unless another line was printed in the last second."""

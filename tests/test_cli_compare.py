@@ -41,7 +41,7 @@ def test_compare_as_json_prints_its_file(scene, tmp_path, monkeypatch, capsys) -
 def test_the_command_prints_the_verdict(scene, tmp_path, capsys) -> None:
     assert main(["compare", str(scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
     out = capsys.readouterr().out
-    assert "step 7 of 7" in out
+    assert "7 of 7" in out
     assert all(line in out for line in json.loads((tmp_path / "out" / "compare.json").read_text())["verdict"])
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finger3d._cost import mesh_gb
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
@@ -21,7 +22,9 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import (
     UnresolvedOverlap,
+    is_meshable_at,
     landmarks_of,
+    unresolved_details,
     unresolved_overlap,
     warnings_before_meshing,
 )
@@ -30,6 +33,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.mechanics.results.penetration import check_surface, penetration_warnings
+from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import ball, box, write_stl
 from tests.scenes import FIG9 as FINGER
@@ -108,11 +112,16 @@ def test_needles_are_refused(obj: RigidObject, domain: str) -> None:
         build(fig9(obj, 5.0, 4.0, domain=domain))
     # the overlap is 5 mm deep and as wide as 2 * 5 / tan(angle), or 2 sqrt(5 * 2 / curvature): a few edges at most
     width = 10.0 / math.tan(math.radians(89.99)) if isinstance(obj, Wedge) else 2.0 * math.sqrt(10.0 / 1e5)
+    if domain == "solid":  # 20 mm wide: more than 1000 layers of more than 1000 facets
+        assert refused.value.size_mm is None
+        assert "press deeper, or with a thicker or blunter object" in str(refused.value)
+        return
     assert refused.value.size_mm is not None
     assert 0.02 * width < refused.value.size_mm < width
 
 
-def test_a_point_beside_a_blunt_bump_does_not_hide_a_needle(tmp_path: Path) -> None:
+def test_a_point_beside_a_blunt_bump_does_not_hide_a_needle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda: (1e15, 1e15))
     bump, needle = box(30.0, 2.0, 40.0, (0.0, 1.0, 0.0)), box(0.2, 2.0, 0.2, (9.1, 0.5, 5.1))
     both = replace(
         bump, points=np.vstack([bump.points, needle.points]), faces=np.vstack([bump.faces, needle.faces + 8])
@@ -172,7 +181,7 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
 @pytest.mark.parametrize(
     ("obj", "lengths"),
     [
-        (Wave(wavelength_mm=1e-6, amplitude_mm=0.1), ("1e-06", "2.5e-07")),
+        (Wave(wavelength_mm=0.01, amplitude_mm=0.1), ("0.01", "0.0025")),
         (Wave(wavelength_mm=1.5, amplitude_mm=0.01), ("1.5", "0.37")),
         (Cylinder(radius_mm=0.9), ("0.9", "0.45")),
         (Wedge(angle=0.5, tip_radius_mm=0.2), ("0.2", "0.1")),
@@ -236,6 +245,23 @@ def test_a_companion_that_does_not_see_the_object_is_none() -> None:
 
     problem = build(fig9(Plane(), 0.1, 4.0))
     assert companion(problem).model.mesh.size_mm < 4.0
+
+
+def test_an_edge_that_no_memory_holds_is_not_advised(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = fig9(Wedge(angle=0.5, tip_radius_mm=0.02), 5.0, 4.0)
+    (line,) = unresolved_details(model)
+    assert "mesh.size_mm = 0.01 resolves it" in line
+    cells = mesh_section(FIG9, replace(model.mesh, size_mm=0.01), model.first_contact.contact_box, symmetry(model))[
+        1
+    ].cells
+    # 80 % of the memory is what a mesh may take (finger3d/_cost.py); cells are counted before they are made, to 11 %
+    for share, is_meshable in ((1.3, True), (0.7, False)):
+        total = share * 1e9 * mesh_gb(cells, 2) / 0.8
+        monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda total=total: (total, total))
+        assert is_meshable_at(model, 0.01) == is_meshable
+        (line,) = unresolved_details(model)
+        assert ("mesh.size_mm = " in line) == is_meshable
+        assert ("choose a larger object.tip_radius_mm" in line) != is_meshable
 
 
 def test_increments_without_contact_are_told(tmp_path: Path) -> None:

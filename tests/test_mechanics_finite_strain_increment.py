@@ -67,7 +67,7 @@ def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
             continue
         (line,) = fold_warnings(problem, frames)
         assert line.endswith("avoid it")
-        assert "most in step 5" in line
+        assert "most in increment 5" in line
         x, y = (float(part) for part in re.findall(r"[xy] = ([-\d.]+)", line)[:2])
         assert abs(x) > 9.0
         assert y < 1.0
@@ -96,7 +96,7 @@ def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> Non
     assert [frame.outcome.ok for frame in frames] == [True] * 20
     force = [measure(problem.points, frame)["normal_force_N"] for frame in frames]
     (line,) = snap_warnings(frames)
-    number = int(re.findall(r"in step (\d+)", line)[0])
+    number = int(re.findall(r"in increment (\d+)", line)[0])
     assert min(np.diff(force[number - 2 :])) < 0.0
     assert min(np.diff(force[: number - 1])) > 0.0
     assert snap_warnings(frames[: number - 1]) == []

@@ -29,8 +29,8 @@ def test_plain_report_writes_a_line_per_event() -> None:
         "meshing",
         "mesh taken from the cache [quickly]",
         "pressing",
-        "step 1 of 2: force 1 N",
-        "step 2 of 2",
+        "1 of 2: force 1 N",
+        "2 of 2",
     ]
     assert (report.steps_done, report.steps_total) == (2, 2)
 

@@ -22,7 +22,7 @@ def test_the_view_keeps_to_its_budget(solid: Path, section: Path) -> None:
     on = states.on_contact
     assert len(whole.rest) == len(np.unique(states.corners[on])) + len(np.unique(states.corners[~on]))
     assert len(whole.body) + len(whole.contact) == len(states.facets)
-    each = len(whole.rest) * 17 * 4 // 3
+    each = (len(whole.rest) * 17 + 3 * len(whole.contact)) * 4 // 3
     fixed = (states.corners.size + states.object_points.size + states.object_faces.size) * 16 // 3
     less = view_of(states, budget=fixed + 2 * each)
     one = view_of(states, budget=fixed + each)

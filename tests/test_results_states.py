@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.results.zones import zone_area
 from finger3d.results.states import chosen, load_states
 
 
@@ -39,6 +41,23 @@ def test_every_kept_step_is_the_finger_at_that_depth(solid: Path) -> None:
         assert touching.any()
         assert np.abs(at[touching, 1] - (5.0 - depth)).max() < 2 * 0.5**2 / (8 * 5.0)
         assert np.abs(states.gap[k][touching]).max() < 1e-6
+
+
+def test_zones_of_kept_steps_have_the_areas_of_the_summary(solid: Path, section: Path) -> None:
+    for folder in (solid, section):
+        states, steps = load_states(folder / "steps.npz"), json.loads((folder / "summary.json").read_text())["steps"]
+        facets = states.contact_facets[(states.contact_facets >= 0).all(axis=1)]
+        corners = states.points[states.nodes][facets].astype(float)
+        arms = corners[:, 1:] - corners[:, :1]
+        width = np.ptp(load_states(solid / "steps.npz").points[:, 2])
+        if states.dim == 3:
+            area = 0.5 * np.linalg.norm(np.cross(arms[:, 0], arms[:, 1]), axis=1)
+        else:
+            area = width * np.linalg.norm(arms[:, 0], axis=1)
+        for k, step in enumerate(states.step):
+            for zone, name in zip(states.zones(k), ("contact", "stick"), strict=True):
+                # single precision
+                assert zone_area(facets, area, zone) == pytest.approx(steps[step - 1][f"{name}_area_mm2"], rel=1e-4)
 
 
 def test_few_of_many_steps_are_kept_the_last_among_them() -> None:

@@ -74,7 +74,7 @@ class AddedCost:
 
     seconds: float = 0.0
     memory_mb: float = 0.0
-    reason: str = "no factorisation and no further step"
+    reason: str = "no factorisation and no further increment"
 
     def __str__(self) -> str:
         return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
@@ -222,7 +222,7 @@ def added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
             return AddedCost(
                 seconds=lengths * press.seconds["condensation"] + press.seconds["assembly"],
                 memory_mb=lengths * press.size.factor_mb,
-                reason=f"{lengths} more factorisation{'s' * (lengths > 1)}, one for each length of step",
+                reason=f"{lengths} more factorisation{'s' * (lengths > 1)}, one for each length of the increments",
             )
         case "inclusions":
             foils, d = len(model.gauges), press.size.dim
@@ -231,7 +231,7 @@ def added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
             return AddedCost(
                 seconds=share * press.seconds["condensation"] + press.seconds["contact"] + _FOIL_S[d] * foils,
                 memory_mb=40e-6 * rows**2,
-                reason=f"{rows} more rows, and every step once more without the foils",
+                reason=f"{rows} more rows, and every increment once more without the foils",
             )
         case "object_compliance":
             return AddedCost(

@@ -46,7 +46,7 @@ class ErrorBars:
     @property
     def covered(self) -> str:
         """The errors that `total` is the sum of, in words."""
-        return "error of mesh and steps" if self.steps else "error of the mesh without that of the steps"
+        return "error of mesh and increments" if self.steps else "error of the mesh without that of the increments"
 
     def total(self, name: str) -> float | None:
         """Return the sum of both errors of a number, None without an estimate of its discretisation error."""

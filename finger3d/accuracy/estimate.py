@@ -137,7 +137,7 @@ def estimate(
     """
     start = time.perf_counter()
     if not steps or not steps[-1].outcome.ok:
-        return ErrorEstimate(method="no estimate: the last step did not converge")
+        return ErrorEstimate(method="no estimate: the last increment did not converge")
     automatic = len(runs) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
     used = runs if automatic else ()
     # from here on, automatic increments are numbers

@@ -13,6 +13,7 @@ from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
 from finger3d.geometry.imported import extent
+from finger3d.mechanics.discretise.resolution import size_advice
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import History, StepResult, measure
 from finger3d.mechanics.results.slip_limit import slip_limit
@@ -222,5 +223,5 @@ def point_count_warning(record: PressRecord) -> list[str]:
     what = f"Only {count} points touch" + (f", {across} across" if problem.dim == 3 else "")
     return [
         f"{what}: too few for the extents of contact and stick zone, and for forces if the object slides; "
-        f"mesh.size_mm = {size * ratio:.2g} has enough"
+        + size_advice(problem.model, size * ratio, "has enough", "press deeper")
     ]

@@ -110,8 +110,8 @@ class PressResult:
 
         Parameters
         ----------
-        table : ``"history"``, a row a step, as in history.csv; or ``"contact"``, a row a contact point in the last
-            good step, as in contact.csv; or ``"markers"``, a row a marker and step, as in markers.csv
+        table : ``"history"``, a row an increment, as in history.csv; or ``"contact"``, a row a contact point in the
+            last good increment, as in contact.csv; or ``"markers"``, a row a marker and increment, as in markers.csv
         """
         require("to_dataframe()", "pandas")
         import pandas
@@ -140,7 +140,7 @@ class PressResult:
         return dict(sensitivity(self._numbers["scene"], [number]).derivatives[number])
 
     def plot_contact(self) -> Picture:
-        """Draw pressure, friction and its limit along x in the last good step, with the zones that stick and slip."""
+        """Draw pressure, friction, its limit and the zones of stick and slip along x in the last good increment."""
         from finger3d.plotting.figures import contact_figure
 
         points = self.history.points
@@ -163,12 +163,12 @@ class PressResult:
     def _contact(self) -> Tree:
         steps = self.history.steps
         if not steps:
-            raise Finger3dError(f"{self.out}: no step was finished, so there is no contact to show")
+            raise Finger3dError(f"{self.out}: no increment was finished, so there is no contact to show")
         last = next((f for f in reversed(steps) if f.outcome.ok), steps[-1])
         return contact_table(self.history.points, last.state)
 
     def __repr__(self) -> str:
-        """One line: title, outcome, force and depth of the last good step."""
+        """One line: title, outcome, force and depth of the last good increment."""
         return f"<PressResult {self._title}: {self._status()}>"
 
     @property

@@ -246,7 +246,7 @@ class _Run:
         residual = max(f.residual for f in self.frames)
         for number, frame in enumerate(self.frames, start=1):
             if not frame.outcome.ok:
-                at = f"step {number} (depth {frame.target.depth_mm:.4g} mm)"
+                at = f"increment {number} (depth {frame.target.depth_mm:.4g} mm)"
                 return VariantResult(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
         last = self.frames[-1]
         numbers = table_row(self.problem.points, replace(last, readings={}))

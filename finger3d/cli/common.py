@@ -31,7 +31,7 @@ EPILOGUE = """Examples:
     finger3d press scene.toml --out out2 --set friction.mu=0.5
     finger3d export scene.toml --out print --mold
 
-Exit codes: 0 done, 2 bad input, 3 a step did not converge or something is
+Exit codes: 0 done, 2 bad input, 3 an increment did not converge or something is
 missing, 130 interrupted.
 """
 

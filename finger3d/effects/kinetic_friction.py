@@ -35,7 +35,7 @@ class Effect:
         if self.branch == "paper":
             model = warn(
                 model,
-                "kinetic_friction: branch 'paper' starts every step all stuck; its stick zone and friction depend on "
-                "mesh and step",
+                "kinetic_friction: branch 'paper' starts every increment all stuck; its stick zone and friction depend "
+                "on mesh and increments",
             )
         return model

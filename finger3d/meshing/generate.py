@@ -5,15 +5,19 @@ from __future__ import annotations
 import importlib
 import time
 
+import numpy as np
+
+from finger3d._cost import MAX_TETS
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
 from finger3d.meshing.given.given import GivenMesh, mesh_given
-from finger3d.meshing.limits import check_sizes
+from finger3d.meshing.limits import check_sizes, is_possible
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.swept import mesh_swept
-from finger3d.meshing.unstructured.sizing import rounded_zone
+from finger3d.meshing.structured.swept import cell_count, mesh_swept
+from finger3d.meshing.unstructured.sizing import count_cells, rounded_zone, sizing
+from finger3d.meshing.unstructured.solids import box
 from finger3d.progress import QUIET, Progress
 
 
@@ -45,6 +49,28 @@ def mesh_solid(
         report.say("meshing (swept)")
         return mesh_swept(design, options, zone, symmetry)
     return _mesh_unstructured(design, options, zone, symmetry, report)
+
+
+def is_meshable(design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...] = ()) -> bool:
+    """Return whether a mesh of these edge lengths is estimated to fit into memory, without making it.
+
+    Parameters
+    ----------
+    design, options, zone, symmetry : see `mesh_solid`
+    dim : 2 for a section
+    """
+    lengths = np.ptp(np.reshape(zone, (2, 2)), axis=1)[: dim - 1] / options.size_mm
+    facets = (dim - 1) * float(lengths.prod()) / 2 ** len(symmetry)
+    if not is_possible(
+        (dim - 1) * facets, dim
+    ):  # each of the contact zone has at least one cell; to count all takes time
+        return False
+    if isinstance(design, GivenMesh):
+        return True
+    if dim == 2 or options.mesher == "swept":
+        return is_possible(cell_count(design, options, zone, dim, symmetry), dim)
+    zone = rounded_zone(design, options, zone)
+    return is_possible(count_cells(design, sizing(design, options, zone, *box(design, symmetry))), 3, MAX_TETS)
 
 
 def _mesh_unstructured(

@@ -33,11 +33,16 @@ def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
         )
 
 
+def is_possible(cells: float, dim: int, cap: float = math.inf) -> bool:
+    """Return whether a mesh is estimated to fit into memory and has at most `cap` cells."""
+    return mesh_gb(cells, dim) <= MEMORY_SHARE * _machine_gb() and cells <= cap
+
+
 def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:
     """Raise a Finger3dError for a mesh estimated to need too much memory or more than `cap` cells."""
-    need, have = mesh_gb(cells, dim), _machine_gb()
-    if need <= MEMORY_SHARE * have and cells <= cap:
+    if is_possible(cells, dim, cap):
         return
+    need, have = mesh_gb(cells, dim), _machine_gb()
     kind = "triangles" if dim == 2 else "tetrahedra"
     limit = (
         f"at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
@@ -74,7 +79,7 @@ def check_memory(need_gb: float, what: str) -> None:
     if need_gb > MEMORY_SHARE * have:
         raise Finger3dError(
             f"{what}: forecast {need_gb:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
-            "choose a larger mesh.size_mm, fewer steps or fewer gauges"
+            "choose a larger mesh.size_mm, fewer increments or fewer gauges"
         )
 
 

@@ -37,6 +37,7 @@ from finger3d.plotting.solid import (
     OBJECT,
     OBJECT_TINT,
     REST,
+    Skin,
     draw_solid,
     render_solids,
     skin_of,
@@ -81,6 +82,14 @@ class DeformedFinger:
         return self.mesh.points + self.displacement
 
     @property
+    def skin(self) -> Skin:
+        """Surfaces, lines and arrows of a solid."""
+        return skin_of(
+            self.mesh, self.displacement, self.pressure, self.shear, self.status, self.nodes, self.faces, self.thing,
+            self.zones,
+        )  # fmt: skip
+
+    @property
     def lines(self) -> Marks:
         """Labels of the gauges and their lines (3, d), mm."""
         return [(mark.label, mark.of(self.moved)) for mark in self.marks]
@@ -118,7 +127,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
     low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
     rest, figures = outline_of(mesh, mesh.points), []
     for finger in fingers:
-        halves, pressure, status = _coloured_halves(finger)
+        halves, pressure, status = coloured_halves(finger)
         figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
         paths = [draw(mesh, finger.moved) for draw in (outline_of, edges_of, interfaces_of)]
         lines = [(paths[0], BODY, LINE, 0.5), (paths[1], "none", LINE, 0.25), (paths[2], "none", FEATURE, 0.9)]
@@ -139,7 +148,7 @@ def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]
     return figures
 
 
-def _coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
+def coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
     """Return both parts (h, 2, 2) of every facet that may touch, the mean pressure (h,) and the status (h,) of each.
 
     They meet where the status changes; that of a part is that of its end.
@@ -169,10 +178,7 @@ def _solids(
     fingers: Sequence[DeformedFinger], highest: float, window: tuple[int, int], arrows: bool
 ) -> tuple[list[Figure], str]:
     """Draw a solid; without a renderer by matplotlib."""
-    skins = [
-        skin_of(f.mesh, f.displacement, f.pressure, f.shear, f.status, f.nodes, f.faces, f.thing, f.zones)
-        for f in fingers
-    ]
+    skins = [finger.skin for finger in fingers]
     pictures = []
     for skin in skins:
         by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)

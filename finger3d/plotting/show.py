@@ -21,7 +21,7 @@ from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.plotting.deformed import DeformedFinger, draw_fingers
-from finger3d.plotting.gauges import marks_of
+from finger3d.plotting.gauges import Mark, marks_of
 from finger3d.plotting.renderer import WINDOW
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import gauges_of, read_json
@@ -52,23 +52,25 @@ def frames(states: States, numbers: Sequence[int], title: str, gauges: Sequence[
     titles = [f"{title}\n{names[k]}" for k in numbers]
     mesh = mesh_of(states)
     marks = marks_of(mesh, gauges, near=mesh.dim == 3)
-    fingers = []
-    for k, title_of_step in zip(numbers, titles, strict=True):
-        fingers.append(
-            DeformedFinger(
-                mesh=mesh,
-                displacement=states.displacement[k].astype(float),
-                pressure=states.pressure[k],
-                shear=np.column_stack([states.shear_x[k], states.shear_y[k], states.shear_z[k]]),
-                status=states.status[k].astype(int),
-                nodes=states.nodes,
-                faces=states.face,
-                thing=states.object_at(k),
-                title=title_of_step,
-                marks=marks,
-            )
-        )
+    fingers = [finger_of(states, k, mesh, name, marks) for k, name in zip(numbers, titles, strict=True)]
     return draw_fingers(fingers, _WINDOW if len(fingers) > 1 else WINDOW, arrows=False)[0]
+
+
+def finger_of(states: States, k: int, mesh: Mesh, title: str = "", marks: Sequence[Mark] = ()) -> DeformedFinger:
+    """Return the finger at the k-th kept increment; `mesh` is that of `mesh_of`."""
+    return DeformedFinger(
+        mesh=mesh,
+        displacement=states.displacement[k].astype(float),
+        pressure=states.pressure[k],
+        shear=np.column_stack([states.shear_x[k], states.shear_y[k], states.shear_z[k]]),
+        status=states.status[k].astype(int),
+        nodes=states.nodes,
+        faces=states.face,
+        thing=states.object_at(k),
+        title=title,
+        marks=marks,
+        zones=states.zones(k),
+    )
 
 
 def mesh_of(states: States) -> Mesh:

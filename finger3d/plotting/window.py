@@ -6,14 +6,18 @@ With a PNG file as second argument the window is drawn off-screen; each control 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.plotting.deformed import coloured_halves
 from finger3d.plotting.gauges import COLOUR, marks_of
-from finger3d.plotting.show import found, mesh_of
-from finger3d.plotting.solid import OBJECT_OPACITY, OBJECT_TINT
+from finger3d.plotting.panels import palette
+from finger3d.plotting.renderer import unshared
+from finger3d.plotting.show import finger_of, found, mesh_of
+from finger3d.plotting.solid import BODY, OBJECT_OPACITY, OBJECT_TINT
 from finger3d.results.states import States, captions
 from finger3d.results.vtu import grid
 
@@ -24,10 +28,10 @@ Array = NDArray[np.floating]
 
 FIELDS = {
     "pressure": "contact pressure (MPa)",
-    "status": "0 open, 1 stick, 2 slip",
+    "status": "stick (blue), slip (orange), open (grey)",
     "displacement": "displacement (mm)",
     "shear": "friction (MPa)",
-    "stress": "von Mises stress (MPa), last step only",
+    "stress": "von Mises stress (MPa), last increment only",
 }
 """Name of a field among the controls -> its description."""
 
@@ -54,7 +58,9 @@ class Window:
         self.shown["value"] = np.zeros(self.shown.n_points)
         self.plotter = pv.Plotter(off_screen=off_screen, title=f"finger3d: {title}", window_size=[1280, 860])
         self.plotter.set_background("white")
-        look = {"scalars": "value", "cmap": "viridis", "scalar_bar_args": {"title": " ", "color": "black"}}
+        look = {
+            "scalars": "value", "cmap": "viridis", "color": BODY, "scalar_bar_args": {"title": " ", "color": "black"}
+        }  # fmt: skip
         if self.states.dim == 3:
             self.plotter.add_mesh_clip_plane(
                 self.shown, normal="z", invert=True, origin=self._front(), outline_translation=False, **look
@@ -62,6 +68,8 @@ class Window:
         else:
             self.plotter.add_mesh(self.shown, **look)
         self.mapper = self.plotter.mapper  # of the finger; the attribute of the plotter changes with the next mesh
+        self.bar = self.plotter.scalar_bars[" "]
+        self.zones = self._add_zones()
         self.thing = pv.PolyData(*self._object())
         if self.thing.n_points:
             self.plotter.add_mesh(self.thing, color=OBJECT_TINT, opacity=OBJECT_OPACITY)
@@ -73,7 +81,7 @@ class Window:
             self.to_step,
             rng=[1, max(len(self.states.step), 2)],
             value=len(self.states.step),
-            title="stored step",
+            title="kept increment",
             fmt="%.0f",
             style="modern",
             pointa=(0.62, 0.92),
@@ -89,6 +97,44 @@ class Window:
         self.plotter.reset_camera(bounds=self.shown.bounds)  # the object may be far larger
         self.plotter.add_axes(color="black")
         self.update()
+
+    def _add_zones(self) -> pv.Actor:
+        """Draw the zones of stick and slip with their borders, before the finger; return what makes them visible."""
+        import pyvista as pv
+
+        points, cells, colours = self._zones()
+        self.zone_mesh = pv.PolyData(points, **{"faces" if self.states.dim == 3 else "lines": cells})
+        self.zone_mesh.cell_data["zone"] = colours
+        actor = self.plotter.add_mesh(self.zone_mesh, scalars="zone", rgb=True, line_width=6)
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2.0, -2.0)
+        for widget in self.plotter.widgets.plane_widgets:
+            plane = pv.generate_plane((0.0, 0.0, -1.0), self._front())
+
+            def follow(widget: Any, _event: str, plane: Any = plane) -> None:
+                widget.GetPlane(plane)
+                plane.SetNormal(-np.array(plane.GetNormal()))  # a mapper keeps what is on the side of the normal
+
+            widget.AddObserver("EndInteractionEvent", follow)
+            actor.mapper.AddClippingPlane(plane)
+        return actor
+
+    def _zones(self) -> tuple[Array, NDArray[np.integer], Array]:
+        """Return points (v, 3), cells in VTK's format and their RGB colours at the current step."""
+        mesh = mesh_of(self.states)
+        if self.states.dim == 2:
+            parts, _, status = coloured_halves(finger_of(self.states, self.step, mesh))
+            parts = np.pad(parts, [(0, 0), (0, 0), (0, 1)])
+        else:  # on the corners, as the finger is shown
+            mesh = replace(mesh, facets={label: f[:, :3] for label, f in mesh.facets.items()})
+            skin = finger_of(self.states, self.step, mesh).skin
+            parts, status = skin.contact, skin.status
+        points, cells = unshared(parts)
+        return (
+            points,
+            np.insert(cells, 0, cells.shape[1], axis=1).ravel(),
+            np.round(255 * palette()[status]).astype(np.uint8),
+        )
 
     def _object(self) -> tuple[Array, NDArray[np.integer]]:
         """Return points (v, 3) and triangles of the object at the current step, the latter in VTK's format."""
@@ -119,8 +165,14 @@ class Window:
         value = values(self.states, self.end, self.field, self.step)
         self.shown["value"] = value
         self.shown.Modified()
+        by_zone = self.field == "status"
+        if by_zone:
+            self.zone_mesh.points, _, self.zone_mesh.cell_data["zone"] = self._zones()
+        self.zones.SetVisibility(by_zone)
+        self.bar.SetVisibility(not by_zone)
+        self.mapper.SetScalarVisibility(not by_zone)
         self._mark(u[:, : self.states.dim])
-        highest = 2.0 if self.field == "status" else float(np.nan_to_num(value).max(initial=0.0)) or 1.0
+        highest = float(np.nan_to_num(value).max(initial=0.0)) or 1.0
         self.mapper.scalar_range = (0.0, highest)
         keys = "   ".join(f"{key} {name}" for key, name in zip("12345", FIELDS, strict=True))
         text = f"{captions(self.states)[self.step]}\n{FIELDS[self.field]}\nkeys: {keys}"

@@ -4,6 +4,7 @@
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
   const rest = new Float32Array(bytes(data.rest)), moved = new Float32Array(bytes(data.moved));
   const pressure = new Float32Array(bytes(data.pressure)), status = new Uint8Array(bytes(data.status));
+  const border = new Uint8Array(bytes(data.border));
   const body = new Uint32Array(bytes(data.body)), contact = new Uint32Array(bytes(data.contact));
   const n = data.vertices, names = ["open", "stick", "slip"];
   const stage = document.getElementById("view-stage"), field = document.getElementById("view-field");
@@ -12,29 +13,41 @@
   const objectPoints = new Float32Array(bytes(data.objectPoints)), objectFaces = new Uint32Array(bytes(data.objectFaces));
   const show = (kind, on) => document.querySelectorAll(`.key .${kind}`).forEach((e) => { e.hidden = !on; });
 
-  // Split each contact triangle into six around its centre, two for each corner, so that the status of a corner is drawn
-  // on the area nearest to it.
+  // Split each contact triangle into six by the places on its sides where the status changes: one part at each corner
+  // with its status, and three around their centre with the status of most corners, as in finger.png.
   const edges = new Map(), parents = [], six = { i: [], j: [], k: [] }, owner = [];
   for (let v = 0; v < n; v++) parents.push([v]);
-  const middle = (a, b) => {
+  const weights = Array(n).fill(() => [1]);  // of the parents at a step
+  const cut = (a, b, side) => {
     const name = Math.min(a, b) * n + Math.max(a, b);
-    if (!edges.has(name)) { edges.set(name, parents.length); parents.push([a, b]); }
+    if (!edges.has(name)) {
+      edges.set(name, parents.length);
+      parents.push([a, b]);
+      weights.push((s) => { const share = border[s * contact.length + side] / 255; return [1 - share, share]; });
+    }
     return edges.get(name);
   };
   for (let t = 0; t < contact.length; t += 3) {
-    const [a, b, c] = contact.slice(t, t + 3);
-    const ab = middle(a, b), bc = middle(b, c), ca = middle(c, a), centre = parents.length;
+    const corners = contact.slice(t, t + 3), [a, b, c] = corners;
+    const on = [cut(a, b, t), cut(b, c, t + 1), cut(c, a, t + 2)], [ab, bc, ca] = on, centre = parents.length;
     parents.push([a, b, c]);
-    for (const [p, q, own] of [[a, ab, a], [ab, b, b], [b, bc, b], [bc, c, c], [c, ca, c], [ca, a, a]]) {
-      six.i.push(p); six.j.push(q); six.k.push(centre); owner.push(own);
+    weights.push((s) => [a, b, c].map((v) =>
+      on.reduce((sum, p) => sum + (parents[p].includes(v) ? weights[p](s)[parents[p].indexOf(v)] : 0), 0) / 3));
+    for (const [p, q, r, own] of [[a, ab, ca, [a]], [b, bc, ab, [b]], [c, ca, bc, [c]],
+      [ca, ab, centre, [a, b, c]], [ab, bc, centre, [b, c, a]], [bc, ca, centre, [c, a, b]]]) {
+      six.i.push(p); six.j.push(q); six.k.push(r); owner.push(own);
     }
   }
+  // Status of a part: of its corner, or of most corners; where all differ, of the one beside it, which is named first.
+  const stateOf = (s, t) => {
+    const [one, two, three] = owner[t].map((v) => status[s * n + v]);
+    return two !== undefined && two === three ? two : one;
+  };
   const sides = { i: [], j: [], k: [] };
   for (let t = 0; t < body.length; t += 3) {
     sides.i.push(body[t]); sides.j.push(body[t + 1]); sides.k.push(body[t + 2]);
   }
   const shift = (s, v) => Math.hypot(...[0, 1, 2].map((a) => moved[3 * (s * n + v) + a] - rest[3 * v + a]));
-  const mean = (vs, of) => vs.reduce((sum, v) => sum + of(v), 0) / vs.length;
   const steps = data.labels.length;
   let highest = 0, farthest = 0;
   for (let s = 0; s < steps; s++) for (let v = 0; v < n; v++) {
@@ -60,30 +73,32 @@
   const light = { ambient: 0.85, diffuse: 0.35, specular: 0.02, roughness: 0.9, fresnel: 0.0 };
 
   function traces(s, what) {
-    const at = (a) => (vs) => mean(vs, (v) => moved[3 * (s * n + v) + a]);
+    const share = weights.map((of) => of(s));
+    const mean = (p, of) => parents[p].reduce((sum, v, k) => sum + share[p][k] * of(v), 0);
+    const all = parents.map((_, p) => p), corners = all.slice(0, n);
+    const at = (a) => (p) => mean(p, (v) => moved[3 * (s * n + v) + a]);
     const place = (list) => ({ x: list.map(at(0)), y: list.map(at(1)), z: list.map(at(2)) });
-    const corners = parents.slice(0, n);
-    const far = (list) => list.map((vs) => mean(vs, (v) => shift(s, v)));
+    const far = (list) => list.map((p) => mean(p, (v) => shift(s, v)));
     const base = { type: "mesh3d", flatshading: false, lighting: light, lightposition: { x: -2e4, y: 8e4, z: 5e4 } };
     const side = { ...base, ...place(corners), ...sides, hoverinfo: "skip", color: "#d9d6cf" };
-    const press = parents.map((vs) => mean(vs, (v) => pressure[s * n + v]));
+    const press = all.map((p) => mean(p, (v) => pressure[s * n + v]));
     const states = parents.map((vs) => [...new Set(vs.map((v) => names[status[s * n + v]]))].join(" / "));
-    const text = parents.map((vs, p) => `${states[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
-      + `<br>moved ${mean(vs, (v) => shift(s, v)).toPrecision(3)} mm`);
+    const text = all.map((p) => `${states[p]}<br>pressure ${press[p].toPrecision(3)} MPa`
+      + `<br>moved ${mean(p, (v) => shift(s, v)).toPrecision(3)} mm`);
     const only = (keep) => {
-      const on = owner.map((v, t) => t).filter((t) => keep(status[s * n + owner[t]]));
+      const on = owner.map((_, t) => t).filter((t) => keep(stateOf(s, t)));
       return { i: on.map((t) => six.i[t]), j: on.map((t) => six.j[t]), k: on.map((t) => six.k[t]) };
     };
-    const face = { ...base, ...place(parents), ...six, text,
+    const face = { ...base, ...place(all), ...six, text,
       hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<br>%{text}<extra></extra>" };
-    if (what === "status") Object.assign(face, { intensitymode: "cell", intensity: owner.map((v) => status[s * n + v]),
+    if (what === "status") Object.assign(face, { intensitymode: "cell", intensity: owner.map((_, t) => stateOf(s, t)),
       cmin: -0.5, cmax: 2.5, showscale: false, colorscale: [[0, "#c4c4c4"], [1 / 3, "#c4c4c4"], [1 / 3, "#1f3f77"],
         [2 / 3, "#1f3f77"], [2 / 3, "#f28e2b"], [1, "#f28e2b"]] });
     const open = { ...face, ...only((state) => state === 0), color: "#c4c4c4" };
     if (what === "pressure") Object.assign(face, only((state) => state !== 0),
       { intensity: press, ...scale("contact pressure (MPa)", highest) });
     if (what === "moved") {
-      Object.assign(face, { intensity: far(parents), ...scale("displacement (mm)", farthest) });
+      Object.assign(face, { intensity: far(all), ...scale("displacement (mm)", farthest) });
       Object.assign(side, { intensity: far(corners), ...scale("", farthest), showscale: false });
     }
     const tint = window.matchMedia("(prefers-color-scheme: dark)").matches ? "#e0408f" : "#b0006a";

@@ -11,9 +11,12 @@ import numpy as np
 from finger3d._types import Array
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.results.zones import border_shares
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
 from finger3d.results.states import States, chosen, label
+
+_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 _MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 1.8 MB
 
@@ -29,6 +32,7 @@ class View3D:
     moved : (s, v, 3) deformed vertices at each increment, mm
     pressure : (s, v) contact pressure, MPa
     status : (s, v) 0 open, 1 stick, 2 slip
+    border : (s, t, 3) where the status changes along the sides of each contact triangle, as a share of their length
     labels : (s,) label of each increment
     gauges : (s, g, 3, 3) start, middle and end of each gauge at each increment, projected onto the front face (+z), mm
     gauge_labels : (g,) label of each gauge
@@ -42,6 +46,7 @@ class View3D:
     moved: Array
     pressure: Array
     status: Array
+    border: Array
     labels: tuple[str, ...]
     gauges: Array
     gauge_labels: tuple[str, ...]
@@ -81,6 +86,7 @@ class View3D:
             "moved": _packed(self.moved, "<f4"),
             "pressure": _packed(self.pressure, "<f4"),
             "status": _packed(self.status, "u1"),
+            "border": _packed(np.round(255.0 * self.border), "u1"),
             "body": _packed(self.body, "<u4"),
             "contact": _packed(self.contact, "<u4"),
             "gauges": np.round(self.gauges, 3).tolist(),
@@ -104,7 +110,7 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
     corners, face_of = keys // (len(FREE_FACES) + 1), keys % (len(FREE_FACES) + 1) - 1
     triangles = index.reshape(states.corners.shape)
     budget -= (states.object_points.size + states.object_faces.size) * 16 // 3
-    each = len(corners) * (3 * 4 + 4 + 1) * 4 // 3
+    each = (len(corners) * (3 * 4 + 4 + 1) + states.contact_facets.size) * 4 // 3
     most = (budget - triangles.size * 16 // 3) // each
     if most < 1:
         return None
@@ -120,6 +126,11 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
             out[own] = states.on_points(name, k, int(face))[corners[own]]
         return out
 
+    sides = states.contact_facets[:, _SIDES].reshape(-1, 2)
+
+    def borders(k: int) -> Array:
+        return border_shares(sides, states.status[k], states.zones(k)).reshape(-1, 3)
+
     return View3D(
         rest=rest,
         body=triangles[~states.on_contact],
@@ -127,6 +138,7 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
         moved=rest + states.displacement[kept][:, corners],
         pressure=np.array([values("pressure", k) for k in kept]),
         status=np.array([values("status", k) for k in kept]),
+        border=np.array([borders(k) for k in kept]),
         labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
         gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
         gauge_labels=tuple(mark.label for mark in marks),

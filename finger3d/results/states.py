@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from finger3d._types import Array, freeze_arrays
+from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
@@ -16,6 +18,7 @@ from finger3d.io import atomic, read_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, contact_table
+from finger3d.mechanics.results.zones import Zone, edges_of, zones
 from finger3d.objects import PlacedObject
 
 _LARGEST = 1e9
@@ -40,6 +43,7 @@ class States:
     facet_face : (t,) number in `finger3d.fem.mesh.simplex.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     face : (m,) number of the face that each contact point belongs to
+    compliance : (m,) 1/MPa, as in `finger3d.mechanics.results.history.ContactPoints`
     step : (s,) number of each increment, from 1
     target : (s, 6) depth_mm, slide_x_mm, slide_z_mm, turn_x_deg, turn_y_deg, turn_z_deg
     displacement : (s, n, d) mm
@@ -57,6 +61,7 @@ class States:
     facet_face: Array
     nodes: Array
     face: Array
+    compliance: Array
     step: Array
     target: Array
     displacement: Array
@@ -88,6 +93,26 @@ class States:
     def on_contact(self) -> Array:
         """Whether each facet (t,) belongs to a face with contact points."""
         return np.isin(self.facet_face, np.append(np.unique(self.face), CONTACT))
+
+    @cached_property
+    def contact_facets(self) -> Array:
+        """Numbers (k, d) of the contact points at the corners of the facets on faces with them; -1 where none is."""
+        number = np.full((len(FREE_FACES), len(self.points)), -1)
+        number[self.face, self.nodes] = np.arange(len(self.nodes))
+        return np.asarray(number[self.facet_face[self.on_contact][:, None], self.corners[self.on_contact]])
+
+    def zones(self, k: int) -> tuple[Zone, Zone]:
+        """Return the zones of contact and of stick at the k-th kept increment."""
+        shear = np.linalg.norm([self.shear_x[k], self.shear_y[k], self.shear_z[k]], axis=0)
+        # tractions as forces on unit areas; the direction of friction does not count
+        traction = np.zeros((len(self.nodes), self.dim))
+        traction[:, 0], traction[:, 1] = self.pressure[k], shear
+        rest = np.zeros((len(self.nodes), self.dim - 1))
+        state = ContactState(self.status[k], traction, self.gap[k].astype(float), rest, rest)
+        places = np.zeros((len(self.nodes), 3))  # z = 0 in a section
+        places[:, : self.dim] = self.points[self.nodes]
+        edges = edges_of(self.contact_facets[(self.contact_facets >= 0).all(axis=1)])
+        return zones(state, places, np.ones(len(places)), self.compliance.astype(float), edges)
 
     def on_points(self, name: str, k: int, face: int | None = None) -> Array:
         """Return a contact field of the k-th kept increment at all points (n,), 0 where there are no contact points.
@@ -154,6 +179,7 @@ def states_of(
         facet_face=np.concatenate([np.full(len(f), faces[label], dtype=np.int8) for label, f in facets.items()]),
         nodes=problem.points.nodes.astype(np.int32),
         face=problem.points.face.astype(np.int8),
+        compliance=problem.points.compliance.astype(np.float32),
         step=np.array(kept) + 1,
         target=np.array([(t.depth_mm, t.slide_x_mm, t.slide_z_mm, *np.degrees(t.turns)) for t in at]),
         displacement=u,
@@ -220,6 +246,7 @@ def _check(states: States) -> None:
         "facet_face": (((t,),), "i"),
         "nodes": (((m,),), "iu"),
         "face": (((m,),), "i"),
+        "compliance": (((m,),), "f"),
         "step": (((s,),), "iu"),
         "target": (((s, 6),), "iuf"),
         "displacement": (((s, n, d),), "f"),

@@ -26,9 +26,11 @@ from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
 from finger3d.mechanics.discretise.regular_points import Box, regular_points
+from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult
+from finger3d.meshing.generate import is_meshable
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
@@ -299,8 +301,8 @@ def resolving_size(
 ) -> float | None:
     """Return the edge length at which a regular patch of contact points resolves the object.
 
-    The patch is where the unresolved overlap is largest.  The length is None if there is none of use, or if the surface
-    of the finger is not known.
+    The patch is where the unresolved overlap is largest.  The length is None if there is none of use, if no such mesh
+    fits into memory, or if the surface of the finger is not known.
     """
     if landmarks is None:
         return None
@@ -317,8 +319,23 @@ def resolving_size(
         there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
         seen = unresolved_overlap(there, points, touch_mm, landmarks)
         if seen.in_contact and seen.ratio <= _RESOLVED:
-            return _rounded_down(min(size, _resolving(model.object)))
+            size = _rounded_down(min(size, _resolving(model.object)))
+            return size if is_meshable_at(model, size) else None
     return None
+
+
+def is_meshable_at(model: Model, size: float) -> bool:
+    """Return whether a mesh with an edge length (mm) in the contact zone is estimated to fit into memory."""
+    options = replace(model.mesh, size_mm=size, base_size_mm=max(size, model.mesh.base_size_mm))
+    dim, zone = 3 if model.domain == "solid" else 2, model.first_contact.contact_box
+    return is_meshable(model.design, options, zone, dim, symmetry(model))
+
+
+def size_advice(model: Model, size: float, effect: str, otherwise: str) -> str:
+    """Return the advice of an edge length (mm) and its effect, or of something else where memory holds no such mesh."""
+    if is_meshable_at(model, size):
+        return f"mesh.size_mm = {size:.2g} {effect}"
+    return f"no mesh that fits into this machine's memory {effect}; {otherwise}"
 
 
 def _within(landmarks: Float, placed: PlacedObject, box: Box, dim: int) -> Float:
@@ -369,7 +386,8 @@ def _refusal(model: Model, unresolved: UnresolvedOverlap, size: float | None) ->
         return f"{now}: {what}; mesh.size_mm = {size:g} resolves it"
     if isinstance(model.design, DesignSummary):
         return f"{now}: {what}; condense the scene with a smaller mesh.size_mm"
-    return f"{now}: {what}; no edge length above {_FINER**_TRIES * model.mesh.size_mm:.1g} mm resolves it"
+    cure = "press deeper, or with a thicker or blunter object"
+    return f"{now}: {what}; no mesh that fits into this machine's memory resolves it; {cure}"
 
 
 def unresolved_details(model: Model) -> list[str]:
@@ -377,9 +395,10 @@ def unresolved_details(model: Model) -> list[str]:
     detail, size, largest = model.object.detail, model.mesh.size_mm, _resolving(model.object)
     if detail is None or size <= largest * (1.0 + 1e-9):
         return []
+    blunter = f"choose a larger object.{detail.key}"
     return [
         f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; mesh.size_mm = {_rounded_down(largest):g} resolves it"
+        f"averages of it; {size_advice(model, _rounded_down(largest), 'resolves it', blunter)}"
     ]
 
 

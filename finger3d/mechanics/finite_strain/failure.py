@@ -46,7 +46,7 @@ def cause_of_failure(problem: Problem, u: Float) -> str:
     corners = mesh.points[mesh.cells[cell, : mesh.dim + 1]]
     place = corners.mean(axis=0)
     state = f"compressed to {ratio:.2g} of its volume" if ratio > 0.0 else "folded over at a node"
-    line = f"the cell at {_text(place)} mm is {state} in the step before"
+    line = f"the cell at {_text(place)} mm is {state} in the increment before"
     length = float(np.ptp(corners, axis=0).max())
     edges = mesh.points[_sharp_edges(mesh)]
     if len(edges) and float(np.linalg.norm(edges - place, axis=1).min()) < _NEAR * length:
@@ -69,9 +69,9 @@ def fold_warnings(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
         return []
     place = mesh.points[mesh.cells[cell, : mesh.dim + 1]].mean(axis=0)
     return [
-        f"the cell at {_text(place)} mm is folded over at a node, most in step {number}: equilibrium holds, stress and "
-        "strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer edges "
-        "there avoid it"
+        f"the cell at {_text(place)} mm is folded over at a node, most in increment {number}: equilibrium holds, "
+        "stress and strain at that place do not, and nothing keeps surfaces that fold over apart; a fillet or longer "
+        "edges there avoid it"
     ]
 
 
@@ -81,8 +81,9 @@ def snap_warnings(steps: Sequence[StepResult]) -> list[str]:
     if not snapped:
         return []
     return [
-        f"the finger snaps to another equilibrium in step {', '.join(snapped)}: the one before ends there, and the one "
-        "that follows depends on mesh and increments; a fillet where a sharp edge folds, or a smaller depth, avoids it"
+        f"the finger snaps to another equilibrium in increment {', '.join(snapped)}: the one before ends there, and "
+        "the one that follows depends on mesh and increments; a fillet where a sharp edge folds, or a smaller depth, "
+        "avoids it"
     ]
 
 

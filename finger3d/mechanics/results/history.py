@@ -17,7 +17,7 @@ from finger3d.errors import Outcome
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.mechanics.readings.columns import QUANTITIES, Column, by_key, in_space, of_kind
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.results.zones import Zone, zone_area, zone_ends, zones
+from finger3d.mechanics.results.zones import Zone, edges_of, zone_area, zone_ends, zones
 from finger3d.objects import ObjectPose
 
 _READINGS = ("gauges", "markers", "taxels", "other_readings")
@@ -67,9 +67,7 @@ class ContactPoints:
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Pairs of points (e, 2) that an edge of the surface mesh joins."""
-        corners = range(self.facets.shape[1])
-        pairs = np.vstack([self.facets[:, [i, j]] for i in corners for j in range(i)])
-        return np.unique(np.sort(pairs, axis=1), axis=0)
+        return edges_of(self.facets)
 
     @cached_property
     def facet_area(self) -> Float:

@@ -14,6 +14,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import BoundarySurface, restrict
 from finger3d.mechanics.discretise.contact_geometry import may_touch
 from finger3d.mechanics.discretise.problem import Problem, free_surface
+from finger3d.mechanics.discretise.resolution import size_advice
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Model
@@ -110,8 +111,11 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
     mesh, depth = problem.model.mesh, deepest.depth_mm
     where = ", ".join(f"{axis} = {value:.3g}" for axis, value in zip("xyz", deepest.place, strict=False))
     on_wall = deepest.face != CONTACT and not deepest.at_crease
-    key, length = ("base_size_mm", mesh.base_size_mm) if on_wall else ("size_mm", mesh.size_mm)
-    cure = f"mesh.{key} = {resolving_edge(deepest) * length:.2g} leaves about {_ADVISE_ABOVE:.0%}"
+    ratio, effect = resolving_edge(deepest), f"leaves about {_ADVISE_ABOVE:.0%}"
+    if on_wall:
+        cure = f"mesh.base_size_mm = {ratio * mesh.base_size_mm:.2g} {effect}"
+    else:
+        cure = size_advice(problem.model, ratio * mesh.size_mm, effect, "a finer one leaves less")
     if mesh.grading is not None:
         cure = "a smaller mesh.tolerance leaves less"
     if deepest.at_crease:

@@ -122,6 +122,13 @@ def _slopes(
     return slope, np.bincount(at, minlength=len(points)) > 0
 
 
+def edges_of(facets: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the pairs of points (e, 2) that an edge of facets (f, d) joins."""
+    corners = range(facets.shape[1])
+    pairs = np.vstack([facets[:, [i, j]] for i in corners for j in range(i)])
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
 def zone_ends(x: Float, points: Int, zone: Zone) -> tuple[float, float]:
     """Return where a zone begins and ends (mm) along a line; twice the same place for an empty zone.
 

@@ -182,7 +182,7 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
         how = "physical surface" if path.suffix.lower() == ".msh" else "value of the cell data 'label'"
         raise Finger3dError(
             f"{path}: no facets are named '{missing[0]}' (a {how}); named are: {names}; name the facets of the fixed "
-            "base 'base' and those that may touch first 'contact'"
+            "base 'base' and the facets that may touch first 'contact'"
         )
     if cuts := [name for name in _CUTS if name in contents.label]:
         raise Finger3dError(

@@ -17,7 +17,7 @@ from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.limits import check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.grid import Grid, Sizes, folded_zone, rows, triangulate
+from finger3d.meshing.structured.grid import Grid, GridLayout, Sizes, folded_zone, rows, triangulate
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh
@@ -38,7 +38,7 @@ def mesh_section(
     start = time.perf_counter()
     check_sizes(design, options, 2)
     axes = tuple(_AXIS[a] for a in ("x",) if a not in symmetry)
-    grid, section = _grid(design, options, zone, 2, 2 ** len(axes))
+    grid, section = _grid(design, options, zone, 2, _copies(design, options, 2, symmetry))
     mesh = _on_curves(
         quadratic(_with_parts(Mesh(grid.points, grid.cells, grid.facets), section, grid.part)), grid.curves
     )
@@ -58,10 +58,9 @@ def mesh_swept(
     start = time.perf_counter()
     check_sizes(design, options, 3)
     half = 0.5 * design.width_mm
-    # Friction varies along z as it does along x, so no layer is thicker than the edge length at the contact.
-    layers = max(options.layers, math.ceil(half / options.size_mm - 1e-9))
+    layers = _layers(design, options)
     axes = tuple(_AXIS[a] for a in ("x", "z") if a not in symmetry)
-    grid, section = _grid(design, options, zone, 3, 3 * layers * 2 ** len(axes))
+    grid, section = _grid(design, options, zone, 3, _copies(design, options, 3, symmetry))
     levels = np.linspace(0.0, half, layers + 1)
     swept = _with_parts(_sweep(grid, levels), section, np.tile(np.tile(grid.part, 3), layers))
     mesh = _on_curves(quadratic(swept), tuple((curve, np.tile(u, layers + 1)) for curve, u in grid.curves))
@@ -69,6 +68,24 @@ def mesh_swept(
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = 4.0 / 2 ** len(axes)
     return whole, _fit(mesh_report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
+
+
+def cell_count(design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...]) -> float:
+    """Return the number of cells of a mesh of :func:`mesh_section` or :func:`mesh_swept`, without making it."""
+    return 2.0 * _layout(design, options, zone, dim)[0].count * _copies(design, options, dim, symmetry)
+
+
+def _layers(design: Design, options: MeshSizes) -> int:
+    """Return the number of layers over half the width."""
+    # Friction varies along z as it does along x, so no layer is thicker than the edge length at the contact.
+    return max(options.layers, math.ceil(0.5 * design.width_mm / options.size_mm - 1e-9))
+
+
+def _copies(design: Design, options: MeshSizes, dim: int, symmetry: tuple[str, ...]) -> int:
+    """Return the number of cells for each triangle of the half section."""
+    each = 1 if dim == 2 else 3 * _layers(design, options)
+    mirrors = sum(axis not in symmetry for axis in "xz"[: dim - 1])
+    return int(each * 2**mirrors)
 
 
 def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
@@ -83,15 +100,19 @@ def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
 
 def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
     """Return the triangles of the half section; a mesh of `copies` cells per triangle must fit the memory."""
+    layout, section = _layout(design, options, zone, dim)
+    check_count(2.0 * layout.count * copies, dim, options)
+    return triangulate(layout), section
+
+
+def _layout(design: Design, options: MeshSizes, zone: Zone, dim: int) -> tuple[GridLayout, Section]:
     section = design.section()
     if section is None:
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
         raise Finger3dError(f"{what}: {design.name} is {lacks_section(design)}; allowed: {allowed}")
     low, high = folded_zone(zone, section.half_length_mm)
     grading = options.grading.in_section if options.grading else None
-    layout = rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading))
-    check_count(2.0 * layout.count * copies, dim, options)
-    return triangulate(layout), section
+    return rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading)), section
 
 
 def _with_parts(mesh: Mesh, section: Section, part: Int) -> Mesh:
