@@ -48,13 +48,13 @@ def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]
 
 
 def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) -> Tree:
-    """Return the tables of one scene with edges twice as long as a press would choose, a solid's longer still."""
+    """Return the tables of one scene with edges two and four times as long as by default, a solid's longer still."""
     high, half, wide = HEIGHTS[finger], HALVES[finger], WIDTHS[finger]
     depth = high * _between(random, 0.005, 0.3)
-    legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 8}]
+    legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 4}]
     if random.random() < 0.25:
         slide = depth * random.uniform(0.05, 0.5)
-        legs.append({"depth_mm": depth, "slide_x_mm": slide, "duration_s": _between(random, 0.01, 50.0), "steps": 4})
+        legs.append({"depth_mm": depth, "slide_x_mm": slide, "duration_s": _between(random, 0.01, 50.0), "steps": 2})
     angle = random.uniform(0.0, 90.0)
     gauges = [
         {"name": name, "x_mm": x * half, "y_mm": y * high, "angle_deg": angle, "length_mm": 0.1 * high}
@@ -87,7 +87,7 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
         edge = SOLID_EDGES[finger]
         return tables | {"mesh": {"size_mm": edge, "base_size_mm": 4.0 * edge, "mesher": "swept"}}
     own = parse(tables).mesh
-    return tables | {"mesh": {"size_mm": 2.0 * own.size_mm, "base_size_mm": max(own.base_size_mm, 2.0 * own.size_mm)}}
+    return tables | {"mesh": {"size_mm": 2.0 * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
 
 
 def _object(random: np.random.Generator, shape: int, high: float, depth: float) -> Tree:

@@ -41,7 +41,7 @@ from ._rows import Result, Row
 
 SEED = 2026
 SECTIONS, SOLIDS = 80, 20
-FINER = {"solid": 0.7, "section": 0.5}
+FINER = {"solid": 0.75, "section": 0.7}
 """Edge lengths of the truth over those of the press."""
 NEAR = 0.2
 """Distance from the tolerance, relative to it, at which either answer is right."""

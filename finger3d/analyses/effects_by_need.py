@@ -1,8 +1,8 @@
 """Which effects a scene calls for: those that change a number of its press by more than a tolerance.
 
-Every effect that the scene names, and large deformation in any case, is added to coarse presses without it, first
-alone and then beside those that are needed, since one effect may matter because of another.  What is left out is a part
-of the model's error.
+Every effect that the scene names, and large deformation in any case, is added to coarse presses, first alone and then,
+since one effect may matter or not because of another, beside all others that may matter.  What is left out is a part of
+the model's error.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
 from finger3d.effects import effect_names
-from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings.columns import AREAS
 from finger3d.progress import Progress
 from finger3d.scene import Scene
 
@@ -34,6 +35,11 @@ _NEEDS = {
 }
 """What an effect that a scene does not name lacks."""
 
+_ZONES = ("contact_half_length_mm", "stick_half_length_mm", *AREAS)
+
+_INTERACTION = 8.0
+"""Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
+
 _FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
 
 
@@ -44,7 +50,7 @@ class Judged:
     Attributes
     ----------
     used : whether the effect is on
-    estimate : what it changes, beside the effects that are used
+    estimate : what it changes, alone or beside the other effects that may matter
     number : name of the number that it changes most, relative to its scale
     change : relative change of that number
     seconds : that it adds to the press by the forecast
@@ -129,25 +135,20 @@ def judge(scene: Scene, report: Progress) -> Need:
     }
     report.stage("judging which effects the scene calls for")
     presses = _presses(plain)
-    used = dict[str, Enriched]()
-    judged, failed = dict[str, Judged](), dict[str, str]()
-    for effects in (sorted(on), None):  # alone, and then what is left out beside the others
-        left = [name for name in effects or judged if name not in used]
-        if effects is None and not used:
-            break
-        beside = dict(used)
-        for name in left:
-            report.say(f"judging {name}{', beside ' + ', '.join(sorted(beside)) if beside else ''}")
-            try:
-                estimate = presses.changes(beside | {name: on[name]}, name)
-            except _FAILURES as error:
-                failed[name] = str(error) or type(error).__name__
-                continue
-            number, change = _largest(estimate.changes)
-            needed = abs(change) > scene.auto
-            judged[name] = Judged(needed, estimate, number, change, _added_seconds(plain, beside, on[name]))
-            if needed:
-                used[name] = on[name]
+    found, failed = dict[str, ChangeEstimate](), dict[str, str]()
+    for name in sorted(on):
+        report.say(f"judging {name}")
+        try:
+            found[name] = presses.changes({name: on[name]}, name)
+        except _FAILURES as error:
+            failed[name] = str(error) or type(error).__name__
+    found |= _beside_each_other(presses, {name: on[name] for name in found}, found, scene.auto, report)
+    largest = {name: _largest(estimate.changes) for name, estimate in found.items()}
+    used = {name: on[name] for name, (_, change) in largest.items() if abs(change) > scene.auto}
+    judged = {
+        name: Judged(name in used, found[name], *largest[name], _added_seconds(plain, used, name, on[name]))
+        for name in found
+    }
     unjudged = {name: why for name, why in _NEEDS.items() if name not in on and name in effect_names()}
     return Need(scene.auto, judged, failed | unjudged, time.perf_counter() - start)
 
@@ -168,20 +169,49 @@ def _presses(model: Model) -> CoarsePresses:
     presses = CoarsePresses(model, cheap_factor(model, without_output_s(forecast(model))))
     try:
         presses.numbers({})
-    except UnresolvedError:
+    except Finger3dError:
         presses = CoarsePresses(model, 1.0, 1.0)
         presses.numbers({})
     return presses
 
 
+def _beside_each_other(
+    presses: CoarsePresses,
+    on: Mapping[str, Enriched],
+    alone: Mapping[str, ChangeEstimate],
+    tolerance: float,
+    report: Progress,
+) -> dict[str, ChangeEstimate]:
+    """Return what effects change beside all others that may matter, where others may decide whether they are needed."""
+    reach = {name: max(abs(c.relative) for c in estimate.changes.values()) for name, estimate in alone.items()}
+    near = {name: on[name] for name in alone if reach[name] > tolerance / _INTERACTION}
+    found = dict[str, ChangeEstimate]()
+    for name in near if len(near) > 1 else ():
+        if abs(_largest(alone[name].changes)[1]) > _INTERACTION * tolerance:
+            continue
+        report.say(f"judging {name}, beside {', '.join(other for other in near if other != name)}")
+        try:
+            found[name] = presses.changes(near, name)
+        except _FAILURES as error:
+            report.say(f"{name} is judged alone: {error}")
+    return found
+
+
 def _largest(changes: Mapping[str, Change]) -> tuple[str, float]:
-    """Return the number that changes most relative to its scale, of those whose change has a sign, and its change."""
-    known = {name: change.relative for name, change in changes.items() if abs(change.change) > change.error}
+    """Return the number that changes most relative to its scale, and its change.
+
+    A length or an area, which changes by whole contact points, counts if the change has a sign.
+    """
+    known = {
+        name: change.relative
+        for name, change in changes.items()
+        if name not in _ZONES or abs(change.change) > change.error
+    }
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
 
-def _added_seconds(model: Model, beside: Mapping[str, Enriched], added: Enriched) -> float:
-    """Return the seconds that an effect adds to a press with others by the forecast."""
-    for name in sorted(beside):
-        model = beside[name](model)
+def _added_seconds(model: Model, used: Mapping[str, Enriched], name: str, added: Enriched) -> float:
+    """Return the seconds that an effect adds to a press with those that are used by the forecast."""
+    for other in sorted(used.keys() - {name}):
+        model = used[other](model)
     return max(float(forecast(added(model))["total_s"] - forecast(model)["total_s"]), 0.0)
