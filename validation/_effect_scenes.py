@@ -48,7 +48,7 @@ def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]
 
 
 def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) -> Tree:
-    """Return the tables of one scene with edges two and four times as long as by default, a solid's longer still."""
+    """Return the tables of one scene with edges 1.5 and four times as long as by default, a solid's longer still."""
     high, half, wide = HEIGHTS[finger], HALVES[finger], WIDTHS[finger]
     depth = high * _between(random, 0.005, 0.3)
     legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 4}]
@@ -87,7 +87,7 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
         edge = SOLID_EDGES[finger]
         return tables | {"mesh": {"size_mm": edge, "base_size_mm": 4.0 * edge, "mesher": "swept"}}
     own = parse(tables).mesh
-    return tables | {"mesh": {"size_mm": 2.0 * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
+    return tables | {"mesh": {"size_mm": 1.5 * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
 
 
 def _object(random: np.random.Generator, shape: int, high: float, depth: float) -> Tree:

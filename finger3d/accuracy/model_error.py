@@ -78,7 +78,8 @@ class CoarsePresses:
         model = coarse_model(self.model, factor, steps)
         for name in sorted(effects):
             model = effects[name](model)
-        problem = build(model)
+        # the strain without foils is that of a press of its own, and no other press has it
+        problem = replace(build(model), without_inclusions=None)
         return changing_numbers(problem, last_step(problem)), problem
 
     def changes(
@@ -95,8 +96,8 @@ class CoarsePresses:
         others = {name: effects[name] for name in effects if name != added}
         before, before_still = self.numbers(others)
         after, after_still = self.numbers(effects)
-        values, kinds = press or before, kinds_of(self.model.columns)  # stiff foils have strains of their own besides
-        names = [name for name in values if name in kinds and name in after and name in before]
+        values = press or before
+        names = [name for name in values if name in after and name in before]
         change = {name: after[name] - before[name] for name in names}
         errors = {
             name: max(
@@ -108,7 +109,7 @@ class CoarsePresses:
         }
         mesh = coarser(self.model, self.factor).mesh
         return ChangeEstimate(
-            changes=judged({name: values[name] for name in names}, change, errors, kinds),
+            changes=judged({name: values[name] for name in names}, change, errors, kinds_of(self.model.columns)),
             method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in "
             f"{_STEPS[0]} increments a leg; error: with {self.still:g} times these edges in {_STEPS[1]} increments,"
             " and from how far the coarse press without it is from the press",
