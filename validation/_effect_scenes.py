@@ -22,7 +22,7 @@ SOLID_EDGES = (3.6, 0.4, 0.8)
 COIN = Path(__file__).resolve().parent.parent / "geometries" / "coin.stl"
 
 _TRIES = 20
-"""Draws of a scene until one is not refused: a gauge may lie outside of the finger, a mesh may not resolve the object."""
+"""Draws of a scene until one is not refused: a gauge may be outside the finger, a mesh may not resolve the object."""
 
 
 def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]:
@@ -91,7 +91,7 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
 
 
 def _object(random: np.random.Generator, shape: int, high: float, depth: float) -> Tree:
-    """Return the table of an object of a size like the finger's; no cylinder or ball is pressed in beyond its middle."""
+    """Return the table of an object about as large as the finger; a cylinder or ball is pressed in up to its middle."""
     round_mm = max(high * _between(random, 0.5, 4.0), 1.2 * depth)
     tables: tuple[Tree, ...] = (
         {"shape": "plane"},

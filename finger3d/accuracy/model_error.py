@@ -83,7 +83,11 @@ class CoarsePresses:
         return changing_numbers(problem, last_step(problem)), problem
 
     def changes(
-        self, effects: Mapping[str, Enriched], added: str, press: Mapping[str, float] | None = None
+        self,
+        effects: Mapping[str, Enriched],
+        added: str,
+        press: Mapping[str, float] | None = None,
+        neutral: Mapping[str, Enriched] | None = None,
     ) -> ChangeEstimate:
         """Return what one of several effects changes beside the others.
 
@@ -92,8 +96,9 @@ class CoarsePresses:
         effects : all that are on, the one in question among them
         added : name of the one in question
         press : numbers of the press itself without it, if they are known
+        neutral : what stands in its place in the presses without it, by another name
         """
-        others = {name: effects[name] for name in effects if name != added}
+        others = {name: effects[name] for name in effects if name != added} | dict(neutral or {})
         before, before_still = self.numbers(others)
         after, after_still = self.numbers(effects)
         values = press or before

@@ -37,6 +37,13 @@ _NEEDS = {
 
 _ZONES = ("contact_half_length_mm", "stick_half_length_mm", *AREAS)
 
+_NEUTRAL: Mapping[str, Tree] = {
+    "kinetic_friction": {"ratio": 1.0 - 1e-12},
+    "viscosity": {"prony": ((1e-12, 1.0),)},
+}
+"""Settings with which an effect changes nothing.  With these effects increments are as they are given, without them of
+second order or exact: few increments would make a difference of their own."""
+
 _INTERACTION = 8.0
 """Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
 
@@ -130,8 +137,10 @@ def judge(scene: Scene, report: Progress) -> Need:
     start = time.perf_counter()
     plain = scene.with_effects(()).model()
     settings = {LARGE_DEFORMATION: None, **scene.effects}
-    on: dict[str, Enriched] = {
-        name: (effect or scene.with_effects([name]).effects[name]).apply for name, effect in settings.items()
+    effects = {name: effect or scene.with_effects([name]).effects[name] for name, effect in settings.items()}
+    on: dict[str, Enriched] = {name: effect.apply for name, effect in effects.items()}
+    off: dict[str, dict[str, Enriched]] = {
+        name: {f"no {name}": replace(effects[name], **_NEUTRAL[name]).apply} for name in on.keys() & _NEUTRAL.keys()
     }
     report.stage("judging which effects the scene calls for")
     presses = _presses(plain)
@@ -139,10 +148,10 @@ def judge(scene: Scene, report: Progress) -> Need:
     for name in sorted(on):
         report.say(f"judging {name}")
         try:
-            found[name] = presses.changes({name: on[name]}, name)
+            found[name] = presses.changes({name: on[name]}, name, neutral=off.get(name))
         except _FAILURES as error:
             failed[name] = str(error) or type(error).__name__
-    found |= _beside_each_other(presses, {name: on[name] for name in found}, found, scene.auto, report)
+    found |= _beside_each_other(presses, on, off, found, scene.auto, report)
     largest = {name: _largest(estimate.changes) for name, estimate in found.items()}
     used = {name: on[name] for name, (_, change) in largest.items() if abs(change) > scene.auto}
     judged = {
@@ -178,6 +187,7 @@ def _presses(model: Model) -> CoarsePresses:
 def _beside_each_other(
     presses: CoarsePresses,
     on: Mapping[str, Enriched],
+    off: Mapping[str, Mapping[str, Enriched]],
     alone: Mapping[str, ChangeEstimate],
     tolerance: float,
     report: Progress,
@@ -191,7 +201,7 @@ def _beside_each_other(
             continue
         report.say(f"judging {name}, beside {', '.join(other for other in near if other != name)}")
         try:
-            found[name] = presses.changes(near, name)
+            found[name] = presses.changes(near, name, neutral=off.get(name))
         except _FAILURES as error:
             report.say(f"{name} is judged alone: {error}")
     return found
