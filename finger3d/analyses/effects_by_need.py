@@ -44,6 +44,10 @@ _NEUTRAL: Mapping[str, Tree] = {
 """Settings with which an effect changes nothing.  With these effects increments are as they are given, without them of
 second order or exact: few increments would make a difference of their own."""
 
+_FINER_AT_CONTACT = 2.0
+"""Edge lengths of the coarse meshes relative to their bases, over those of the press: few points of contact say nothing
+about friction."""
+
 _INTERACTION = 8.0
 """Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
 
@@ -175,7 +179,9 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
 
 def _presses(model: Model) -> CoarsePresses:
     """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it."""
-    presses = CoarsePresses(model, cheap_factor(model, without_output_s(forecast(model))))
+    mesh = model.mesh
+    fine = replace(model, mesh=replace(mesh, size_mm=mesh.size_mm / _FINER_AT_CONTACT))
+    presses = CoarsePresses(fine, cheap_factor(fine, without_output_s(forecast(model))))
     try:
         presses.numbers({})
     except Finger3dError:
