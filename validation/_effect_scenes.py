@@ -18,7 +18,7 @@ FINGERS: tuple[Tree, ...] = (
     {"geometry": "block", "half_length_mm": 8.0, "height_mm": 8.0},
 )
 HEIGHTS, HALVES, WIDTHS = (50.0, 5.0, 8.0), (50.0, 5.0, 8.0), (20.0, 3.0, 8.0)
-SOLID_EDGES = (3.6, 0.4, 0.8)
+SOLID_EDGES = (5.0, 0.6, 1.1)
 COIN = Path(__file__).resolve().parent.parent / "geometries" / "coin.stl"
 
 _TRIES = 20
@@ -50,7 +50,7 @@ def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]
 def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) -> Tree:
     """Return the tables of one scene with edges 1.5 and four times as long as by default, a solid's longer still."""
     high, half, wide = HEIGHTS[finger], HALVES[finger], WIDTHS[finger]
-    depth = high * _between(random, 0.005, 0.3)
+    depth = high * _between(random, 0.005, 0.08 if solid else 0.3)
     legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 4}]
     if random.random() < 0.25:
         slide = depth * random.uniform(0.05, 0.5)
@@ -60,6 +60,8 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
         {"name": name, "x_mm": x * half, "y_mm": y * high, "angle_deg": angle, "length_mm": 0.1 * high}
         for name, x, y in (("a", random.uniform(0.0, 0.5), random.uniform(0.3, 0.75)), ("b", 0.0, 0.6))
     ]
+    if solid:  # a gauge that keeps the symmetry, and with it half of the mesh
+        gauges = [{**gauges[1], "angle_deg": 0.0}]
     domain: Any = "solid" if solid else ("plane-strain", "plane-stress")[int(random.integers(2))]
     elastic = {"E_MPa": _between(random, 1.0, 1e5), "nu": random.uniform(0.2, 0.45)}
     tables: Tree = {
@@ -85,7 +87,7 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
         del tables["effects"]["elastic_object"]
     if solid:
         edge = SOLID_EDGES[finger]
-        return tables | {"mesh": {"size_mm": edge, "base_size_mm": 4.0 * edge, "mesher": "swept"}}
+        return tables | {"mesh": {"size_mm": edge, "base_size_mm": 3.0 * edge, "mesher": "swept"}}
     own = parse(tables).mesh
     return tables | {"mesh": {"size_mm": 1.5 * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
 

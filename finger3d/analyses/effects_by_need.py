@@ -20,7 +20,6 @@ from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
 from finger3d.effects import effect_names
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import AREAS
 from finger3d.progress import Progress
 from finger3d.scene import Scene
 
@@ -35,8 +34,6 @@ _NEEDS = {
 }
 """What an effect that a scene does not name lacks."""
 
-_ZONES = ("contact_half_length_mm", "stick_half_length_mm", *AREAS)
-
 _NEUTRAL: Mapping[str, Tree] = {
     "kinetic_friction": {"ratio": 1.0 - 1e-12},
     "viscosity": {"prony": ((1e-12, 1.0),)},
@@ -47,6 +44,9 @@ second order or exact: few increments would make a difference of their own."""
 _FINER_AT_CONTACT = 2.0
 """Edge lengths of the coarse meshes relative to their bases, over those of the press: few points of contact say nothing
 about friction."""
+
+_ROUND_OFF = 1e-9
+"""Relative change up to which nothing changes."""
 
 _INTERACTION = 8.0
 """Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
@@ -156,7 +156,7 @@ def judge(scene: Scene, report: Progress) -> Need:
         except _FAILURES as error:
             failed[name] = str(error) or type(error).__name__
     found |= _beside_each_other(presses, on, off, found, scene.auto, report)
-    largest = {name: _largest(estimate.changes) for name, estimate in found.items()}
+    largest = {name: _largest(estimate) for name, estimate in found.items()}
     used = {name: on[name] for name, (_, change) in largest.items() if abs(change) > scene.auto}
     judged = {
         name: Judged(name in used, found[name], *largest[name], _added_seconds(plain, used, name, on[name]))
@@ -179,9 +179,12 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
 
 def _presses(model: Model) -> CoarsePresses:
     """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it."""
-    mesh = model.mesh
+    mesh, press_s = model.mesh, without_output_s(forecast(model))
     fine = replace(model, mesh=replace(mesh, size_mm=mesh.size_mm / _FINER_AT_CONTACT))
-    presses = CoarsePresses(fine, cheap_factor(fine, without_output_s(forecast(model))))
+    try:
+        presses = CoarsePresses(fine, cheap_factor(fine, press_s))
+    except Finger3dError:  # too costly
+        presses = CoarsePresses(model, cheap_factor(model, press_s))
     try:
         presses.numbers({})
     except Finger3dError:
@@ -200,10 +203,11 @@ def _beside_each_other(
 ) -> dict[str, ChangeEstimate]:
     """Return what effects change beside all others that may matter, where others may decide whether they are needed."""
     reach = {name: max(abs(c.relative) for c in estimate.changes.values()) for name, estimate in alone.items()}
-    near = {name: on[name] for name in alone if reach[name] > tolerance / _INTERACTION}
+    # kinetic friction alone changes nothing where all points stick: others may let them slip
+    near = {name: on[name] for name in alone if not _ROUND_OFF < reach[name] < tolerance / _INTERACTION}
     found = dict[str, ChangeEstimate]()
     for name in near if len(near) > 1 else ():
-        if abs(_largest(alone[name].changes)[1]) > _INTERACTION * tolerance:
+        if abs(_largest(alone[name])[1]) > _INTERACTION * tolerance:
             continue
         report.say(f"judging {name}, beside {', '.join(other for other in near if other != name)}")
         try:
@@ -213,15 +217,15 @@ def _beside_each_other(
     return found
 
 
-def _largest(changes: Mapping[str, Change]) -> tuple[str, float]:
+def _largest(estimate: ChangeEstimate) -> tuple[str, float]:
     """Return the number that changes most relative to its scale, and its change.
 
-    A length or an area, which changes by whole contact points, counts if the change has a sign.
+    A length or an area, which changes by whole contact points, counts if it changes by more than they resolve.
     """
     known = {
         name: change.relative
-        for name, change in changes.items()
-        if name not in _ZONES or abs(change.change) > change.error
+        for name, change in estimate.changes.items()
+        if abs(change.change) >= estimate.resolution.get(name, 0.0)
     }
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
