@@ -25,12 +25,16 @@ _TRIES = 20
 """Draws of a scene until one is not refused: a gauge may be outside the finger, a mesh may not resolve the object."""
 
 
-def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]:
+def scenes(sections: int, solids: int, seed: int, longer: float = 1.5) -> Iterator[tuple[str, Scene]]:
     """Names and scenes: the shapes of finger and object in turn, all else at random.
 
-    Depths are 0.5 to 30 % of the finger's height, moduli of the object 1 to 1e5 times the finger's, of foils 1 to 1e4
-    MPa, ratios of kinetic to static friction 0.3 to 1; 2 to 50 % of the modulus relax in 0.5 s, and the object takes
-    0.01 to 50 s for its way.  One path in four slides after the press.
+    Depths are 0.5 to 30 % of the height, in solids to 8 %, moduli of the object 1 to 1e5 times those of the finger, of
+    foils 1 to 1e4 MPa, ratios of kinetic to static friction 0.3 to 1; 2 to 50 % of the modulus relax in 0.5 s, and the
+    object takes 0.01 to 50 s for its way.  One path in four slides after the press.
+
+    Parameters
+    ----------
+    longer : edge length at the contact of a section over the one that a press chooses
     """
     for domain, count, places in (("section", sections, 6), ("solid", solids, 7)):
         for number in range(count):
@@ -38,7 +42,7 @@ def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]
             finger, shape = number % len(FINGERS), (number // len(FINGERS)) % places
             for _ in range(_TRIES):
                 try:
-                    scene = parse(_drawn(random, finger, shape, domain == "solid"))
+                    scene = parse(_drawn(random, finger, shape, domain == "solid", longer))
                     break
                 except Finger3dError:
                     continue
@@ -47,8 +51,8 @@ def scenes(sections: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]
             yield f"{domain} {number}: {scene.tables.object['shape']} on {scene.design.name}", scene
 
 
-def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) -> Tree:
-    """Return the tables of one scene with edges 1.5 and four times as long as by default, a solid's longer still."""
+def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool, longer: float) -> Tree:
+    """Return the tables of one scene; edges far from contact are four times as long as by default, or longer."""
     high, half, wide = HEIGHTS[finger], HALVES[finger], WIDTHS[finger]
     depth = high * _between(random, 0.005, 0.08 if solid else 0.3)
     legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 4}]
@@ -89,7 +93,7 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool) ->
         edge = SOLID_EDGES[finger]
         return tables | {"mesh": {"size_mm": edge, "base_size_mm": 3.0 * edge, "mesher": "swept"}}
     own = parse(tables).mesh
-    return tables | {"mesh": {"size_mm": 1.5 * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
+    return tables | {"mesh": {"size_mm": longer * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
 
 
 def _object(random: np.random.Generator, shape: int, high: float, depth: float) -> Tree:

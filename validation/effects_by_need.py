@@ -16,7 +16,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
+from threading import Event, Timer
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,7 @@ from finger3d.analyses.effects_by_need import LARGE_DEFORMATION
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.step_halving import last_step
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.scene import Scene, parse
 
@@ -40,9 +42,11 @@ from ._paper import columns
 from ._rows import Result, Row
 
 SEED = 2026
-SECTIONS, SOLIDS = 36, 9
+SECTIONS, SOLIDS = 60, 15
 FINER = {"solid": 0.75, "section": 0.7}
 """Edge lengths of the truth over those of the press."""
+MOST_S = 60.0
+"""Seconds of a press after which its scene is left out."""
 NEAR = 0.2
 """Distance from the tolerance, relative to it, at which either answer is right."""
 RIGHT, COVERED, COST = 0.95, 0.9, 1.5
@@ -116,9 +120,24 @@ class Pressed:
 
     @classmethod
     def of(cls, model: Model) -> Pressed:
-        """Press a model."""
-        problem = build(model)
-        step = last_step(problem)
+        """Press a model.
+
+        Raises
+        ------
+        Finger3dError
+            If the press does not converge, or takes more than `MOST_S`.
+        """
+        problem, cancel = build(model), Event()
+        timer = Timer(MOST_S, cancel.set)
+        timer.start()
+        try:
+            *_, step = march(problem, cancel=cancel)
+        except CancelledError:
+            raise Finger3dError(f"the press takes more than {MOST_S:g} s") from None
+        finally:
+            timer.cancel()
+        if not step.outcome.ok:
+            raise Finger3dError(f"the press did not converge ({step.outcome})")
         return cls(changing_numbers(problem, step), PointResolution.of(problem, step).zone_bars)
 
 
@@ -132,16 +151,16 @@ def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
     """
     assert scene.auto is not None
     names = (LARGE_DEFORMATION, *scene.effects)
+    everything = scene.with_effects(names).model()
+    every = Pressed.of(everything)
+    without = {effect: Pressed.of(_without(scene, names, effect)) for effect in names}
     start = time.perf_counter()
     auto = finger3d.press(scene)
     seconds = time.perf_counter() - start
-    everything = scene.with_effects(names).model()
-    every = Pressed.of(everything)
     judged = auto.summary()["effects_auto"]
     verdicts = []
     for effect in names:
-        without = Pressed.of(_without(scene, names, effect))
-        change, number, sure = _largest_change(everything, without, every)
+        change, number, sure = _largest_change(everything, without[effect], every)
         found = judged["judged"].get(effect, {"change": 0.0, "number": ""})
         verdicts.append(
             Verdict(name, effect, effect in judged["used"], scene.auto, change, number, sure, found["change"],
@@ -210,7 +229,7 @@ def _flat(step: Tree) -> dict[str, float]:
 def run(quick: bool) -> Result:
     """All scenes; quick: two sections."""
     found, failed = list[Compared](), 0
-    drawn = scenes(2, 0, SEED) if quick else scenes(SECTIONS, SOLIDS, SEED)
+    drawn = scenes(2, 0, SEED, 3.0) if quick else scenes(SECTIONS, SOLIDS, SEED)
     for number, (name, scene) in enumerate(drawn):
         try:
             found.append(compare(name, scene, number % 3 == 0))
@@ -231,7 +250,7 @@ def _rows(found: list[Compared], failed: int) -> Iterable[Row]:
     either = sum(v.either for v in verdicts)
     what = f"share of {len(found)} scenes with the right set of effects; either answer is right for {either} of "
     yield Row(
-        f"{what}{len(verdicts)} effects, and {failed} more scenes are left out, whose truth does not converge", GOAL,
+        f"{what}{len(verdicts)} effects, and {failed} scenes more take over a minute or fail", GOAL,
         RIGHT, float(np.mean([one.right for one in found])), 0.0, "a bound", measure="at least",
     )  # fmt: skip
     yield Row(
