@@ -50,6 +50,25 @@ def test_an_effect_is_used_if_its_data_make_it_matter(name: str, much: Any, litt
     assert abs(without.judged[name].change) < 0.02
 
 
+def test_few_increments_make_no_difference_of_their_own() -> None:
+    """With two coefficients increments are as they are; without, the path under a plane is exact."""
+    found = judge(needs(0.3, kinetic_friction={"ratio": 0.999}, viscosity={"prony": [[0.001, 0.3]]}), QUIET)
+    for name in ("kinetic_friction", "viscosity"):
+        assert name not in found.used
+        assert abs(found.judged[name].change) < 0.01  # both change the limit of friction or the force by 0.1 %
+
+
+def test_effects_are_judged_beside_stiff_gauges() -> None:
+    """The free strain of such gauges is no number of a press without them."""
+    gauges = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}
+    long = [{"name": "long", "x_mm": 30.0, "y_mm": 38.0, "angle_deg": 10.0, "length_mm": 4.0}]
+    effects = {"auto": True, "embedded_gauge": gauges, "kinetic_friction": {"ratio": 0.9}}
+    given = {**needs().given, "gauge": long, "effects": effects}
+    found = judge(parse(given), QUIET)
+    assert {"embedded_gauge", "kinetic_friction"} <= set(found.judged)
+    assert not any(name.endswith("_free") for one in found.judged.values() for name in one.estimate.changes)
+
+
 def test_what_is_left_out_is_told_and_holds(tmp_path: Path) -> None:
     """The truth is the same press at large deformation."""
     given = changed(HALF_CYLINDER, depth_mm=0.05, size_mm=0.15) + "\n[effects]\nauto = true\nauto_tolerance = 0.9\n"

@@ -36,7 +36,7 @@ LABELS = {
     "elastic_object": "elastic object, E = 10 MPa",
     "embedded_gauge": "embedded foil gauge",
 }
-QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
+QUANTITIES = ("force", "contact_length", "stick", "friction_sum", "gauge_strain")
 DOMAINS = ("plane-strain", "solid")
 CALCULIX = "CalculiX 2.20; REFERENCES.md, 6.5"
 
@@ -94,7 +94,8 @@ def _pressed(domain: str, effect: str, quick: bool) -> dict[str, float]:
     return {
         "force": numbers["normal_force_N"] / 20.0,
         "contact_length": 2.0 * numbers["contact_half_length_mm"],
-        "stick_length": 2.0 * numbers["stick_half_length_mm"],
+        # of a solid the area: stick ends in a zone one point wide, whose length is that of a few points
+        "stick": 2.0 * numbers["stick_half_length_mm"] if problem.dim == 2 else numbers["stick_area_mm2"],
         "friction_sum": numbers["friction_sum_N"] / 20.0,
         "gauge_strain": numbers["gauges"]["g1"],
         "cpu_seconds": seconds,
@@ -148,12 +149,15 @@ def _rows(found: dict[tuple[str, str], dict[str, float]], quick: bool) -> tuple[
 
 
 def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
+    """Draw changes in per cent, and beside them the seconds of each press."""
     domains = [d for d in DOMAINS if (d, "none") in found]
     effects = [n for n in SETTINGS if (domains[0], n) in found]
-    names = ("force", "contact length", "stick length", "sum of |friction|", "gauge strain")
-    figure.set_size_inches(5.2 * len(domains) + 1.6, 5.6)
+    figure.set_size_inches(7.0 * len(domains) + 1.6, 5.6)
+    panels = figure.subplots(1, 2 * len(domains), squeeze=False, width_ratios=[3.4, 1.0] * len(domains))[0]
     for k, domain in enumerate(domains):
-        axes = figure.add_subplot(1, len(domains), k + 1)
+        axes, times = panels[2 * k : 2 * k + 2]
+        stick = "stick length" if domain == "plane-strain" else "stick area"
+        names = ("force", "contact length", stick, "sum of |friction|", "gauge strain")
         base = found[domain, "none"]
         height = 0.8 / len(effects)
         for i, effect in enumerate(effects):
@@ -165,11 +169,19 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
                     axes.text(min(max(c, -100.0), 200.0) + (2.0 if c > 0 else -2.0), y, f"{c:+.0f}", va="center",
                               ha="left" if c > 0 else "right", fontsize=7)  # fmt: skip
         axes.axvline(0.0, color="black", linewidth=0.8)
-        axes.set_yticks(np.arange(len(QUANTITIES)), names if k == 0 else [""] * len(names))
+        axes.set_yticks(np.arange(len(QUANTITIES)), names)
         axes.invert_yaxis()
         axes.set_xlim(-125.0, 225.0)
         axes.set_xlabel("change by the effect (%)")
         axes.set_title({"plane-strain": "section, plane strain", "solid": "solid, 20 mm wide"}[domain])
-        axes.spines[["top", "right"]].set_visible(False)
-    handles = figure.axes[0].get_legend_handles_labels()
+        seconds = [found[domain, name]["cpu_seconds"] for name in ("none", *effects)]
+        times.barh(range(len(seconds)), seconds, color=["#777777", *(f"C{i}" for i in range(len(effects)))])
+        for y, value in enumerate(seconds):
+            times.text(1.15 * value, y, f"{value:.2g}" if value < 10.0 else f"{value:.0f}", va="center", fontsize=8)
+        times.set(xscale="log", xlim=(0.5 * min(seconds), 6.0 * max(seconds)), xlabel="processor time (s)")
+        times.set_yticks([0], ["none"])
+        times.invert_yaxis()
+        for panel in (axes, times):
+            panel.spines[["top", "right"]].set_visible(False)
+    handles = panels[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", fontsize=8, frameon=False, ncols=3)

@@ -69,11 +69,13 @@ class ChangeEstimate:
     changes : changes of forces, lengths, areas and readings by name; empty if there is no estimate
     method : one line that says how the changes were estimated, or ``no estimate: ...``
     seconds : wall time of the estimate
+    resolution : of changes of lengths and areas by the contact points of the presses, by name
     """
 
     changes: Mapping[str, Change] = field(default_factory=dict)
     method: str = ""
     seconds: float = 0.0
+    resolution: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def significant(self) -> dict[str, Change]:

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
 from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
+from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
@@ -56,6 +57,7 @@ class CoarsePresses:
     factor: float
     still: float = 2.0
     _known: dict[tuple[str, ...], tuple[dict[str, float], dict[str, float]]] = field(default_factory=dict)
+    _zones: dict[tuple[str, ...], Mapping[str, float]] = field(default_factory=dict)
 
     def numbers(self, effects: Mapping[str, Enriched]) -> tuple[dict[str, float], dict[str, float]]:
         """Return the numbers by name with some effects on, on the coarse mesh and on the one that is coarser still.
@@ -67,22 +69,30 @@ class CoarsePresses:
         """
         key = tuple(sorted(effects))
         if key not in self._known:
-            fine, finer = self._pressed(self.factor, _STEPS[0], effects)
-            coarse, coarser_still = self._pressed(self.still * self.factor, _STEPS[1], effects)
+            fine, finer, zones = self._pressed(self.factor, _STEPS[0], effects)
+            coarse, coarser_still, _ = self._pressed(self.still * self.factor, _STEPS[1], effects)
             if self.still > 1.0 and edge_ratio(finer, coarser_still) < LEAST_RATIO:
                 raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
-            self._known[key] = fine, coarse
+            self._known[key], self._zones[key] = (fine, coarse), zones
         return self._known[key]
 
-    def _pressed(self, factor: float, steps: int, effects: Mapping[str, Enriched]) -> tuple[dict[str, float], Problem]:
+    def _pressed(
+        self, factor: float, steps: int, effects: Mapping[str, Enriched]
+    ) -> tuple[dict[str, float], Problem, Mapping[str, float]]:
         model = coarse_model(self.model, factor, steps)
         for name in sorted(effects):
             model = effects[name](model)
-        problem = build(model)
-        return changing_numbers(problem, last_step(problem)), problem
+        # the strain without foils is that of a press of its own, and no other press has it
+        problem = replace(build(model), without_inclusions=None)
+        last = last_step(problem)
+        return changing_numbers(problem, last), problem, PointResolution.of(problem, last).zone_bars
 
     def changes(
-        self, effects: Mapping[str, Enriched], added: str, press: Mapping[str, float] | None = None
+        self,
+        effects: Mapping[str, Enriched],
+        added: str,
+        press: Mapping[str, float] | None = None,
+        neutral: Mapping[str, Enriched] | None = None,
     ) -> ChangeEstimate:
         """Return what one of several effects changes beside the others.
 
@@ -91,8 +101,9 @@ class CoarsePresses:
         effects : all that are on, the one in question among them
         added : name of the one in question
         press : numbers of the press itself without it, if they are known
+        neutral : what stands in its place in the presses without it, by another name
         """
-        others = {name: effects[name] for name in effects if name != added}
+        others = {name: effects[name] for name in effects if name != added} | dict(neutral or {})
         before, before_still = self.numbers(others)
         after, after_still = self.numbers(effects)
         values = press or before
@@ -107,11 +118,13 @@ class CoarsePresses:
             for name in names
         }
         mesh = coarser(self.model, self.factor).mesh
+        zones = [self._zones[tuple(sorted(chosen))] for chosen in (others, effects)]
         return ChangeEstimate(
             changes=judged({name: values[name] for name in names}, change, errors, kinds_of(self.model.columns)),
             method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in "
             f"{_STEPS[0]} increments a leg; error: with {self.still:g} times these edges in {_STEPS[1]} increments,"
             " and from how far the coarse press without it is from the press",
+            resolution={name: sum(bars.get(name, 0.0) for bars in zones) for name in zones[0]},
         )
 
 
