@@ -10,8 +10,7 @@ Each value is therefore varied, and the others with it according to their covari
 increased by one: these are the ends of its 68 % interval, and the root mean square of their distances from the value
 is the standard deviation that the noise leaves.
 
-Errors b of the simulation shift the values by ``(J^T J)^-1 J^T b``.  Those of the mesh and of the increments are
-proportional to a column, and independent between columns.
+Errors b of the simulation shift the values by ``(J^T J)^-1 J^T b``.
 """
 
 from __future__ import annotations
@@ -227,6 +226,7 @@ def _interval(
             if abs(rise - 1.0) < _RISE_TOLERANCE or (rise < 1.0 and moved[number] in (0.0, 1.0)):
                 break
             step *= min(max(1.0 / math.sqrt(max(rise, 1e-12)), 1.0 / _LARGEST_STEP), _LARGEST_STEP)
+            step = max(step, 1.0 / _LARGEST_STEP)  # where the fit is poor, round-off of the minimum exceeds one
         ends.append(scales[number].value(float(moved[number])))
     return ends[0], ends[1]
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
@@ -42,6 +43,7 @@ _BAR = 1.645
 _SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
 _TRIED_MODULI = 41  # values of Young's modulus that are tried at the start
+_FRICTION = 0.2, 0.45, 0.7  # shares tried at the start: a fit does not leave values at which all of the contact sticks
 _FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
 _SHARPEST = 1e-9  # standard deviation of a column of zeros
 
@@ -209,6 +211,8 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
 
+    own = np.array([f.key.startswith("friction.") for f in simulation.free])
+    starts += [np.where(own, share, begin) for share in _FRICTION if own.any()]
     tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
     costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
     shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
@@ -223,13 +227,12 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     report.stage("errors of mesh and increments")
     fitted = uncertainty(scales, shares, derivative, residuals)
     simulated = simulation.at(values, data)
-    bars = simulation.errors(values)
-    unknown = sorted(set(data.columns) - set(bars))
-    errors = np.zeros((len(data.columns), data.count))
-    for k, name in enumerate(data.columns):
-        rows = slice(k * len(data.at), (k + 1) * len(data.at))
-        errors[k, rows] = bars.get(name, 0.0) / _BAR * simulated[name] / stds[name]
-    fitted = fitted.with_errors(scales, derivative, errors)
+    known = simulation.errors(values, data)
+    unknown = sorted(set(data.columns) - set(known))
+    zero = np.zeros((1, len(data.at)))
+    # a row of zeros for all columns but the one that the error is of
+    blocks = [known.get(name, zero) / (_BAR * stds[name]) for name in data.columns]
+    fitted = fitted.with_errors(scales, derivative, block_diag(*blocks))
     reduced = _reduced_chi_square(data, simulated, len(scales))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
     notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]

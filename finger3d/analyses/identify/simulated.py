@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.estimate import estimate, press_numbers
+from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
@@ -50,6 +51,9 @@ _SCALED = ("_N", "_MPa", "_mJ", "_Nmm")
 
 _UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
 """Last parts of the names of numbers of an increment."""
+
+_LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
+"""Numbers that say how strongly the finger is pressed, and how large the contact is."""
 
 _MAX_STORED = 4  # bodies
 
@@ -173,17 +177,30 @@ class Simulation:
                 column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
         return out
 
-    def errors(self, values: Float) -> dict[str, float]:
-        """Return the errors of mesh and increments by number at the end of the press, over the number."""
+    def errors(self, values: Float, measured: MeasuredPress) -> dict[str, Float]:
+        """Return independent errors (m, n) of every measured column whose error at the end of the press is known.
+
+        They are proportional to the normal force, and grow as the contact becomes smaller beside the edges of the mesh,
+        as an error of order `ORDER` does.  Two are those of all rows at once, with and without this growth, and one is
+        of each row, since errors change as points close one by one.
+        """
         point, _ = self._point(values)
         scene = self.scene(point)
         model = scene.model()
         body = self._body(scene, model)
         problem = under(body.problem, model.friction, rule=model.rule)
         steps = body.steps(model.friction, model.rule)
-        found = estimate(problem, steps, numbers=press_numbers).totals()
-        row = table_row(problem.points, steps[-1])
-        return {n: e / abs(float(row[n])) for n, e in found.items() if math.isfinite(e) and row.get(n)}
+        bars = estimate(problem, steps, numbers=press_numbers).totals()
+        end = table_row(problem.points, steps[-1])
+        known = [n for n in measured.columns if math.isfinite(bars.get(n, math.nan))]
+        found = self.at(values, replace(measured, columns=dict.fromkeys((_LOAD, _SIZE), measured.at)))
+        load, ratio = (
+            found[_LOAD] / float(end[_LOAD]),
+            np.divide(float(end[_SIZE]), found[_SIZE], out=np.ones_like(measured.at), where=found[_SIZE] > 0.0),
+        )
+        growth = ratio**ORDER
+        shapes = load * np.vstack([np.ones_like(growth), growth - 1.0, np.diag(growth)])
+        return {n: shapes * bars[n] for n in known}
 
     def _derivatives(self, point: tuple[float, ...], count: int, keys: Sequence[str]) -> list[Curve] | None:
         """Return the derivatives of a curve of `count` increments by keys of the scene; None where one has none."""
