@@ -109,13 +109,6 @@ def test_a_trial_that_fails_is_followed_by_one_nearer() -> None:
     )
 
 
-def test_a_trial_that_fails_within_a_bracket_is_followed_by_one_nearer_to_the_force() -> None:
-    search = search_of(lambda depth: depth if depth < 2.0 or depth > 5.0 else np.nan, 1.9, 0.0)
-    search.good += [search.increment(depth, ()) for depth in (1.8, 6.0)]
-    assert search.run(3.5).depth == pytest.approx(1.9, rel=1e-8)
-    assert len(search.failed) < 5
-
-
 def test_a_force_far_beyond_the_depths_that_fail_ends_the_search_early() -> None:
     search = search_of(lambda depth: depth if depth < 2.0 else np.nan, 100.0, 0.0)
     found = search.run(1.0).solution

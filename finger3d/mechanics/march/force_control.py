@@ -206,8 +206,7 @@ class DepthSearch:
             nearest = min((t.depth for t in self.failed), key=lambda depth: abs(depth - self.start))
             return min(self.start, nearest), max(self.start, nearest)
         lowest, highest = low.depth if low else -self.most, high.depth if high else self.most
-        ends = [low, high] if low and high else self.good[-1:]
-        anchor = min(ends, key=lambda trial: abs(trial.force - self.wanted)).depth
+        anchor = self.good[-1].depth
         above = [t.depth for t in self.failed if anchor < t.depth < highest]
         below = [t.depth for t in self.failed if lowest < t.depth < anchor]
         return max([lowest, *below]), min([highest, *above])
