@@ -18,13 +18,7 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.force_control import (
-    TARGET_IF_FACTORED,
-    DepthSearch,
-    Trial,
-    at_depth_reached,
-    forecast_depth,
-)
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, at_depth_reached, forecast_depth
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import measure
@@ -133,30 +127,6 @@ def test_a_force_that_jumps_is_not_reached() -> None:
     found = search_of(lambda depth: depth + (depth > 1.0), 1.5, 0.0).run(0.4)
     assert found.solution.outcome is Outcome.FORCE_JUMPS
     assert "1 N and 2 N on either side of 1 mm" in found.solution.detail
-
-
-def test_a_jump_is_seen_early_where_trials_are_costly() -> None:
-    def force(depth: float) -> float:
-        return depth + 0.01 * (depth > 1.0)
-
-    cheap, costly = search_of(force, 1.005, 0.0), replace(search_of(force, 1.005, 0.0), target=TARGET_IF_FACTORED)
-    for search in (cheap, costly):
-        assert search.run(0.4).solution.outcome is Outcome.FORCE_JUMPS
-    assert len(costly.good) < 0.8 * len(cheap.good)
-    # a corner, where the rate of the force grows a hundred times, is no jump
-    corner = search_of(lambda depth: depth + 99.0 * max(depth - 1.0, 0.0), 1.5, 0.0)
-    assert replace(corner, target=TARGET_IF_FACTORED).run(0.4).depth == pytest.approx(1.005, rel=1e-7)
-
-
-def test_a_search_repeats_a_trial_that_failed_and_ends_when_it_may_not_go_on() -> None:
-    most = [1.0]  # depth that trials reach; more with more cuts
-    search = search_of(lambda depth: depth if depth < most[0] else np.nan, 1.9, 0.0)
-    assert search.run(8.0).solution.outcome is Outcome.NEWTON
-    most[0] = 2.0
-    assert search.repeated().depth == pytest.approx(1.9, rel=1e-8)
-    ended = replace(search_of(lambda depth: np.nan, 1.9, 0.0), may_go_on=lambda: False)
-    assert ended.run(8.0).solution.outcome is Outcome.NEWTON
-    assert len(ended.failed) == 1
 
 
 def test_a_slide_that_loses_the_contact_says_so() -> None:

@@ -30,14 +30,10 @@ TARGET, TARGET_IF_FACTORED = 1e-12, 1e-8
 where round-off prevents it, one up to a hundred times as large."""
 
 _RESOLUTION, _NEAREST = 1e-12, 1e-6
-"""Width of a bracket, over the largest depth, in which the force jumps; distance to a failed trial that ends it, and
-width from which a jump is looked for by the rate of the force."""
+"""Width of a bracket, over the largest depth, in which the force jumps; distance to a failed trial that ends it."""
 
 _TRIALS, _FAILURES = 80, 8
 """Largest number of trials, and of those that fail."""
-
-_STEEP = 1e4
-"""Rate of the force in a bracket, over the largest rate elsewhere, from which the force jumps there."""
 
 _STIFFENING = 5.0
 """Rate of the force beyond the deepest trial, over the largest rate up to it, at most."""
@@ -116,8 +112,6 @@ class DepthSearch:
     begin : state before the increment as a trial, where only the depth changes, from which forces are interpolated too
     most : largest depth, mm; a turn or a slide may lift the object above first touch by as much, to negative depths
     target : relative error of the force
-    may_go_on : function
-        Whether another trial may be made after one that failed.
     """
 
     increment: Callable[[float, Sequence[Trial]], Trial]
@@ -126,7 +120,6 @@ class DepthSearch:
     most: float
     begin: Trial | None = None
     target: float = TARGET
-    may_go_on: Callable[[], bool] = lambda: True
     good: list[Trial] = field(default_factory=list, init=False)
     failed: list[Trial] = field(default_factory=list, init=False)
 
@@ -144,7 +137,7 @@ class DepthSearch:
                 errors.append(error)
             low, high = self._bracket()
             if low and high:
-                if high.depth - low.depth <= _RESOLUTION * self.most or self._jumps(low, high):
+                if high.depth - low.depth <= _RESOLUTION * self.most:
                     nearer = min(low, high, key=lambda trial: abs(trial.force - self.wanted))
                     if abs(nearer.force - self.wanted) <= FORCE_TOLERANCE * self.wanted:
                         return nearer
@@ -157,8 +150,6 @@ class DepthSearch:
                 break
             if len(self.failed) > _FAILURES or self._falls_short(low, bounds[1]):
                 break
-            if not trial.ok and not self.may_go_on():
-                break
             depth = self._next(low, high, bounds, stride, len(errors) > 4 and errors[-1] > 0.5 * errors[-3])
             stride *= 2.0
         cause = self.failed[-1].solution.outcome if self.failed else Outcome.FORCE_NOT_REACHED
@@ -166,12 +157,6 @@ class DepthSearch:
         if cause.is_cycle or untouched:  # no later increment starts from another force, as it does from a cycle
             cause = Outcome.FORCE_NOT_REACHED
         return self._ended(cause, self._extreme())
-
-    def repeated(self) -> Trial:
-        """Search again from the last trial that failed, beside those that have converged."""
-        guess = self.failed[-1].depth
-        self.failed.clear()
-        return self.run(guess)
 
     def _tried(self, depth: float) -> Trial:
         """Try a depth; one without force is tried again nearer, since the object may have passed through the finger."""
@@ -211,28 +196,12 @@ class DepthSearch:
         below = [t.depth for t in self.failed if lowest < t.depth < anchor]
         return max([lowest, *below]), min([highest, *above])
 
-    def _rates(self, trials: Sequence[Trial]) -> list[float]:
-        """Return the rates of the force (N/mm) between trials, the state before the increment among them."""
-        known = sorted([*([self.begin] if self.begin else []), *trials], key=lambda trial: trial.depth)
-        return [(b.force - a.force) / (b.depth - a.depth) for a, b in pairwise(known) if b.depth > a.depth]
-
-    def _jumps(self, low: Trial, high: Trial) -> bool:
-        """Return whether the force rises so steeply between two trials that it jumps.
-
-        Where trials factor no stiffness, the bracket is narrowed to round-off instead.
-        """
-        if self.target == TARGET or high.depth - low.depth > _NEAREST * self.most:
-            return False
-        sides = [t for t in self.good if t.depth <= low.depth], [t for t in self.good if t.depth >= high.depth]
-        elsewhere = [rate for side in sides for rate in self._rates(side)]
-        rise = (high.force - low.force) / (high.depth - low.depth)
-        return rise > _STEEP * max(elsewhere, default=math.inf) > 0.0
-
     def _falls_short(self, low: Trial | None, barrier: float) -> bool:
         """Return whether the force stays too small up to a depth that failed, at `_STIFFENING` times the rate."""
         if low is None or len(self.good) < 2 or all(t.depth != barrier for t in self.failed):
             return False
-        rates = self._rates(self.good)
+        known = sorted([*([self.begin] if self.begin else []), *self.good], key=lambda trial: trial.depth)
+        rates = [(b.force - a.force) / (b.depth - a.depth) for a, b in pairwise(known) if b.depth > a.depth]
         return bool(rates) and low.force + _STIFFENING * max(rates) * (barrier - low.depth) < self.wanted
 
     def _next(

@@ -32,13 +32,6 @@ from finger3d.progress import QUIET, Progress
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
-_LONGEST_STRIDE = 0.25
-"""Depth of the first trial for a force at large deformation, over the largest depth, at most."""
-
-_TRIAL_CUTS, _TRIALS_FAILED, _MOST_FAILED = 2, 4, 24
-"""Times that an increment to a trial depth is halved at first, at most; number of such trials that may fail before any
-converges; number of increments of a search for a force that may fail.  A trial far too deep fails in many parts."""
-
 _FIRST_PARTS = 1.0 / 16.0, 0.25
 """Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
 ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
@@ -110,7 +103,6 @@ class Press:
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
         # in small strain without bulk relaxation, an increment of another duration costs a factorisation
         model = problem.model
-        self._failed = 0  # increments that did not converge, cut ones included
         self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
         self._previous: tuple[Move, Float] | None = None
         self.path: ExactPath | None = None
@@ -211,7 +203,6 @@ class Press:
     ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
         """Solve an increment; one that does not converge is halved and repeated from the same state."""
         whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
-        self._failed += not whole.outcome.ok
         if whole.outcome.ok or cuts == 0:
             return whole, [Substep(state, whole.state, move)]
         halves, parts = self._in_turn(state, move.cut(0.5), cuts - 1)
@@ -276,8 +267,8 @@ class Press:
     def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one.
 
-        Every trial begins at the end expected from those before it.  A search that fails is repeated with more cuts.
-        If the force is not reached, the solution says why, and state and pose are those at the beginning.
+        Every trial begins at the end expected from those before it.  If the force is not reached, the solution says
+        why, and state and pose are those at the beginning.
         """
         problem, state, parts = self.problem, self.state, dict[float, list[Substep]]()
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
@@ -285,13 +276,6 @@ class Press:
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
         rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
         begin = Trial(start_mm, rest, force) if only_deeper else None
-        cuts, failed_before = min(self._cuts, _TRIAL_CUTS if problem.model.finite_strain else self._cuts), self._failed
-
-        def may_go_on() -> bool:
-            if not problem.model.finite_strain:
-                return True
-            needs_cuts = not search.good and len(search.failed) >= _TRIALS_FAILED and cuts < self._cuts
-            return not needs_cuts and self._failed - failed_before < _MOST_FAILED
 
         def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
             self._end_if_cancelled()
@@ -304,24 +288,16 @@ class Press:
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
                 start = expecting(state, there, ends, share) if problem.model.finite_strain else state
-            found, parts[depth] = self._in_turn(start, self.moves_to(there.end), cuts, guess)
+            found, parts[depth] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
             return Trial(depth, found, reached)
 
         target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
-        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target, may_go_on)
+        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
-        if problem.model.finite_strain:  # a trial that is far too deep costs more than several that are not deep enough
-            stride = min(stride, _LONGEST_STRIDE * self._deepest)
         last = search.run(first_trial(start_mm, stride, wanted, begin))
-        if search.failed and not last.ok and cuts < self._cuts:
-            cuts = self._cuts
-            last = search.repeated() if may_go_on() else last
-        if not last.ok and not may_go_on():
-            detail = f"{last.solution.detail}; the search ended after {_MOST_FAILED} increments without a solution"
-            last = replace(last, solution=replace(last.solution, detail=detail))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
             return Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
