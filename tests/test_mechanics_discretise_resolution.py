@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d._cost import mesh_gb
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
@@ -22,9 +21,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import (
     UnresolvedOverlap,
-    is_meshable_at,
     landmarks_of,
-    unresolved_details,
     unresolved_overlap,
     warnings_before_meshing,
 )
@@ -33,7 +30,6 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.mechanics.results.penetration import check_surface, penetration_warnings
-from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import ball, box, write_stl
 from tests.scenes import FIG9 as FINGER
@@ -245,23 +241,6 @@ def test_a_companion_that_does_not_see_the_object_is_none() -> None:
 
     problem = build(fig9(Plane(), 0.1, 4.0))
     assert companion(problem).model.mesh.size_mm < 4.0
-
-
-def test_an_edge_that_no_memory_holds_is_not_advised(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = fig9(Wedge(angle=0.5, tip_radius_mm=0.02), 5.0, 4.0)
-    (line,) = unresolved_details(model)
-    assert "mesh.size_mm = 0.01 resolves it" in line
-    cells = mesh_section(FIG9, replace(model.mesh, size_mm=0.01), model.first_contact.contact_box, symmetry(model))[
-        1
-    ].cells
-    # 80 % of the memory is what a mesh may take (finger3d/_cost.py); cells are counted before they are made, to 11 %
-    for share, is_meshable in ((1.3, True), (0.7, False)):
-        total = share * 1e9 * mesh_gb(cells, 2) / 0.8
-        monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda total=total: (total, total))
-        assert is_meshable_at(model, 0.01) == is_meshable
-        (line,) = unresolved_details(model)
-        assert ("mesh.size_mm = " in line) == is_meshable
-        assert ("choose a larger object.tip_radius_mm" in line) != is_meshable
 
 
 def test_increments_without_contact_are_told(tmp_path: Path) -> None:

@@ -26,11 +26,10 @@ from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
 from finger3d.mechanics.discretise.regular_points import Box, regular_points
-from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.discretise.size_advice import is_meshable_at, rounded_down, size_advice
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import StepResult
-from finger3d.meshing.generate import is_meshable
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
@@ -319,23 +318,9 @@ def resolving_size(
         there = replace(model, legs=(leg,), mesh=replace(model.mesh, size_mm=size))
         seen = unresolved_overlap(there, points, touch_mm, landmarks)
         if seen.in_contact and seen.ratio <= _RESOLVED:
-            size = _rounded_down(min(size, _resolving(model.object)))
+            size = rounded_down(min(size, _resolving(model.object)))
             return size if is_meshable_at(model, size) else None
     return None
-
-
-def is_meshable_at(model: Model, size: float) -> bool:
-    """Return whether a mesh with an edge length (mm) in the contact zone is estimated to fit into memory."""
-    options = replace(model.mesh, size_mm=size, base_size_mm=max(size, model.mesh.base_size_mm))
-    dim, zone = 3 if model.domain == "solid" else 2, model.first_contact.contact_box
-    return is_meshable(model.design, options, zone, dim, symmetry(model))
-
-
-def size_advice(model: Model, size: float, effect: str, otherwise: str) -> str:
-    """Return the advice of an edge length (mm) and its effect, or of something else where memory holds no such mesh."""
-    if is_meshable_at(model, size):
-        return f"mesh.size_mm = {size:.2g} {effect}"
-    return f"no mesh that fits into this machine's memory {effect}; {otherwise}"
 
 
 def _within(landmarks: Float, placed: PlacedObject, box: Box, dim: int) -> Float:
@@ -398,14 +383,8 @@ def unresolved_details(model: Model) -> list[str]:
     blunter = f"choose a larger object.{detail.key}"
     return [
         f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; {size_advice(model, _rounded_down(largest), 'resolves it', blunter)}"
+        f"averages of it; {size_advice(model, rounded_down(largest), 'resolves it', blunter)}"
     ]
-
-
-def _rounded_down(size: float) -> float:
-    """Return an edge length rounded down to two digits."""
-    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
-    return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
 
 
 def _resolving(obj: RigidObject) -> float:

@@ -14,7 +14,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import BoundarySurface, restrict
 from finger3d.mechanics.discretise.contact_geometry import may_touch
 from finger3d.mechanics.discretise.problem import Problem, free_surface
-from finger3d.mechanics.discretise.resolution import size_advice
+from finger3d.mechanics.discretise.size_advice import size_advice
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Model
