@@ -49,7 +49,7 @@ _ROUND_OFF = 1e-9
 """Relative change up to which nothing changes."""
 
 _INTERACTION = 8.0
-"""Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
+"""Factor by which other effects are taken to raise or lower the change by one at most."""
 
 _FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
 
