@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._types import Tree
-from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
+from finger3d.accuracy.changes import ChangeEstimate, two_digits
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
 from finger3d.effects import effect_names
