@@ -28,7 +28,12 @@ def needs(depth: float = 10.0, **effects: Any) -> Scene:
 
 
 def test_a_deep_press_calls_for_large_deformation_and_a_shallow_one_does_not() -> None:
-    deep, shallow = judge(needs(), QUIET), judge(needs(0.1), QUIET)
+    """With friction even the shallow one does: presses on this mesh and one four times as fine differ by 15 % in it."""
+    deep, shallow = judge(needs(), QUIET), judge(parse({**needs(0.1).given, "friction": {"mu": 0.0}}), QUIET)
+    friction = judge(needs(0.1), QUIET).judged["large_deformation"]
+    assert friction.used
+    assert friction.number == "friction_sum_N"
+    assert friction.change == pytest.approx(0.15, abs=0.03)
     assert deep.used == ("large_deformation",)
     assert shallow.used == ()
     assert abs(shallow.judged["large_deformation"].change) < 0.02

@@ -41,8 +41,8 @@ from ._effect_scenes import scenes
 from ._paper import columns
 from ._rows import Result, Row
 
-SEED = 2026
-SECTIONS, SOLIDS = 60, 15
+SEED = 20261126
+SECTIONS, SOLIDS = 40, 10
 FINER = {"solid": 0.75, "section": 0.7}
 """Edge lengths of the truth over those of the press."""
 MOST_S = 60.0

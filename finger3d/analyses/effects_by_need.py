@@ -49,7 +49,7 @@ _ROUND_OFF = 1e-9
 """Relative change up to which nothing changes."""
 
 _INTERACTION = 8.0
-"""Largest factor by which other effects raise or lower the change by one: 8 in validation/effects_by_need.py."""
+"""Factor by which other effects are taken to raise or lower the change by one at most."""
 
 _FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
 
@@ -202,7 +202,9 @@ def _beside_each_other(
     report: Progress,
 ) -> dict[str, ChangeEstimate]:
     """Return what effects change beside all others that may matter, where others may decide whether they are needed."""
-    reach = {name: max(abs(c.relative) for c in estimate.changes.values()) for name, estimate in alone.items()}
+    reach = {
+        name: max((abs(c.relative) for c in estimate.changes.values()), default=0.0) for name, estimate in alone.items()
+    }
     # kinetic friction alone changes nothing where all points stick: others may let them slip
     near = {name: on[name] for name in alone if not _ROUND_OFF < reach[name] < tolerance / _INTERACTION}
     found = dict[str, ChangeEstimate]()
