@@ -31,7 +31,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.energy import frictional_dissipation
+from finger3d.mechanics.march.parts import frictional_dissipation
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.state import State
