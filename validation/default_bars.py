@@ -86,7 +86,7 @@ def numbers(title: str, scene: Path | dict[str, Any]) -> Iterator[Number]:
     for name, bar in bars.items():
         largest = max(abs(v) for other, v in values.items() if kinds[other] == kinds[name])
         least = max(abs(values[name]), 0.01 * largest)
-        relative = bar / least if least else np.inf * bool(bar)
+        relative = bar / least if least else (np.inf if bar else 0.0)
         yield Number(title, summary["scene"]["model"]["domain"], name, values[name], bar, relative, seconds)
 
 
@@ -126,5 +126,6 @@ def _draw(figure: Any, found: list[Number]) -> None:
         label = "solids" if is_solid else "sections"
         axes.plot([100.0 * n.relative for n in some], at, "|", color=colour, ms=8, label=label)
     axes.axvline(100.0 * QUARTER, color="k", lw=0.8, ls=":", label="a quarter")
-    axes.set(xscale="log", xlabel="error bar (%)", yticks=range(len(names)), yticklabels=names)
+    axes.set(xscale="log", xlabel="error bar (%)", yticks=range(len(names)), yticklabels=names,
+             xlim=(1e-3, 3e2))  # fmt: skip
     axes.legend(fontsize=8)
