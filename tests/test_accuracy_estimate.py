@@ -119,7 +119,7 @@ def test_increments_that_cannot_be_judged_leave_the_bars_of_the_mesh(monkeypatch
     assert found.discretisation == whole.discretisation
     assert found.steps == {}
     assert found.method.endswith("; steps: no estimate: no run converges")
-    assert found.covered == "error of the mesh without that of the steps"
+    assert found.covered == "error of the mesh without that of the increments"
 
 
 def test_a_run_that_fails_is_replaced_by_another(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,6 +63,7 @@ def test_few_increments_make_no_difference_of_their_own() -> None:
         assert abs(found.judged[name].change) < 0.01  # both change the limit of friction or the force by 0.1 %
 
 
+@pytest.mark.slow
 def test_effects_are_judged_beside_stiff_gauges() -> None:
     """The free strain of such gauges is no number of a press without them."""
     gauges = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}

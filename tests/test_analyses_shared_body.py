@@ -151,7 +151,7 @@ def test_a_step_that_fails_is_named() -> None:
     """The paper's rule, which does not exclude friction that helps slip."""
     model = scene("contact.rule=paper", "material.nu=0.3", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
     pressed = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
-    assert pressed.outcome.startswith("step ")
+    assert pressed.outcome.startswith("increment ")
     assert pressed.numbers == {}
     assert pressed.readings == {}
 

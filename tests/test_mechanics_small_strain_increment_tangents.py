@@ -38,7 +38,11 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+SLOW = ("plane", "force", "bar")
+"""Cases that only `make test-all` runs."""
+
+
+@pytest.mark.parametrize("case", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in CASES])
 def test_every_derivative_is_that_of_presses(case: str) -> None:
     model = CASES[case]
     ways, thing = parameters(model), model.object

@@ -36,7 +36,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", ["slide", "force", *(pytest.param(n, marks=pytest.mark.slow) for n in ("press", "grip"))]
+)
 def test_every_derivative_is_that_of_presses(case: str) -> None:
     changes, domain, mu = CASES[case]
     model = fig9(domain=domain, mesh=MeshOptions(4.0, 10.0), friction=Coulomb(mu), **(READINGS | changes))
