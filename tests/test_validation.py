@@ -18,7 +18,8 @@ SLOW = (
     "embedded_gauge_study", "design_search", "action_reaction", "rolling_cylinder", "hard_large_deformation",
     "meshers", "readings_within_tolerances", "friction_in_3d", "scaling", "advice_against_truth", "cost_of_accuracy",
     "hertz_line", "bonded_layer", "fig14_measured", "wide_finger_claims", "gelsight_mini", "effects_by_need",
-    "cost_forecast", "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does", "default_bars", "identify_z_scores",
+    "cost_forecast", "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does",
+    "default_bars", "identify_z_scores",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 
