@@ -105,6 +105,7 @@ def test_step_lengths_are_counted() -> None:
     assert "2" in forecast(model)["viscosity"]
 
 
+@pytest.mark.slow
 def test_presses_took_what_is_foretold(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # whole presses of the Fig. 9 finger as measured last, 12 000 unknowns and more; a factor 2 is what it claims
     from finger3d.meshing import limits

@@ -89,6 +89,7 @@ def test_slopes_between_the_few_mu_that_are_tried() -> None:
         assert np.abs(a.spread[1::2] - c.spread).max() <= share * b.spread.max(), a.name
 
 
+@pytest.mark.slow
 def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> None:
     """Which is what a calibration of that coarser body finds itself, and within a fifth of the largest slope."""
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003}

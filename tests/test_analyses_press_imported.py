@@ -90,6 +90,7 @@ def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(
     assert force["stl"] == pytest.approx(force["step"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_twisted_column_has_the_torque_of_its_polar_moment(tmp_path: Path) -> None:
     """Held without slip, a round column twists by u = theta y / h (z, 0, -x), which quadratic cells hold exactly."""
     from build123d import Cylinder, Rot

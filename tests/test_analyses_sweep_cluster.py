@@ -32,6 +32,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_sce
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
+@pytest.mark.slow
 def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
     """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
     pools = []
