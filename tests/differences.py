@@ -62,7 +62,7 @@ def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[l
     return [step for step, _ in found], [slopes for _, slopes in found]
 
 
-def compare(problem: Problem, ways: Mapping[str, Callable[[float], Model]]) -> None:
+def assert_equal_to_differences(problem: Problem, ways: Mapping[str, Callable[[float], Model]]) -> None:
     """Compare all derivatives with central differences of presses, whose bodies are condensed again if they change."""
     h = DIFFERENCE if problem.model.object.is_flat else 10.0 * DIFFERENCE  # curved contact is solved to 1e-9
     variations = [variation(problem, way(-STEP), way(STEP), STEP) for way in ways.values()]

@@ -50,6 +50,14 @@ def test_known_values_are_found_again(tmp_path: Path, scene_file: Path) -> None:
     }
 
 
+def test_errors_of_the_mesh_do_not_depend_on_the_bounds_of_the_modulus(tmp_path: Path, scene_file: Path) -> None:
+    measured, found = bench(tmp_path / "bench.csv", stds=True), []
+    for number, bounds in enumerate(((0.05, 5.0), (0.3, 0.5))):
+        free = FREE | {"material.E_MPa": bounds}
+        found.append(finger3d.identify(scene_file, measured, free, tmp_path / f"out{number}").fitted.numerical)
+    assert found[1] == pytest.approx(found[0], rel=0.02)
+
+
 @pytest.mark.slow
 def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> None:
     inside = []

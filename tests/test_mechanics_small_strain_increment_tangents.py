@@ -13,8 +13,9 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
+from finger3d.mechanics.small_strain.variations import variation
 from finger3d.objects import Cylinder, Plane
-from tests.differences import compare, parameters
+from tests.differences import STEP, assert_equal_to_differences, differentiated, parameters
 from tests.models import block, small_section
 
 READINGS = {
@@ -51,4 +52,16 @@ def test_every_derivative_is_that_of_presses(case: str) -> None:
         ways["place"] = lambda h: replace(model, object=replace(thing, x_mm=thing.x_mm + h))
     else:
         ways["tilt"] = lambda h: replace(model, object=replace(thing, tilt=thing.tilt + np.deg2rad(h)))
-    compare(build(model), ways)
+    assert_equal_to_differences(build(model), ways)
+
+
+def test_a_hold_changes_no_derivative() -> None:
+    ways = parameters(TILTED)
+    found = []
+    for legs in ((Leg(0.3, steps=2),), (Leg(0.3, steps=2), Leg(0.3, steps=1))):
+        model = replace(TILTED, legs=legs)
+        problem = build(model)
+        own = [replace(ways["mu"](h), legs=legs) for h in (-STEP, STEP)]
+        slopes = differentiated(problem, [variation(problem, *own, STEP)])[1][-1][0]
+        found.append({n: slope for n, slope in slopes.items() if not n.startswith("stick")})  # what slipped now sticks
+    assert found[1] == pytest.approx(found[0], rel=1e-6, abs=1e-7)

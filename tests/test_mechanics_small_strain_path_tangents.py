@@ -12,7 +12,7 @@ from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import Plane
-from tests.differences import compare, parameters
+from tests.differences import assert_equal_to_differences, parameters
 from tests.models import fig9
 
 TILTED = {"symmetry": (), "object": Plane(tilt=np.deg2rad(2.0))}
@@ -42,4 +42,4 @@ CASES = {
 def test_every_derivative_is_that_of_presses(case: str) -> None:
     changes, domain, mu = CASES[case]
     model = fig9(domain=domain, mesh=MeshOptions(4.0, 10.0), friction=Coulomb(mu), **(READINGS | changes))
-    compare(build(model), parameters(model))
+    assert_equal_to_differences(build(model), parameters(model))

@@ -2,8 +2,7 @@
 
 No source.  The scenes of geometries/ as they are, and random sections and solids without ``[mesh]``: four designs under
 planes, bars and balls, 2 to 15 % of their height deep, nu from 0.3 to 0.49, mu from 0.06 to 1, with a gauge.  All
-numbers that have error bars count.  One below a hundredth of the largest of its kind (force, moment, length, area,
-energy) is judged against that hundredth: a net force of zero has no relative error.
+numbers that have error bars count, relative as finger3d.accuracy.richardson.relative_error has it.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger3d.accuracy.error_bars import ErrorBars
+from finger3d.accuracy.richardson import kinds_of, relative_error
 from finger3d.analyses.press import press
 from finger3d.mechanics.results.history import table_row
 
@@ -79,15 +79,11 @@ def numbers(title: str, scene: Path | dict[str, Any]) -> Iterator[Number]:
     begin = time.perf_counter()
     result = press(scene)
     seconds = time.perf_counter() - begin
-    summary, row = result.summary(), table_row(result.history.points, result.history.steps[-1])
-    bars = ErrorBars.of_summary(summary).totals()
-    values = {name: float(row[name]) for name in bars}
-    kinds = {name: name.split("_")[0] if name.startswith(READINGS) else name.split("_")[-1] for name in bars}
-    for name, bar in bars.items():
-        largest = max(abs(v) for other, v in values.items() if kinds[other] == kinds[name])
-        least = max(abs(values[name]), 0.01 * largest)
-        relative = bar / least if least else (np.inf if bar else 0.0)
-        yield Number(title, summary["scene"]["model"]["domain"], name, values[name], bar, relative, seconds)
+    summary, last = result.summary(), result.history.steps[-1]
+    values, kinds = table_row(result.history.points, last), kinds_of(last.readings)
+    for name, bar in ErrorBars.of_summary(summary).totals().items():
+        relative = relative_error(values, kinds, name, bar)
+        yield Number(title, summary["scene"]["model"]["domain"], name, float(values[name]), bar, relative, seconds)
 
 
 def run(quick: bool) -> Result:

@@ -178,9 +178,8 @@ def _honest(name: str, some: list[Judged], kind: Literal["verification", "statem
         rms = float(np.sqrt(np.mean(z**2)))
         what = f"rms of z of mu, not {{}}: {name}, {len(z)} of {len(some)} with an estimate"
         one = "1 if stated rightly"
-        # where the curve is flat errors of mu are not normally distributed, and one decides the root mean square
-        yield Row(what.format("above"), one, 1.2, rms, 0.0, why, "statement", "at most")
-        yield Row(what.format("below"), one, 0.8, rms, 0.0, why, "statement", "at least")
+        yield Row(what.format("above"), one, 1.2, rms, 0.0, why, kind, "at most")
+        yield Row(what.format("below"), one, 0.8, rms, 0.0, why, kind, "at least")
     what = f"share of 90 % sets that contain mu: {name}, {len(some)} readings"
     yield Row(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, 0.0, why, kind, "at least")
     yield Row(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, 0.0, why, kind, "at most")

@@ -228,8 +228,7 @@ def _pressed(model: Model, report: Progress) -> Iterator[_Pilot]:
 def _pilot(model: Model, factor: float) -> _Pilot:
     start = time.perf_counter()
     body = PressedBody(replace(model, mesh=_scaled(model, factor)))
-    if model.mesh.stick_refinement > 1.0:
-        body.refine_borders()
+    body.refine_borders()
     problem = body.problem
     meshed = problem.seconds["cad"] + problem.seconds["mesh"]
     steps, chosen = march_automatic(problem)

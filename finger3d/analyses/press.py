@@ -124,7 +124,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     writer.scene(scene.to_toml())
     report.stage("meshing")
     body = PressedBody(scene.model(), report, refinement.problem if refinement else None)
-    if scene.mesh.stick_refinement > 1.0 and not (refinement and refinement.problem):
+    if not (refinement and refinement.problem):
         body.refine_borders()
 
     def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:

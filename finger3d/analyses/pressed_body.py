@@ -234,7 +234,9 @@ class PressedBody:
         return [replace(end, penetration_mm=next(depths).penetration_mm) if end.outcome.ok else end for end in ends]
 
     def refine_borders(self) -> None:
-        """Shorten the edges at the border of stick, which presses on coarser meshes find."""
+        """Shorten the edges at the border of stick, which presses on coarser meshes find, if the model asks for it."""
+        if self.problem.model.mesh.stick_refinement <= 1.0:
+            return
         from finger3d.accuracy.borders import with_refined_borders  # most bodies need none of it
 
         start = time.perf_counter()

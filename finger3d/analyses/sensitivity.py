@@ -123,8 +123,7 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")
     body = PressedBody(model, report)
-    if scene.mesh.stick_refinement > 1.0:
-        body.refine_borders()
+    body.refine_borders()
     pressed = body.steps()
     if not pressed[-1].outcome.ok:
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")

@@ -61,9 +61,8 @@ def is_meshable(design: Design, options: MeshSizes, zone: Zone, dim: int, symmet
     """
     lengths = np.ptp(np.reshape(zone, (2, 2)), axis=1)[: dim - 1] / options.size_mm
     facets = (dim - 1) * float(lengths.prod()) / 2 ** len(symmetry)
-    if not is_possible(
-        (dim - 1) * facets, dim
-    ):  # each of the contact zone has at least one cell; to count all takes time
+    # each facet of the contact zone has at least one cell; to count all cells takes time
+    if not is_possible((dim - 1) * facets, dim):
         return False
     if isinstance(design, GivenMesh):
         return True

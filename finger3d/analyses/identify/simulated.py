@@ -23,12 +23,13 @@ from finger3d.analyses.sensitivity import has_derivative, varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
-from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
 from finger3d.scene import Scene, tree
@@ -155,7 +156,7 @@ class Simulation:
         """
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
-        known = self._derivatives(point, len(curve["step"]) - 1, [f.numbered(self.given) for f in costly])
+        known = self._derivatives(point, [f.numbered(self.given) for f in costly])
         if known is None:
             return None
         by_key = dict(zip((f.key for f in costly), known, strict=True))
@@ -184,35 +185,32 @@ class Simulation:
         as an error of order `ORDER` does.  Two are those of all rows at once, with and without this growth, and one is
         of each row, since errors change as points close one by one.
         """
-        point, _ = self._point(values)
+        curve, (point, factor) = self.curve(values), self._point(values)
+        problem, steps = self._pressed(point)
+        bars = estimate(problem, steps, numbers=press_numbers).totals()
+        found = self.at(values, replace(measured, columns=dict.fromkeys((_LOAD, _SIZE), measured.at)))
+        ratio = np.divide(curve[_SIZE][-1], found[_SIZE], out=np.ones_like(measured.at), where=found[_SIZE] > 0.0)
+        growth = ratio**ORDER
+        shapes = found[_LOAD] / curve[_LOAD][-1] * np.vstack([np.ones_like(growth), growth - 1.0, np.diag(growth)])
+        known = {n: np.asarray(bars[n]) for n in measured.columns if math.isfinite(bars.get(n, math.nan))}
+        return {n: shapes * bar for n, bar in _scaled(known, factor).items()}
+
+    def _pressed(self, point: tuple[float, ...]) -> tuple[Problem, list[StepResult]]:
+        """Return the condensed body at values of the free keys, and its increments."""
         scene = self.scene(point)
         model = scene.model()
         body = self._body(scene, model)
-        problem = under(body.problem, model.friction, rule=model.rule)
-        steps = body.steps(model.friction, model.rule)
-        bars = estimate(problem, steps, numbers=press_numbers).totals()
-        end = table_row(problem.points, steps[-1])
-        known = [n for n in measured.columns if math.isfinite(bars.get(n, math.nan))]
-        found = self.at(values, replace(measured, columns=dict.fromkeys((_LOAD, _SIZE), measured.at)))
-        load, ratio = (
-            found[_LOAD] / float(end[_LOAD]),
-            np.divide(float(end[_SIZE]), found[_SIZE], out=np.ones_like(measured.at), where=found[_SIZE] > 0.0),
-        )
-        growth = ratio**ORDER
-        shapes = load * np.vstack([np.ones_like(growth), growth - 1.0, np.diag(growth)])
-        return {n: shapes * bars[n] for n in known}
+        steps = body.steps(model.friction, model.rule)  # which may condense it again
+        return under(body.problem, model.friction, rule=model.rule), steps
 
-    def _derivatives(self, point: tuple[float, ...], count: int, keys: Sequence[str]) -> list[Curve] | None:
-        """Return the derivatives of a curve of `count` increments by keys of the scene; None where one has none."""
+    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
+        """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
         if not keys:
             return []
-        scene = self.scene(point)
-        model, given = scene.model(), scene.as_dict()
-        problem = under(
-            self._body(scene, model).problem, model.friction, with_increments_of(model.legs, count), model.rule
-        )
+        scene, (problem, steps) = self.scene(point), self._pressed(point)
+        problem, given = under(problem, legs=with_increments_of(problem.model.legs, len(steps))), scene.as_dict()
         values = [float(str(tree.value_at(given, key) or 0.0)) for key in keys]
-        if refusal(model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
+        if refusal(problem.model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
             return None
         try:
             variations = [varied(scene, problem, key) for key in keys]
@@ -223,10 +221,7 @@ class Simulation:
 
     def _solve(self, point: tuple[float, ...]) -> Tree:
         try:
-            scene = self.scene(point)
-            model = scene.model()
-            body = self._body(scene, model)
-            frames = body.steps(model.friction, model.rule)
+            problem, frames = self._pressed(point)
         except Finger3dError as error:
             return {"values": list(point), "outcome": " ".join(str(error).split()), "curve": {}}
         bad = next((f for f in frames if not f.outcome.ok), None)
@@ -235,7 +230,7 @@ class Simulation:
             return {"values": list(point), "outcome": outcome, "curve": {}}
         rows = []
         for number, frame in enumerate(frames, start=1):
-            rows.append({"step": float(number)} | table_row(body.problem.points, frame))
+            rows.append({"step": float(number)} | table_row(problem.points, frame))
         columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
         return {"values": list(point), "outcome": "converged", "curve": columns}
 

@@ -372,7 +372,10 @@ def _refusal(model: Model, unresolved: UnresolvedOverlap, size: float | None) ->
     if isinstance(model.design, DesignSummary):
         return f"{now}: {what}; condense the scene with a smaller mesh.size_mm"
     cure = "press deeper, or with a thicker or blunter object"
-    return f"{now}: {what}; no mesh that fits into this machine's memory resolves it; {cure}"
+    least = _FINER**_TRIES * model.mesh.size_mm
+    return (
+        f"{now}: {what}; no edge length above {least:.1g} mm that fits into this machine's memory resolves it; {cure}"
+    )
 
 
 def unresolved_details(model: Model) -> list[str]:

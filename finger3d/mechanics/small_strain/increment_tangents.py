@@ -126,7 +126,7 @@ class IncrementTangents:
         whole, parts = Move(self._pose, step.target).change, list[_Part]()
         before, start = self._state, 0.0
         for pose, after in step.parts:
-            share = float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
+            share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
                 linear = LinearisedIncrement.of(self.problem, before.contact, after.contact)
             except np.linalg.LinAlgError:
@@ -180,11 +180,11 @@ class IncrementTangents:
         other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
         if any(self._bodies):
             flat = self.problem.upright_force(contact)
-            unknowns = self.problem.unknowns(flat)[:, None]
+            field = self.problem.unknowns(flat)[:, None]
             for k, body in enumerate(self._bodies):
                 if body:
-                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, unknowns, flat.reshape(-1, 1))
-        rubbed = self._rubbed(part)
+                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, field, flat.reshape(-1, 1))
+        rubbed = _rubbed(part)
         direct = slope([upright(contact, rubbed * _coefficients(side)[:, None]) for side in sides])
         unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
         errors = [np.full(p, np.inf)] * 2  # unknowns and directions are corrected in turn
@@ -210,15 +210,16 @@ class IncrementTangents:
             "abruptly where it touches"
         )
 
-    def _rubbed(self, part: _Part) -> Float:
-        """Return the friction (c, d) N of slipping points for a coefficient of friction of one."""
-        after, before = part.after.contact, part.before.contact
-        slid, along = after.accumulated_slip - before.accumulated_slip, after.force[:, 1:]
-        along = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, -slid)
-        length = np.linalg.norm(along, axis=1)
-        slips = (length > 0.0) & (after.status == SLIP)
-        share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
-        return np.column_stack([np.zeros(len(along)), along * share[:, None]])
+
+def _rubbed(part: _Part) -> Float:
+    """Return the friction (c, d) N of slipping points for a coefficient of friction of one."""
+    after, before = part.after.contact, part.before.contact
+    slid, along = after.accumulated_slip - before.accumulated_slip, after.force[:, 1:]
+    along = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, -slid)
+    length = np.linalg.norm(along, axis=1)
+    slips = (length > 0.0) & (after.status == SLIP)
+    share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
+    return np.column_stack([np.zeros(len(along)), along * share[:, None]])
 
 
 def _begun(problem: Problem) -> Side:
