@@ -36,7 +36,7 @@ CAUSES = ("depth_mm", "E_percent", "nu", "tilt_deg", "gauge_x_mm", "gauge_y_mm",
 CURVE = Calibration(
     (ReadingCurve(
         "g36", MUS, 0.02 + 0.01 * MUS - 0.004 * MUS**2, 1.5e-4,
-        tuple(Tolerance(name, "", 0.5, np.full(6, 1e-3), np.full(6, 1e-3)) for name in CAUSES),
+        tuple(Tolerance(name, "", 0.5, np.full(6, 2e-3), np.zeros(6)) for name in CAUSES),
     ),),
     0.1, about={"domain": "solid"},
 )  # fmt: skip

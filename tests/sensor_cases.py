@@ -63,10 +63,9 @@ def line(slope: float) -> Any:
     return lambda mu: 0.05 + slope * mu
 
 
-def tolerance(name: str, sd: float, slope: float, spread: float | None = None) -> Tolerance:
+def tolerance(name: str, sd: float, slope: float, curvature: float = 0.0) -> Tolerance:
     """A tolerance that has the same effect at every mu."""
-    size = abs(slope) * sd if spread is None else spread
-    return Tolerance(name, "1", sd, np.full(25, slope), np.full(25, size))
+    return Tolerance(name, "1", sd, np.full(25, slope), np.full(25, curvature))
 
 
 def together(*curves: Calibration) -> Calibration:

@@ -12,7 +12,7 @@ from finger3d.accuracy.companions import companion
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import with_defaults
+from finger3d.analyses.calibrate.tolerances import tolerance_of, with_defaults
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
@@ -110,3 +110,16 @@ def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> No
     for a, b in zip(found.readings[0].tolerances, beside.readings[0].tolerances, strict=True):
         assert a.slope == pytest.approx(b.slope, rel=1e-6, abs=1e-9), a.name
         assert 0.0 < np.abs(a.slope - own[a.name]).max() < 0.2 * np.abs(own[a.name]).max(), a.name
+
+
+def test_two_steps_of_any_length_give_the_parabola_through_them() -> None:
+    slope, curvature = np.array([2.0, -1.0]), np.array([30.0, 0.0])
+    effects = [(step, slope * step + 0.5 * curvature * step**2) for step in (0.17, -0.1)]
+    found = tolerance_of("depth_mm", 0.1, effects)
+    assert found.slope == pytest.approx(slope)
+    assert found.curvature == pytest.approx(curvature, abs=1e-12)
+    # the variance of s z + c z^2 / 2 for a normally distributed z is s^2 + c^2 / 2
+    assert found.spread**2 == pytest.approx((0.1 * slope) ** 2 + 0.5 * (0.01 * curvature) ** 2)
+    alone = tolerance_of("nu", 0.003, effects[:1])
+    assert not alone.curvature.any()
+    assert alone.slope == pytest.approx(effects[0][1] / 0.17)

@@ -58,7 +58,7 @@ def test_the_standard_deviation_of_mu_is_that_of_a_calibration(body: LiveBody) -
         ]
         for key in ("x_mm", "y_mm", "angle_deg")
     ]
-    spread = [math.sqrt(0.5 * (up**2 + down**2)) for up, down in moved]
+    spread = [math.hypot(0.5 * (up - down), (up + down) / math.sqrt(2.0)) for up, down in moved]  # to second order
     assert found.strain_sd == pytest.approx(math.hypot(1e-3, *spread), rel=1e-3)  # with the error of the curve
     assert found.mu_sd == pytest.approx(found.strain_sd / abs(found.slope))
 

@@ -40,9 +40,9 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
 
     cases = {
         "not JSON, or cut short": good[: len(good) // 2],
-        "version 9, this finger3d reads version 3; calibrate again": json.dumps({**data, "version": 9}),
-        "version 2, this finger3d reads version 3; calibrate again": json.dumps({**data, "version": 2}),
-        "version 1 of several readings, this finger3d reads version 3; calibrate again": json.dumps(
+        "version 9, this finger3d reads version 4; calibrate again": json.dumps({**data, "version": 9}),
+        "version 2, this finger3d reads version 4; calibrate again": json.dumps({**data, "version": 2}),
+        "version 1 of several readings, this finger3d reads version 4; calibrate again": json.dumps(
             {**data, "format": "finger3d joint calibration", "version": 1}
         ),
         "no calibration": json.dumps([1, 2]),
@@ -77,7 +77,7 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
     ("place", "value"),
     [((*G, "noise"), 1e300), (("resolution_limit",), 1e300), ((*G, "curve", 3), -1e300), (("mu", 24), 1e300),
      ((*G, "tolerances", "nu", "sd"), 1e300), ((*G, "tolerances", "nu", "per_unit", 2), 1e300),
-     ((*G, "tolerances", "nu", "reading_sd", 2), 1e300)],
+     ((*G, "tolerances", "nu", "per_unit_squared", 2), 1e300)],
 )  # fmt: skip
 def test_a_number_that_would_overflow_is_refused(
     place: tuple[Any, ...], value: float, tmp_path: Path, capsys: Any

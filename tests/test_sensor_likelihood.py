@@ -135,7 +135,7 @@ def test_the_tail_of_chi_square(freedom: int) -> None:
 @pytest.mark.parametrize("function", [straight, saturating, kinked, turning])
 def test_sets_and_deviations_of_one_reading_are_kept(function: Any) -> None:
     """For mu drawn evenly the 90 % sets hold it in 90 % of the draws, and the mean square of z is 1, on any curve."""
-    grown = Tolerance("mesh", "error bar", 1.0, np.zeros(25), 3e-4 * np.linspace(0.0, 1.0, 25))
+    grown = Tolerance("mesh", "error bar", 1.0, 3e-4 * np.linspace(0.0, 1.0, 25), np.zeros(25))
     made, random = curve(function, tolerances=(grown,)), np.random.default_rng(20261122)
     mu, g = random.uniform(0.02, 1.2, 1500), made["g"]
     answers = estimate(made, g.at(mu) + random.normal(size=len(mu)) * g.reading_sd(mu))
@@ -159,7 +159,7 @@ def test_the_fit_may_take_the_place_of_the_interpolation() -> None:
 
 
 def test_a_tolerance_that_hides_mu_is_named() -> None:
-    made = curve(straight, tolerances=(Tolerance("tilt_deg", "degree", 0.5, np.full(25, 0.02), np.full(25, 0.01)),))
+    made = curve(straight, tolerances=(Tolerance("tilt_deg", "degree", 0.5, np.full(25, 0.02), np.zeros(25)),))
     (blind,) = estimate(made, straight(0.5))
     assert blind.status == "blind"
     assert re.search(r"100 % .*tilt_deg$", blind.verdict)
@@ -194,3 +194,29 @@ def test_the_information_is_that_of_a_joint_calibration() -> None:
 def test_without_readings_mu_is_known_as_before() -> None:
     assert mu_sd(prior(2, 0.3)) == pytest.approx(0.3)
     assert mu_sd(prior(0, 0.3)) == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("curvature", [-0.4, 0.4, 1.0])
+def test_a_tolerance_of_second_order_is_marginalised(curvature: float) -> None:
+    """Laplace's method against quadrature over the depth: mean and deviation within a twentieth of the deviation."""
+    depth = tolerance("depth_mm", 0.1, 0.02, curvature)
+    joint = together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
+    noise, z, mu = joint.noise, np.linspace(-6.0, 6.0, 6001), np.linspace(0.02, 1.2, 400)
+    for true_z in (0.0, 1.0, 2.0):
+        reading = joint.at([0.6])[0] + 0.02 * 0.1 * true_z + 0.5 * curvature * (0.1 * true_z) ** 2
+        effect = 0.02 * 0.1 * z + 0.5 * curvature * (0.1 * z) ** 2
+        left = (reading[:, None, None] - joint.at(mu).T[:, :, None] - effect) / noise[:, None, None]
+        density = np.exp(-0.5 * (np.sum(left**2, axis=0) + z**2)).sum(axis=1)
+        mean = float(np.average(mu, weights=density))
+        std = math.sqrt(float(np.average((mu - mean) ** 2, weights=density)))
+        (found,) = estimate(joint, dict(zip(joint.names, reading, strict=True)))
+        assert found.mu == pytest.approx(mean, abs=0.05 * std)
+        assert found.std == pytest.approx(std, rel=0.05)
+
+
+def test_a_plateau_belongs_to_the_set_where_a_deeper_press_reads_the_same() -> None:
+    """Where the reading saturates, a press 2.7 deviations too shallow may have any mu beyond."""
+    depth = tolerance("depth_mm", 0.1, 0.0037, -0.017)
+    made = curve(lambda mu: 0.06 - 0.08 * np.maximum(0.5 - mu, 0.0) ** 2, tolerances=(depth,))
+    (found,) = estimate(made, 0.06 - 0.27 * 0.0037 - 0.5 * 0.017 * 0.27**2)
+    assert found.intervals[0][0] < 0.5 < 1.1 < found.high

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from finger3d._types import Tree, TreeView
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.free_keys import scene_with
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
@@ -225,7 +225,7 @@ def _tolerance(key: str, value: float) -> float | None:
     table, last = key.split(".")[0], key.split(".")[-1]
     if last == "E_MPa":
         return TOLERANCES["E_percent"][0] / 100.0 * value
-    name = f"gauge_{last}" if table == "gauge" else last
+    name = GAUGE_PLACES.get(last, last) if table == "gauge" else last
     return TOLERANCES[name][0] if name in TOLERANCES and table != "marker" else None
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import GAUGE_PLACES, displaced_gauges, tolerance_of
+from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
+from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.recovery.recover import displacement
@@ -152,7 +152,7 @@ class LiveBody:
             return np.asarray((place.row(mesh, axes) @ displacements)[0])
 
         own, tolerances = strains(gauge), []
-        for name in GAUGE_PLACES:
+        for name in GAUGE_PLACES.values():
             sd = TOLERANCES[name][0]
             displaced = displaced_gauges(model, gauge, {name: sd})
             tolerances.append(tolerance_of(name, sd, [(d.step, strains(d.gauge) - own) for d in displaced]))

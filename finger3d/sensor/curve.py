@@ -5,6 +5,7 @@ The interpolation is monotone and needs NumPy alone, since it runs on a robot wi
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -121,15 +122,19 @@ class Tolerance:
     Attributes
     ----------
     sd : in `unit`
-    slope : (n,) reading per unit at the calibration's mu
-    spread : (n,) error of the reading, the root mean square of the effects of plus and minus one standard deviation
+    slope, curvature : (n,) first and second derivative of the reading at the calibration's mu, per unit and unit^2
     """
 
     name: str
     unit: str
     sd: float
     slope: Float
-    spread: Float
+    curvature: Float
+
+    @property
+    def spread(self) -> Float:
+        """Standard deviation (n,) of the reading, to second order in the quantity."""
+        return np.asarray(np.hypot(self.slope * self.sd, self.curvature * self.sd**2 / math.sqrt(2.0)))
 
 
 @dataclass(frozen=True)

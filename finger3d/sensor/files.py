@@ -13,7 +13,7 @@ from finger3d.errors import Finger3dError
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import FEWEST, LARGEST_SD, LARGEST_STRAIN, QUANTITIES, ReadingCurve, Tolerance
 
-FORMAT, VERSION = "finger3d calibration", 3
+FORMAT, VERSION = "finger3d calibration", 4
 
 _FORMER_FORMAT = "finger3d joint calibration"
 
@@ -64,7 +64,14 @@ def _reading_dict(c: ReadingCurve) -> Tree:
         "fit": {"coefficients": c.fit.coefficients, "residual_rms": c.fit.rms, "residual_largest": c.fit.largest},
         "resolution": c.resolution(c.mu),
         "tolerances": {
-            t.name: {"unit": t.unit, "sd": t.sd, "per_unit": t.slope, "reading_sd": t.spread} for t in c.tolerances
+            t.name: {
+                "unit": t.unit,
+                "sd": t.sd,
+                "per_unit": t.slope,
+                "per_unit_squared": t.curvature,
+                "reading_sd": t.spread,
+            }
+            for t in c.tolerances
         },
     }
 
@@ -164,7 +171,7 @@ def _curve(name: str, data: Tree, mu: Float) -> ReadingCurve:
         ),
         kind=kind,
     )
-    lengths = {len(mu), len(curve.reading), *(len(v) for t in curve.tolerances for v in (t.slope, t.spread))}
+    lengths = {len(mu), len(curve.reading), *(len(v) for t in curve.tolerances for v in (t.slope, t.curvature))}
     if len(lengths) > 1:
         raise ValueError(f"{at}: must have a reading and tolerances for each of the {len(mu)} values of mu")
     return curve
@@ -177,7 +184,7 @@ def _tolerance(at: str, name: str, data: Tree) -> Tolerance:
         unit=_part(data, f"{at}.unit", str),
         sd=_number(data, f"{at}.sd", 0.0, LARGEST_SD),
         slope=_numbers(data, f"{at}.per_unit", -_STEEPEST, _STEEPEST),
-        spread=_numbers(data, f"{at}.reading_sd", 0.0, LARGEST_STRAIN),
+        curvature=_numbers(data, f"{at}.per_unit_squared", -_STEEPEST, _STEEPEST),
     )
 
 

@@ -1,13 +1,17 @@
 """Friction coefficient from one or more readings: the likelihood of mu, and a test whether any mu explains them.
 
-With the residual ``d(mu) = r - e(mu)`` of the readings r and their covariance C(mu), the likelihood of mu is ``exp(-d^T
-C^-1 d / 2) / sqrt(det C)``.  Normalised over the calibrated range it gives the mean of mu, its standard deviation, and
-the smallest set that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood
-has several peaks, that set is several intervals, all of which are reported.
+At every mu, the deviations z of the tolerances that readings r share are marginalised by Laplace's method.  With the
+residual ``d = r - e(mu) - S z - C z^2 / 2`` of the forward model, the likelihood is ``exp(-chi^2 / 2) / sqrt(det D det
+H)``, where ``chi^2 = d^T D^-1 d + z^T z`` is the least over z, and ``H = 1 + J^T D^-1 J`` with ``J = S + C z`` is its
+Hessian by Gauss and Newton.  Without curvatures C this is the normal distribution with the covariance ``D + S S^T``.
 
-The smallest ``d^T C^-1 d`` of several readings of one press follows a chi-square distribution with one degree of
-freedom less than there are readings; that of a single reading is at most as large as with one degree of freedom.
-Readings with a p-value below 0.001 are out of range, or contradict each other.
+Normalised over the calibrated range the likelihood gives the mean of mu, its standard deviation, and the smallest set
+that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood has several peaks,
+that set is several intervals, all of which are reported.
+
+The smallest chi-square of several readings of one press follows a chi-square distribution with one degree of freedom
+less than there are readings; that of a single reading is at most as large as with one degree of freedom. Readings with
+a p-value below 0.001 are out of range, or contradict each other.
 
 The Fisher information of readings that nobody has taken yet marginalises the tolerances.  The unknowns are mu and the
 tolerances that all readings share, each in units of its standard deviation.  A reading with slope s against mu, effects
@@ -27,7 +31,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.sensor.curve import Shape
-from finger3d.sensor.model import SensorModel
+from finger3d.sensor.model import Errors, SensorModel
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
 
@@ -39,6 +43,8 @@ LEAST_P = 1e-3
 
 _PLAUSIBLE = math.exp(-0.5 * 2.706)  # of the largest likelihood: the 90 % limit of a likelihood ratio
 _NEGLIGIBLE = 1e-12  # of the largest likelihood
+_ITERATIONS, _STILL = 30, 1e-4  # of the method of Gauss and Newton; a change of z, in standard deviations, that ends it
+_EQUAL = 0.99  # share of a density from which another one is as large: on a plateau all belong to a set, or none
 _NODES, _ENOUGH, _ZOOMS = 400, 50, 6  # of a finer grid; where the likelihood is not negligible; grids that are tried
 
 
@@ -86,9 +92,9 @@ class _Likelihood:
     chi_square: Float
 
     @classmethod
-    def of(cls, mu: Float, residual: Float, precision: Float, log_determinant: Float) -> _Likelihood:
-        """Return the likelihood of residuals (m, k) with inverse covariances (m, k, k)."""
-        chi_square = np.einsum("mi,mi->m", residual, (precision @ residual[:, :, None])[:, :, 0])
+    def of(cls, mu: Float, residual: Float, errors: Errors) -> _Likelihood:
+        """Return the likelihood of residuals (m, k) at z = 0."""
+        chi_square, log_determinant = _marginal(residual, errors)
         log = -0.5 * (chi_square + log_determinant)
         return cls(mu, np.exp(log - log.max()), chi_square)
 
@@ -115,48 +121,58 @@ class _Likelihood:
 
     def credible_set(self) -> tuple[tuple[float, float], ...]:
         """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood."""
-        weight, order = self.weight, np.argsort(-self.density)
-        count = int(np.searchsorted(np.cumsum(weight[order]), CREDIBLE)) + 1
-        inside = np.zeros(len(weight) + 2, dtype=int)
-        inside[1 + order[:count]] = 1
-        ends = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
+        order = np.argsort(-self.density)
+        count = int(np.searchsorted(np.cumsum(self.weight[order]), CREDIBLE))
+        inside = self.density >= _EQUAL * self.density[order[min(count, len(order) - 1)]]
+        ends = np.flatnonzero(np.diff([0, *inside, 0])).reshape(-1, 2)
         return tuple((float(self.mu[a]), float(self.mu[b - 1])) for a, b in ends)
+
+
+def _marginal(residual: Float, errors: Errors) -> tuple[Float, Float]:
+    """Return the least chi-square (m,) over the shared tolerances, and the log of det D det H, but for a constant."""
+    slope, curvature, weight = errors.slope, errors.curvature, 1.0 / errors.variance
+    count, _, tolerances = slope.shape
+    z, chi_square, log_determinant = np.zeros((count, tolerances)), np.full(count, np.inf), np.zeros(count)
+    left = np.arange(count)  # the mu at which z still changes
+    for _ in range(_ITERATIONS if curvature.any() else 2):  # the least of a quadratic form is found by the first one
+        s, c, w, at = slope[left], curvature[left], weight[left], z[left, None, :]
+        jacobian = s + c * at
+        misfit = residual[left] - np.sum((s + 0.5 * c * at) * at, axis=-1)
+        weighted = jacobian.transpose(0, 2, 1) * w[:, None, :]
+        hessian = np.eye(tolerances) + weighted @ jacobian
+        reached = np.sum(w * misfit**2, axis=1) + np.sum(z[left] ** 2, axis=1)
+        falls = reached < chi_square[left]
+        chi_square[left[falls]] = reached[falls]
+        log_determinant[left[falls]] = np.linalg.slogdet(hessian[falls]).logabsdet
+        target = (misfit + np.sum(jacobian * at, axis=-1))[:, :, None]
+        z[left] = np.linalg.solve(hessian, weighted @ target)[:, :, 0]
+        left = left[np.abs(z[left] - at[:, 0]).max(axis=1, initial=0.0) > _STILL]
+    return chi_square, log_determinant - np.sum(np.log(weight / weight[0]), axis=1)
 
 
 @dataclass(frozen=True)
 class Estimator:
-    """Data shared by all estimates from the same readings: curves, inverse covariance and its determinant on the grid.
+    """Estimates from readings of one kind and noise.
 
     Attributes
     ----------
     limit : standard deviation of mu beyond which an estimate is called coarse
-    readings : (m, k) readings
-    precision : (m, k, k) inverse covariance
-    log_determinant : (m,) of the covariance
+    noise : (k,)
+    shape : of the curves
     """
 
     model: SensorModel
     limit: float
-    noise: Float
-    readings: Float
-    precision: Float
-    log_determinant: Float
+    noise: tuple[float, ...]
+    shape: Shape = "interpolation"
 
-    @classmethod
-    def of(
-        cls,
-        model: SensorModel,
-        limit: float,
-        noise: Float,
-        shape: Shape = "interpolation",
-    ) -> Estimator:
-        """Prepare estimates from readings with noise (k,)."""
-        covariance = model.covariance(model.grid, noise, shape=shape)
-        scale = model.noise
-        scaled = covariance / np.outer(scale, scale)
-        precision = np.linalg.inv(scaled) / np.outer(scale, scale)
-        log_determinant = np.linalg.slogdet(scaled).logabsdet
-        return cls(model, limit, noise, model.at(model.grid, shape), precision, log_determinant)
+    @cached_property
+    def _on_grid(self) -> tuple[Float, Errors]:
+        return self._at(self.model.grid)
+
+    def _at(self, mu: Float) -> tuple[Float, Errors]:
+        """Return the readings (m, k) at mu (m,) without errors, and the errors."""
+        return self.model.at(mu, self.shape), self.model.errors(mu, np.array(self.noise), shape=self.shape)
 
     def estimate(self, reading: Float) -> Estimate:
         """Return the estimate from readings (k,)."""
@@ -196,17 +212,9 @@ class Estimator:
         return likelihood
 
     def _on(self, mu: Float, reading: Float) -> _Likelihood:
-        """Return the likelihood at mu (m,); between points of the grid, readings and precision are interpolated."""
-        grid = self.model.grid
-        if mu is grid:
-            return _Likelihood.of(mu, reading - self.readings, self.precision, self.log_determinant)
-        cell = np.clip(np.searchsorted(grid, mu, side="right") - 1, 0, len(grid) - 2)
-        fraction = ((mu - grid[cell]) / (grid[cell + 1] - grid[cell]))[:, None]
-        residual = reading - self.readings[cell] * (1.0 - fraction) - self.readings[cell + 1] * fraction
-        precision = (
-            self.precision[cell] * (1.0 - fraction[:, :, None]) + self.precision[cell + 1] * fraction[:, :, None]
-        )
-        return _Likelihood.of(mu, residual, precision, np.interp(mu, grid, self.log_determinant))
+        """Return the likelihood at mu (m,)."""
+        nominal, errors = self._on_grid if mu is self.model.grid else self._at(mu)
+        return _Likelihood.of(mu, reading - nominal, errors)
 
     def _status(self, likelihood: _Likelihood, p_value: float, intervals: int) -> Status:
         mu = self.model.mu
@@ -264,25 +272,13 @@ class Estimator:
 
     def _contradiction(self, likelihood: _Likelihood, reading: Float, p_value: float) -> str:
         """Return the verdict that readings contradict each other, and without which one the others agree."""
-        c, text = self.model, ""
-        for i, name in enumerate(c.names if len(c.names) > 2 else ()):
-            others = [j for j in range(len(reading)) if j != i]
-            # the inverse of a block of the covariance, by the Schur complement of the precision
-            row = self.precision[:, others, i]
-            precision = self.precision[np.ix_(range(len(self.readings)), others, others)] - (
-                row[:, :, None] * row[:, None, :] / self.precision[:, i, i, None, None]
-            )
-            part = Estimator(
-                c.of([c.names[j] for j in others]),
-                self.limit,
-                self.noise[others],
-                self.readings[:, others],
-                precision,
-                -np.linalg.slogdet(precision).logabsdet,
-            )
-            left = float(part._likelihood(reading[others]).chi_square.min())
-            if chi_square_tail(left, len(others) - 1) >= LEAST_P:
-                text += f"; without {name}: {part.estimate(reading[others]).verdict}"
+        text = ""
+        for name in self.model.names if len(reading) > 2 else ():
+            others = [j for j, other in enumerate(self.model.names) if other != name]
+            model, noise = self.model.of([self.model.names[j] for j in others]), tuple(self.noise[j] for j in others)
+            part = Estimator(model, self.limit, noise, self.shape).estimate(reading[others])
+            if part.p_value >= LEAST_P:
+                text += f"; without {name}: {part.verdict}"
         return (
             f"these readings contradict each other: chi-square {likelihood.chi_square.min():.3g} with "
             f"{len(reading) - 1} degree{'s' if len(reading) > 2 else ''} of freedom (p = {p_value:.1g}){text}"
@@ -292,7 +288,7 @@ class Estimator:
 @lru_cache(maxsize=8)
 def estimator(model: SensorModel, limit: float, noise: tuple[float, ...], shape: Shape = "interpolation") -> Estimator:
     """Return the estimator for readings with noise (k,); a few are kept, so that readings one by one are quick."""
-    return Estimator.of(model, limit, np.array(noise), shape)
+    return Estimator(model, limit, noise, shape)
 
 
 def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:

@@ -1,9 +1,10 @@
 """Forward model of a sensor: its readings as functions of mu, and the covariance of their errors.
 
-The readings r = e(mu) + error have the covariance ``C = D + sum_t sd_t^2 s_t s_t^T``.  The sum is over the tolerances
-that all readings share (depth, modulus, Poisson's ratio, tilt) with the slopes s_t of the readings, and the diagonal D
-has what every reading has of its own: noise, interpolation, place of a gauge, mesh, increments, and the part of a
-shared tolerance that is not linear.
+The readings are ``r = e(mu) + sum_t (s_t z_t + c_t z_t^2 / 2) + error``.  The sum is over the tolerances that all
+readings share (depth, modulus, Poisson's ratio, tilt), with their deviations z_t in units of the standard deviation and
+the first and second derivatives s_t, c_t of the readings.  The error has the diagonal covariance D of what every
+reading has of its own: noise, interpolation, place of a gauge, mesh, and increments.  To second order the covariance of
+the readings is ``C = D + sum_t (s_t s_t^T + c_t c_t^T / 2)``.
 """
 
 from __future__ import annotations
@@ -23,6 +24,21 @@ SHARED = ("depth_mm", "E_percent", "nu", "tilt_deg")
 """Tolerances that change all readings together."""
 
 _LEAST_NOISE = 1e-3  # relative to the noise of a calibration: an exact reading leaves the covariance regular
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What changes readings (k) at mu (m,) besides friction.
+
+    Attributes
+    ----------
+    variance : (m, k) of what every reading has of its own
+    slope, curvature : (m, k, q) first and second derivative by the shared tolerances, in units of their deviations
+    """
+
+    variance: Float
+    slope: Float
+    curvature: Float
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -75,14 +91,10 @@ class SensorModel:
         """Return d reading / d mu (m, k) at mu (m,)."""
         return np.stack([c.slope(mu) for c in self.readings], axis=-1)
 
-    def covariance(
-        self,
-        mu: ArrayLike,
-        noise: Float | None = None,
-        without: str = "",
-        shape: Shape = "interpolation",
-    ) -> Float:
-        """Return the covariance (m, k, k) of the readings at mu (m,).
+    def errors(
+        self, mu: ArrayLike, noise: Float | None = None, without: str = "", shape: Shape = "interpolation"
+    ) -> Errors:
+        """Return what changes the readings at mu (m,) besides friction.
 
         Parameters
         ----------
@@ -92,23 +104,25 @@ class SensorModel:
         """
         mus = np.atleast_1d(np.asarray(mu, dtype=float))
         scale = self.noise
-        independent = np.array([c.curve_error(mus, shape) ** 2 for c in self.readings]).T
+        variance = np.array([c.curve_error(mus, shape) ** 2 for c in self.readings]).T
         if without != "noise":
-            independent = independent + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
-        shared = [np.zeros((len(mus), len(self.readings))) for _ in SHARED]
+            variance = variance + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
+        shared = [name for name in SHARED if name in self.tolerance_names and name != without]
+        slope, curvature = np.zeros((2, len(mus), len(self.readings), len(shared)))
         for i, c in enumerate(self.readings):
             for t in (t for t in c.tolerances if t.name != without):
-                square = np.interp(mus, c.mu, t.spread) ** 2
-                if t.name in SHARED:
-                    effect = t.sd * np.interp(mus, c.mu, t.slope)
-                    shared[SHARED.index(t.name)][:, i] = effect
-                    square = np.maximum(square - effect**2, 0.0)
-                independent[:, i] += square
-        total = np.zeros((len(mus), len(scale), len(scale)))
-        total[:, np.arange(len(scale)), np.arange(len(scale))] = np.maximum(independent, (_LEAST_NOISE * scale) ** 2)
-        for effect in shared:
-            total += effect[:, :, None] * effect[:, None, :]
-        return total
+                if t.name in shared:
+                    slope[:, i, shared.index(t.name)] = t.sd * np.interp(mus, c.mu, t.slope)
+                    curvature[:, i, shared.index(t.name)] = t.sd**2 * np.interp(mus, c.mu, t.curvature)
+                else:
+                    variance[:, i] += np.interp(mus, c.mu, t.spread) ** 2
+        return Errors(np.maximum(variance, (_LEAST_NOISE * scale) ** 2), slope, curvature)
+
+    def covariance(self, mu: ArrayLike, without: str = "") -> Float:
+        """Return the covariance (m, k, k) of the readings at mu (m,), without a tolerance or the ``"noise"``."""
+        errors = self.errors(mu, without=without)
+        total = errors.variance[:, :, None] * np.eye(len(self.readings))
+        return np.asarray(total + _squares(errors.slope) + 0.5 * _squares(errors.curvature))
 
     def mu_sd(self, mu: ArrayLike, without: str = "") -> Float:
         """Return the standard deviation (m,) of mu of a linear model, ``1 / sqrt(s^T C^-1 s)`` with the slopes s.
@@ -134,3 +148,8 @@ class SensorModel:
                 name: np.nan_to_num(1.0 - self.mu_sd(mu, without=name) ** 2 / whole)
                 for name in ("noise", *self.tolerance_names)
             }
+
+
+def _squares(effects: Float) -> Float:
+    """Return the sum (m, k, k) of the squares of effects (m, k, q) over the tolerances."""
+    return effects @ effects.transpose(0, 2, 1)

@@ -15,3 +15,6 @@ TOLERANCES: dict[str, tuple[float, str]] = {
 }
 """Default standard deviation and unit of each quantity: a careful laboratory set-up and a gauge laid by hand.  For mesh
 and increments the unit is the error bar of the strain due to them."""
+
+GAUGE_PLACES = {"x_mm": "gauge_x_mm", "y_mm": "gauge_y_mm", "angle_deg": "gauge_angle_deg"}
+"""The tolerance of a gauge's place, by the key of the gauge."""

@@ -1,10 +1,11 @@
 """Effect of tolerances on readings: depth, material, tilt, places of gauges, mesh and increments.
 
-Each effect is a finite difference over one standard deviation.  A displaced gauge is read in the same presses as the
-nominal one.  Other quantities are varied in a further series of presses at some values of mu, on the coarser mesh
-that the error bar comes from if that has enough contact points: the depth on another path, Young's modulus with a
-scaled compliance, and Poisson's ratio, the tilt and the place of a stiff gauge on a body of their own.  Between these
-values of mu the effect is interpolated.  The error of the increments follows from presses with more or fewer of them.
+Each effect is a finite difference over one standard deviation, of second order where both signs are tried.  A displaced
+gauge is read in the same presses as the nominal one.  Other quantities are varied in a further series of presses at
+some values of mu, on the coarser mesh that the error bar comes from if that has enough contact points: the depth on
+another path, Young's modulus with a scaled compliance, and Poisson's ratio, the tilt and the place of a stiff gauge on
+a body of their own.  Between these values of mu the effect is interpolated.  The error of the increments follows from
+presses with more or fewer of them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from finger3d.accuracy.estimate import reading_error
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
 from finger3d.analyses.calibrate.settings import CalibratedReading
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
@@ -41,8 +42,6 @@ from finger3d.sensor.curve import LARGEST_SD, Tolerance
 _LEAST_POINTS = {2: 150, 3: 500}
 """Least number of contact points, by dimension, for which differences on the coarser mesh are accurate enough: within a
 fifth of the largest."""
-
-GAUGE_PLACES = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
 
 Effect: TypeAlias = tuple[float, Float]
 """Step of a quantity in its unit, and the changes (k, m) of readings at several mu that it causes."""
@@ -88,7 +87,7 @@ class DisplacedGauge:
 def displaced_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
     """Return the gauge displaced by plus and minus each tolerance of its place, as far as it stays in the body."""
     found = []
-    for name in (n for n in GAUGE_PLACES if n in tolerances):
+    for name in (n for n in GAUGE_PLACES.values() if n in tolerances):
         for sign in (1.0, -1.0):
             step = sign * tolerances[name]
             displaced = replace(_displaced(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
@@ -138,7 +137,7 @@ def evaluate_tolerances(
     mu = base.mu[base.sample]
     own = np.array([base.readings[name][base.sample] for name in names])
     body = ReferenceBody(problem, names, mu, own, base.pressed)
-    others = set(tolerances) - {*GAUGE_PLACES, "increments"}
+    others = set(tolerances) - {*GAUGE_PLACES.values(), "increments"}
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
@@ -155,7 +154,7 @@ def evaluate_tolerances(
                 continue
             error = error_of_increments(problem, own, increments.chosen, lambda other: read(other, names, mu))
             effects = [(sd, sd * error)]
-        elif name in GAUGE_PLACES and not problem.model.inclusions:
+        elif name in GAUGE_PLACES.values() and not problem.model.inclusions:
             known = base.mu
             effects = _effects_of_displaced_gauges(problem.model, readings, name, sd, base)
         else:
@@ -175,16 +174,13 @@ def _tolerances(
 
 
 def tolerance_of(name: str, sd: float, effects: list[Effect]) -> Tolerance:
-    """Return a tolerance from its effects, each scaled to one standard deviation."""
-    scaled = np.array([change * sd / step for step, change in effects])
-    (a, change_a), (b, change_b) = [*effects, (0.0, np.zeros(scaled.shape[1]))][:2]
-    return Tolerance(
-        name=name,
-        unit=TOLERANCES[name][1],
-        sd=sd,
-        slope=(change_a - change_b) / (a - b),
-        spread=np.sqrt(np.mean(scaled**2, axis=0)),
-    )
+    """Return a tolerance from the change of a reading at one step, or the parabola through those at two."""
+    step, change = effects[0]
+    slope, curvature = change / step, np.zeros(len(change))
+    for other, changed in effects[1:]:
+        curvature = 2.0 * (change / step - changed / other) / (step - other)
+        slope = slope - 0.5 * curvature * step
+    return Tolerance(name=name, unit=TOLERANCES[name][1], sd=sd, slope=slope, curvature=curvature)
 
 
 def _interpolated(mu: Float, known: Float, values: Float) -> Float:
@@ -218,10 +214,14 @@ def _gauges(model: Model, readings: Sequence[CalibratedReading]) -> list[tuple[i
 
 
 def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Press deeper, and less deep by at most half the depth of the shallowest leg."""
+    """Press deeper, and less deep by at most half the depth of the shallowest leg.
+
+    Between the nodes of Gauss-Hermite quadrature of three points the parabola has the mean and variance of the reading
+    to fourth order, and contact points that close one by one matter little.
+    """
     problem, model = body.problem, body.problem.model
-    shallowest = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0)
-    for step in (sd, -min(sd, 0.5 * shallowest)):
+    shallowest, node = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0), math.sqrt(3.0) * sd
+    for step in (node, -min(node, 0.5 * shallowest)):
         legs = deeper(model.legs, step)
         yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
 
@@ -304,7 +304,7 @@ _VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], flo
     "E_percent": _vary_modulus,
     "nu": _vary_poisson,
     "tilt_deg": _vary_tilt,
-    **{name: partial(_vary_stiff_gauge, name) for name in GAUGE_PLACES},
+    **{name: partial(_vary_stiff_gauge, name) for name in GAUGE_PLACES.values()},
 }
 """By tolerance, the function that yields its effects on a reference body for one standard deviation."""
 
