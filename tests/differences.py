@@ -51,8 +51,9 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
             found[name] = with_dimension(model, name)
     for number, leg in enumerate(model.legs):
         found[f"goal {number}"] = with_leg(model, number, "depth_mm" if leg.force_N is None else "force_N")
-        if leg.slide_x_mm:
-            found[f"slide {number}"] = with_leg(model, number, "slide_x_mm")
+        for name in ("slide_x_mm", "force_x_N", "force_z_N", "turn_y", "turn_z"):
+            if getattr(leg, name):
+                found[f"{name.split('_mm')[0].removesuffix('_x')} {number}"] = with_leg(model, number, name)
     return found
 
 

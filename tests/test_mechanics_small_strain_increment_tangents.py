@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
+from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.small_strain.variations import variation
@@ -30,16 +31,24 @@ SLIDE = (
     Leg(0.1, slide_x_mm=0.05, slide_z_mm=0.02, steps=1),
 )
 FORCE = (Leg(0.3, force_N=1.0, steps=2), Leg(0.3, slide_x_mm=0.1, force_N=1.2, steps=1))
+SLIDE_2D = (Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.05, steps=2))
+HELD = (
+    Leg(0.3, steps=1),
+    Leg(0.3, force_x_N=0.1, force_z_N=0.05, steps=2),
+    Leg(0.3, slide_x_mm=0.05, steps=2),
+)
 CASES = {
     "plane": replace(TILTED, legs=(Leg(0.3, steps=2),)),
     "slide": replace(TILTED, legs=SLIDE, friction=Coulomb(0.3)),
     "force": replace(TILTED, legs=FORCE),
     "ball": replace(SOLID, legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.2, steps=2))),
     "bar": small_section(object=Cylinder(radius_mm=3.0, axis="z"), symmetry=(), legs=(Leg(0.4, steps=3),)),
+    "tangential force": replace(TILTED, friction=Coulomb(0.5), legs=HELD),
+    "turn": replace(TILTED, legs=(Leg(0.3, steps=1), Leg(0.3, turn_y=0.05, turn_z=0.01, steps=2))),
 }
 
 
-SLOW = ("plane", "force", "bar")
+SLOW = ("plane", "force", "bar", "ball", "tangential force")
 """Cases that only `make test-all` runs."""
 
 
@@ -53,6 +62,26 @@ def test_every_derivative_is_that_of_presses(case: str) -> None:
     else:
         ways["tilt"] = lambda h: replace(model, object=replace(thing, tilt=thing.tilt + np.deg2rad(h)))
     assert_equal_to_differences(build(model), ways)
+
+
+FOILS = tuple(Gauge(g.name, g.x_mm, 1.4, angle=g.angle, length_mm=1.0) for g in READINGS["gauges"])
+PATHS = ("mu", "goal 0", "goal 1", "slide 1")
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        replace(TILTED, legs=SLIDE_2D, inclusions=Foils(100.0, 0.1, 0.3), gauges=FOILS),
+        small_section(symmetry=(), legs=SLIDE_2D, inclusions=Foils(100.0, 0.05, 0.3), gauges=FOILS),
+        replace(CASES["bar"], object_compliance=ElasticObject(3.0, 0.3, None)),
+    ],
+    ids=["solid with foils", "section with foils", "elastic bar"],
+)
+def test_friction_and_path_have_derivatives_beside_foils_and_elastic_objects(model: Model) -> None:
+    problem, ways = build(model), parameters(model)
+    assert_equal_to_differences(problem, {name: ways[name] for name in PATHS if name in ways})
+    with pytest.raises(Finger3dError, match="it changes"):
+        variation(problem, ways["E"](-STEP), ways["E"](STEP), STEP)
 
 
 def test_a_hold_changes_no_derivative() -> None:

@@ -24,11 +24,21 @@ from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 
 _KEYS = re.compile(
-    r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_N|slide_x_mm|slide_z_mm)"
+    r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
+
+_BREAKS = {
+    "slide_x_mm": "x", "slide_z_mm": "z", "force_x_N": "x", "force_z_N": "z",
+    "object.x_mm": "x", "object.z_mm": "z", "tilt_deg": "x",
+    "turn_x_deg": "z", "turn_y_deg": "xz", "turn_z_deg": "x",
+}  # fmt: skip
+"""Axes of the mirror symmetries that a key breaks, by its end."""
+
+_IN_SOLIDS = ("z_mm", "force_z_N", "turn_x_deg", "turn_y_deg")
+"""Ends of keys that sections do not have."""
 
 _STEP, _NU_STEP, _LEAST = 1e-6, 1e-5, 0.1
 """Step of central differences over the value, or over `_LEAST` if that is larger; that of nu is larger, since the bulk
@@ -185,12 +195,18 @@ def has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
     flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
     unstructured = problem.dim == 3 and problem.model.mesh.mesher != "swept"  # its cells are others each time
-    if (problem.dim == 2 and key.endswith("z_mm")) or (unstructured and key.startswith("finger.")):
+    if (problem.dim == 2 and key.endswith(_IN_SOLIDS)) or (unstructured and key.startswith("finger.")):
         return False
+    if key.endswith("turn_z_deg") and has_exact_path(problem.model):
+        return False  # beside the path there are increments
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
         return False
-    moved = {"slide_x_mm": "x", "slide_z_mm": "z", "object.x_mm": "x", "object.z_mm": "z", "tilt_deg": "x"}
-    mirrored = any(key.endswith(name) and axis in problem.axes for name, axis in moved.items())
+    in_body = key.startswith(("finger.", "material.", "parts."))
+    if problem.model.object_compliance is not None and (in_body or key.startswith("object.")):
+        return False
+    if problem.model.inclusions is not None and (in_body or key.startswith(("gauge.", "marker."))):
+        return False
+    mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())
     return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)
 
 

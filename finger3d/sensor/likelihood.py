@@ -44,7 +44,7 @@ LEAST_P = 1e-3
 _PLAUSIBLE = math.exp(-0.5 * 2.706)  # of the largest likelihood: the 90 % limit of a likelihood ratio
 _NEGLIGIBLE = 1e-12  # of the largest likelihood
 _ITERATIONS, _STILL = 30, 1e-4  # of the method of Gauss and Newton; a change of z, in standard deviations, that ends it
-_EQUAL = 0.99  # share of a density from which another one is as large: on a plateau all belong to a set, or none
+_EQUAL = 0.1  # difference of logarithms of densities below which they are equal: on a plateau
 _NODES, _ENOUGH, _ZOOMS = 400, 50, 6  # of a finer grid; where the likelihood is not negligible; grids that are tried
 
 
@@ -121,10 +121,13 @@ class _Likelihood:
 
     def credible_set(self) -> tuple[tuple[float, float], ...]:
         """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood."""
-        order = np.argsort(-self.density)
-        count = int(np.searchsorted(np.cumsum(self.weight[order]), CREDIBLE))
-        inside = self.density >= _EQUAL * self.density[order[min(count, len(order) - 1)]]
-        ends = np.flatnonzero(np.diff([0, *inside, 0])).reshape(-1, 2)
+        with np.errstate(divide="ignore"):
+            level = np.round(np.log(self.density) / _EQUAL)
+        order = np.lexsort((np.abs(self.mu - self.mu[np.argmax(level)]), -level))  # of equals the nearest to the mode
+        count = int(np.searchsorted(np.cumsum(self.weight[order]), CREDIBLE)) + 1
+        inside = np.zeros(len(order) + 2, dtype=int)
+        inside[1 + order[:count]] = 1
+        ends = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
         return tuple((float(self.mu[a]), float(self.mu[b - 1])) for a, b in ends)
 
 

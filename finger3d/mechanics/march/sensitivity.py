@@ -42,14 +42,8 @@ def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
     if not model.is_linear_elastic:
         return "derivatives need linear elasticity: small strain, without viscosity"
-    if model.inclusions is not None or model.object_compliance is not None:
-        return "derivatives are not known with an elastic object or foils"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
-    if any(leg.turn_x or leg.turn_y or leg.turn_z for leg in model.legs):
-        return "derivatives are not known where the object turns"
-    if any(leg.force_x_N is not None or leg.force_z_N is not None for leg in model.legs):
-        return "derivatives are not known under a tangential force"
     return ""
 
 

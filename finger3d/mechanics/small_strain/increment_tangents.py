@@ -10,7 +10,7 @@ geometry of the contact, and on the parameters through the state before and the 
 parameter less and plus its step to first order.  They hold the curvature of the object, and where points touch within
 the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration.
 
-Under a prescribed force an increment is differentiated by its depth, too, which changes so that the force is kept.
+Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Array, Float
 from finger3d.contact.friction import SLIP
 from finger3d.contact.state import pressure
 from finger3d.errors import Finger3dError
@@ -73,13 +73,14 @@ class _End:
         contact = replace(after.contact, force=after.contact.force + force)
         body, place = LinearBody(side.problem.delassus, np.zeros_like(after.body)), after.body + displacement
         increment = Increment(side.problem, side.state, move, body, DistanceTracker())
-        geometry = increment.geometry(place, np.inf)
-        state = increment.reached(geometry, place, place, contact, None)
+        expansion_point = np.zeros_like(place) if side.problem.model.object.is_flat else place
+        geometry = increment.geometry(expansion_point, np.inf)
+        state = increment.reached(geometry, expansion_point, place, contact, None)
         work, lost = energies(side.problem, [Substep(side.state, state, move)])
         read = readings + side.problem.system.reading_rows @ side.problem.upright_force(state.contact).ravel()
         end = Side(side.problem, state, move.end, read, side.work_mJ + work, side.dissipation_mJ + lost)
         turned = np.einsum("ca,cak->ck", after.contact.force, geometry.bases)
-        return cls(end, increment.relative(geometry, place, place), turned)
+        return cls(end, increment.relative(geometry, expansion_point, place), turned)
 
 
 class IncrementTangents:
@@ -103,7 +104,7 @@ class IncrementTangents:
         self._bodies = [one.body for one in variations]
         self._stations = [stations(end.model.legs) for end in ends]
         self._state, self._pose, self._number = SmallStrain().start(problem), problem.origin, 0
-        self._leg_start_N = np.zeros(len(ends))
+        self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
 
     def advance(self, step: StepResult) -> list[Side]:
         """Return the sides at the end of the next increment, which has this result.
@@ -114,9 +115,9 @@ class IncrementTangents:
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
         targets = [own[self._number] for own in self._stations]
-        parts, poses = self._parts(step), [target.pose for target in targets]
+        parts, poses = self._parts(step), self._poses(targets)
         if any(target.load for target in targets):
-            poses = self._at_force(step, parts, targets)
+            poses = self._in_equilibrium(step, parts, targets, poses)
         self.sides = self._through(parts, self.sides, self._steps, poses)
         self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
         return self.sides
@@ -135,26 +136,41 @@ class IncrementTangents:
             before, start = after, share
         return parts
 
-    def _at_force(self, step: StepResult, parts: Sequence[_Part], targets: Sequence[Station]) -> list[ObjectPose]:
-        """Return the poses at the end of an increment whose depth follows from a prescribed force."""
-        depth = step.target.depth_mm
-        h, here = _STEP * max(depth, 1.0), _begun(self.problem)._replace(state=self._state, pose=self._pose)
-        fixed = [replace(target.pose, depth_mm=depth) for target in targets]
-        deeper = [replace(step.target, depth_mm=depth + t) for t in (-h, h)]
-        found = self._through(parts, [*self.sides, here, here], np.array([*self._steps, -h, h]), [*fixed, *deeper])
-        *reached, low, high = (_normal_force(side) for side in found)
-        wanted = np.zeros(len(targets))
-        for k, (side, target) in enumerate(zip(self.sides, targets, strict=True)):
-            assert target.load is not None
-            if target.load.begins:
-                self._leg_start_N[k] = _normal_force(side)
-            start = self._leg_start_N[k]
-            wanted[k] = start + target.load.share * (target.load.forces[0] - start)
-        missing = 0.5 * np.diff((wanted - reached).reshape(-1, 2), axis=1).ravel() * (2.0 * h) / (high - low)
-        return [
-            replace(pose, depth_mm=depth + change)
-            for pose, change in zip(fixed, np.column_stack([-missing, missing]).ravel().tolist(), strict=True)
-        ]
+    def _poses(self, targets: Sequence[Station]) -> list[ObjectPose]:
+        """Return the poses at stations; slides that forces have determined are taken back in proportion to the leg."""
+        before = [own[self._number - 1] for own in self._stations] if self._number else []
+        if before and before[0].share == 1.0:
+            planned = [station.pose.coordinates[1:3] for station in before]
+            self._left = np.array([side.pose.coordinates[1:3] for side in self.sides]) - planned
+        change = (1.0 - targets[0].share) * self._left
+        return [_moved(target.pose, [1, 2], by) for target, by in zip(targets, change, strict=True)]
+
+    def _in_equilibrium(
+        self, step: StepResult, parts: Sequence[_Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
+    ) -> list[ObjectPose]:
+        """Return the poses at the end of an increment whose depth or slides follow from prescribed forces."""
+        loads = [target.load for target in targets if target.load]
+        free = np.flatnonzero(~np.isnan(loads[0].forces))
+        reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
+        held = [_moved(pose, free, (reached - pose.coordinates)[free]) for pose in poses]
+        moved = [_moved(step.target, [k], [t]) for k in free.tolist() for t in (-h, h)]
+        here = _begun(self.problem)._replace(state=self._state, pose=self._pose)
+        found = self._through(
+            parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
+        )
+        forces = np.array([_forces(side) for side in found])
+        if loads[0].begins:
+            self._leg_start_N = np.array([_forces(side) for side in self.sides])
+        goals = np.array([load.forces for load in loads])
+        wanted = self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
+        missing = 0.5 * np.diff((wanted - forces[: len(held)]).reshape(-1, 2, 3), axis=1)[:, 0, free]
+        stiffness = np.diff(forces[len(held) :].reshape(-1, 2, 3), axis=1)[:, 0, free].T / (2.0 * h)
+        try:
+            change = np.linalg.solve(stiffness, missing.T).T
+        except np.linalg.LinAlgError:
+            raise Finger3dError("forces do not determine the pose of the object: numbers have no derivatives") from None
+        both = np.stack([-change, change], axis=1).reshape(-1, len(free))
+        return [_moved(pose, free, by) for pose, by in zip(held, both, strict=True)]
 
     def _through(
         self, parts: Sequence[_Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
@@ -226,8 +242,17 @@ def _begun(problem: Problem) -> Side:
     return Side(problem, SmallStrain().start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
 
 
-def _normal_force(side: Side) -> float:
-    return -float(side.problem.world_force(side.state.contact)[:, 1].sum())
+def _forces(side: Side) -> Float:
+    """Return the normal force and the forces along x and z (3,) N."""
+    x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
+    return np.array([-y, x, z])
+
+
+def _moved(pose: ObjectPose, numbers: Sequence[int] | Array, change: Sequence[float] | Float) -> ObjectPose:
+    """Return a pose with some of its coordinates changed."""
+    coordinates = pose.coordinates
+    coordinates[numbers] += change
+    return ObjectPose(*coordinates.tolist())
 
 
 def _coefficients(side: Side) -> Float:

@@ -29,7 +29,8 @@ from finger3d.objects import ObjectPose, vertical_frame
 _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
 
-_IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
+_ELASTIC = ("design", "material", "parts")
+_IN_BODY = (*_ELASTIC, "gauges", "markers", "taxels")
 _CHANGES = (*_IN_BODY, "friction", "legs", "object")
 """What a parameter may change in a model, in the body and elsewhere."""
 
@@ -133,8 +134,13 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
         for model, touch in zip(models, touches, strict=True)
     ]
-    if all(getattr(end.model, name) == getattr(own, name) for name in _IN_BODY for end in ends):
+    changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
+    if own.object_compliance is not None and changed & {*_ELASTIC, "object"}:
+        raise Finger3dError("it changes the share of an elastic object in the compliance")
+    if not changed & {*_IN_BODY}:
         return Variation(ends[0], ends[1], step, None)
+    if own.inclusions is not None:
+        raise Finger3dError("it changes a body with foils")
     below, above = (_assembled(problem, end) for end in ends)
     change = BodyChange(
         *((high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True))
