@@ -63,9 +63,11 @@ def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[l
     return [step for step, _ in found], [slopes for _, slopes in found]
 
 
-def assert_equal_to_differences(problem: Problem, ways: Mapping[str, Callable[[float], Model]]) -> None:
+def assert_equal_to_differences(
+    problem: Problem, ways: Mapping[str, Callable[[float], Model]], tolerance: float = 1e-6, step: float = DIFFERENCE
+) -> None:
     """Compare all derivatives with central differences of presses, whose bodies are condensed again if they change."""
-    h = DIFFERENCE if problem.model.object.is_flat else 10.0 * DIFFERENCE  # curved contact is solved to 1e-9
+    h = step if problem.model.object.is_flat else max(step, 10.0 * DIFFERENCE)  # curved contact is solved to 1e-9
     variations = [variation(problem, way(-STEP), way(STEP), STEP) for way in ways.values()]
     steps, slopes = differentiated(problem, variations)
     values = [table_row(problem.points, step) for step in steps]
@@ -81,7 +83,9 @@ def assert_equal_to_differences(problem: Problem, ways: Mapping[str, Callable[[f
             for column, slope in slopes[number][k].items():
                 size = 1e-3 if column.startswith("gauge") else 0.1  # of numbers that are zero
                 largest = max(abs(slope), size, *(abs(row[column]) for row in values))
-                assert (rows[1][column] - rows[0][column]) / (2.0 * h) == pytest.approx(slope, abs=1e-6 * largest), (
+                assert (rows[1][column] - rows[0][column]) / (2.0 * h) == pytest.approx(
+                    slope, abs=tolerance * largest
+                ), (
                     name,
                     number,
                     column,

@@ -78,7 +78,7 @@ def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
         assert ratio < 0.0
         assert "folded over" in cause_of_failure(problem, displacement(problem.mesh, unknowns))
         _, strain, stress = formulation_of(problem.model).fields(problem, state)
-        quadrature_points = FiniteStrain(NeoHooke(1.0))._body(problem).solid.slopes(unknowns)
+        quadrature_points = FiniteStrain(NeoHooke(1.0)).body(problem).solid.slopes(unknowns)
         assert np.linalg.det(quadrature_points + np.eye(2)).min() > 0.0
         corners = problem.mesh.cells[cell]
         assert np.isfinite(stress[corners]).all()
@@ -101,7 +101,7 @@ def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> Non
     assert min(np.diff(force[: number - 1])) > 0.0
     assert snap_warnings(frames[: number - 1]) == []
     state = frames[-1].meshed_state
-    internal = FiniteStrain(NeoHooke(1.0))._body(problem).internal_forces(state.body.unknowns)
+    internal = FiniteStrain(NeoHooke(1.0)).body(problem).internal_forces(state.body.unknowns)
     base = internal[problem.body.fixed_dofs]
     down = base[problem.body.fixed_dofs % 2 == 1].sum() * 2 ** len(problem.axes)
     assert down == pytest.approx(force[-1], rel=1e-7)

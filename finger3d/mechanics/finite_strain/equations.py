@@ -93,7 +93,7 @@ class IncrementEquations:
         """Return the solution with the state at the end, unless the material law is unstable there."""
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
-        state, error = self._state(now, solution.state), max(solution.residual, error)
+        state, error = self.reached(now, solution.state), max(solution.residual, error)
         return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(
@@ -232,8 +232,8 @@ class IncrementEquations:
             delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
         moved = np.zeros(force.size)
         moved[active] = displacement
-        free_displacement = self._relative_displacement(now, force)
-        free_displacement += self._active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
+        free_displacement = self.relative_displacement(now, force)
+        free_displacement += self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
         contact = ContactProblem.of(
@@ -252,10 +252,10 @@ class IncrementEquations:
     def out_of_balance(self, now: Configuration, force: Float) -> Float:
         """Return internal less contact forces (N,)."""
         out = now.internal.copy()
-        out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self._active(force.ravel())).ravel()
+        out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self.active(force.ravel())).ravel()
         return out
 
-    def _active(self, vector: Float) -> Float:
+    def active(self, vector: Float) -> Float:
         """Return a vector (c d,) as (c, d), zero across symmetry planes.
 
         The weighted mean over half of a point's hat need not be zero there.
@@ -264,7 +264,7 @@ class IncrementEquations:
         out[self.problem.system.active_dofs] = vector[self.problem.system.active_dofs]
         return out.reshape(-1, self.problem.dim)
 
-    def _relative_displacement(self, now: Configuration, force: Float) -> Float:
+    def relative_displacement(self, now: Configuration, force: Float) -> Float:
         """Gap and increment of tangential displacement (c, d) under forces (c, d), in the present directions.
 
         Points that close in the increment slip from where they touch.
@@ -286,7 +286,7 @@ class IncrementEquations:
             out[:, 0] += np.einsum("ck,ck->c", bases[:, 0], whole)
             increment = increment + whole - last
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], increment)
-        return self._active(out.ravel())
+        return self.active(out.ravel())
 
     def residual(self, now: Configuration, solution: ContactState, out_of_balance: Float) -> float:
         """Return the largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.
@@ -306,11 +306,11 @@ class IncrementEquations:
         volume = float(np.abs(np.linalg.det(np.diff(mesh.points[mesh.cells[:, : mesh.dim + 1]], axis=1))).mean())
         volume *= problem.body.thickness / math.factorial(mesh.dim) * self.body.solid.pressure_scale
         dilatation = float(np.abs(unbalanced[n:]).max(initial=0.0)) / volume
-        moved = self._relative_displacement(now, force)
+        moved = self.relative_displacement(now, force)
         return max(residual(force, moved, solution.status, mu, self.length_scale), equilibrium, dilatation)
 
-    def _state(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
+    def reached(self, now: Configuration, solution: ContactState) -> State[DeformedBody]:
         """Return the state at the end of the increment."""
-        moved, contact = self._relative_displacement(now, solution.force), replace(solution, bases=now.contact.bases)
+        moved, contact = self.relative_displacement(now, solution.force), replace(solution, bases=now.contact.bases)
         reached = advanced(self.start, contact, moved, self._until_touch, self.move)
         return replace(reached, body=DeformedBody(now.x, previous=(self.move, self.start.body.unknowns)))

@@ -48,7 +48,7 @@ class FiniteStrain:
         """Return a workspace without body and factor."""
         return FiniteStrainWorkspace()
 
-    def _body(self, problem: Problem, workspace: FiniteStrainWorkspace | None = None) -> FiniteBody:
+    def body(self, problem: Problem, workspace: FiniteStrainWorkspace | None = None) -> FiniteBody:
         has_inclusions = problem.inclusions.bars is not None
         if workspace is not None and has_inclusions in workspace.bodies:
             return workspace.bodies[has_inclusions]
@@ -69,7 +69,7 @@ class FiniteStrain:
 
     def start(self, problem: Problem) -> State[DeformedBody]:
         """Return the state at rest."""
-        mesh, body = problem.mesh, self._body(problem)
+        mesh, body = problem.mesh, self.body(problem)
         x = np.zeros(mesh.points.size + len(body.solid.pattern.vertices))
         contact = contact_of(problem, problem.surface, displacement(mesh, x), problem.origin)
         memory = None
@@ -128,7 +128,7 @@ class FiniteStrain:
         move: Move,
         workspace: FiniteStrainWorkspace,
     ) -> FiniteIncrement:
-        body = self._body(problem, workspace)
+        body = self.body(problem, workspace)
         memory = state.body.memory
         if self.relaxation is not None and memory is not None:
             body = body.over(self.relaxation, memory, move.duration_s)
@@ -184,7 +184,7 @@ class FiniteStrain:
         """Return the internal nodal forces (n, d) of the present stress; only taxels read them."""
         if not problem.model.taxels:
             return np.zeros((0, problem.dim))
-        body = self._body(problem)
+        body = self.body(problem)
         if self.relaxation is not None and state.memory is not None:
             body = body.over(self.relaxation, state.memory, 0.0)
         return body.internal_forces(state.unknowns)[: problem.mesh.points.size].reshape(-1, problem.dim)
@@ -202,7 +202,7 @@ class FiniteStrain:
 
     def fields(self, problem: Problem, state: State[DeformedBody]) -> tuple[Float, Float, Float]:
         """Return displacement, Green-Lagrange strain and Cauchy stress."""
-        x, memory, body = state.body.unknowns, state.body.memory, self._body(problem)
+        x, memory, body = state.body.unknowns, state.body.memory, self.body(problem)
         f, strain, cauchy = nodal_fields(body.solid, x)
         if self.relaxation is not None and memory is not None:
             lost = relaxed(self.relaxation.prony, memory) - memory.elastic

@@ -15,12 +15,13 @@ import numpy as np
 from finger3d.contact.events import Event
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.elastic import at_rest, linear_loads
+from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.path_tangents import (
@@ -40,8 +41,8 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if not model.is_linear_elastic:
-        return "derivatives need linear elasticity: small strain, without viscosity"
+    if model.relaxation is not None:
+        return "derivatives are not known with viscosity"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""
@@ -77,10 +78,18 @@ def _advanced(press: Press, station: Station) -> StepResult:
 
 
 def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
-    press, tangents = Press(problem), IncrementTangents(problem, variations)
+    press, tangents = Press(problem), _increment_tangents(problem, variations)
     for station in stations(problem.model.legs):
         step = _advanced(press, station)
         yield step, tangents.advance(step)
+
+
+def _increment_tangents(problem: Problem, variations: Sequence[Variation]) -> IncrementTangents:
+    if not problem.model.finite_strain:
+        return IncrementTangents(problem, variations)
+    from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
+
+    return FiniteIncrementTangents(problem, variations)
 
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
@@ -127,7 +136,7 @@ def _of_numbers(step: StepResult, one: Variation, low: Side, high: Side) -> Numb
 
     def numbers(side: Side) -> Numbers:
         problem, contact = side.problem, side.state.contact
-        moment = linear_loads(problem, contact, side.state.body).moment
+        moment = formulation_of(problem.model).loads(problem, side.state, side.pose).moment
         changed = replace(
             step,
             target=side.pose,

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,11 @@ from finger3d.contact.friction import SLIP
 from finger3d.contact.state import pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.mechanics.small_strain.variations import Side, Variation
@@ -44,12 +45,12 @@ _STEP = 1e-6
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """Part of an increment, linearised, between two shares of its motion."""
 
-    before: State[Float]
-    after: State[Float]
-    linear: LinearisedIncrement
+    before: State[Any]
+    after: State[Any]
+    linear: Any
     start: float
     end: float
 
@@ -100,10 +101,11 @@ class IncrementTangents:
         self.problem = problem
         self._steps = np.array([t for one in variations for t in (-one.step, one.step)])
         ends = [end for one in variations for end in one.ends]
-        self.sides = [_begun(end) for end in ends]
-        self._bodies = [one.body for one in variations]
+        self.formulation = formulation_of(problem.model)
+        self.sides = [self._begun(end) for end in ends]
+        self._variations = variations
         self._stations = [stations(end.model.legs) for end in ends]
-        self._state, self._pose, self._number = SmallStrain().start(problem), problem.origin, 0
+        self._state, self._pose, self._number = self.formulation.start(problem), problem.origin, 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
 
     def advance(self, step: StepResult) -> list[Side]:
@@ -122,19 +124,26 @@ class IncrementTangents:
         self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
         return self.sides
 
-    def _parts(self, step: StepResult) -> list[_Part]:
+    def _parts(self, step: StepResult) -> list[Part]:
         """Return the parts of an increment, linearised."""
-        whole, parts = Move(self._pose, step.target).change, list[_Part]()
+        whole, parts = Move(self._pose, step.target).change, list[Part]()
         before, start = self._state, 0.0
         for pose, after in step.parts:
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
-                linear = LinearisedIncrement.of(self.problem, before.contact, after.contact)
+                linear = self._linearised(before, after, Move(self._pose, pose))
             except np.linalg.LinAlgError:
                 raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
-            parts.append(_Part(before, after, linear, start, share))
+            parts.append(Part(before, after, linear, start, share))
             before, start = after, share
         return parts
+
+    def _begun(self, problem: Problem) -> Side:
+        return Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+
+    def _linearised(self, before: State[Any], after: State[Any], move: Move) -> Any:
+        """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
+        return LinearisedIncrement.of(self.problem, before.contact, after.contact)
 
     def _poses(self, targets: Sequence[Station]) -> list[ObjectPose]:
         """Return the poses at stations; slides that forces have determined are taken back in proportion to the leg."""
@@ -146,7 +155,7 @@ class IncrementTangents:
         return [_moved(target.pose, [1, 2], by) for target, by in zip(targets, change, strict=True)]
 
     def _in_equilibrium(
-        self, step: StepResult, parts: Sequence[_Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
+        self, step: StepResult, parts: Sequence[Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
     ) -> list[ObjectPose]:
         """Return the poses at the end of an increment whose depth or slides follow from prescribed forces."""
         loads = [target.load for target in targets if target.load]
@@ -154,7 +163,7 @@ class IncrementTangents:
         reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
         held = [_moved(pose, free, (reached - pose.coordinates)[free]) for pose in poses]
         moved = [_moved(step.target, [k], [t]) for k in free.tolist() for t in (-h, h)]
-        here = _begun(self.problem)._replace(state=self._state, pose=self._pose)
+        here = self._begun(self.problem)._replace(state=self._state, pose=self._pose)
         found = self._through(
             parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
         )
@@ -173,7 +182,7 @@ class IncrementTangents:
         return [_moved(pose, free, by) for pose, by in zip(held, both, strict=True)]
 
     def _through(
-        self, parts: Sequence[_Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
+        self, parts: Sequence[Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
     ) -> list[Side]:
         """Return the sides after all parts of an increment, which ends in these poses."""
         moves = [Move(side.pose, pose) for side, pose in zip(sides, poses, strict=True)]
@@ -181,7 +190,7 @@ class IncrementTangents:
             sides = self._after(part, sides, steps, [Move(move.at(part.start), move.at(part.end)) for move in moves])
         return list(sides)
 
-    def _after(self, part: _Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
+    def _after(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
         """Return the sides after a part of an increment."""
         contact, linear, frame = part.after.contact, part.linear, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
@@ -194,14 +203,13 @@ class IncrementTangents:
             return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
 
         other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
-        if any(self._bodies):
+        if any(one.body for one in self._variations):
             flat = self.problem.upright_force(contact)
             field = self.problem.unknowns(flat)[:, None]
-            for k, body in enumerate(self._bodies):
-                if body:
-                    other[:, k : k + 1], readings[:, k : k + 1] = body.of(self.problem, field, flat.reshape(-1, 1))
-        rubbed = _rubbed(part)
-        direct = slope([upright(contact, rubbed * _coefficients(side)[:, None]) for side in sides])
+            for k, one in enumerate(self._variations):
+                if one.body:
+                    other[:, k : k + 1], readings[:, k : k + 1] = one.body.of(self.problem, field, flat.reshape(-1, 1))
+        direct = slope([upright(contact, friction) for friction in rubbed(part, sides)])
         unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
         errors = [np.full(p, np.inf)] * 2  # unknowns and directions are corrected in turn
         for _ in range(_MOST):
@@ -227,19 +235,16 @@ class IncrementTangents:
         )
 
 
-def _rubbed(part: _Part) -> Float:
-    """Return the friction (c, d) N of slipping points for a coefficient of friction of one."""
+def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
+    """Return the friction (c, d) N of slipping points for the coefficients of friction of sides at the start."""
     after, before = part.after.contact, part.before.contact
     slid, along = after.accumulated_slip - before.accumulated_slip, after.force[:, 1:]
     along = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, -slid)
     length = np.linalg.norm(along, axis=1)
     slips = (length > 0.0) & (after.status == SLIP)
     share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
-    return np.column_stack([np.zeros(len(along)), along * share[:, None]])
-
-
-def _begun(problem: Problem) -> Side:
-    return Side(problem, SmallStrain().start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+    friction = np.column_stack([np.zeros(len(along)), along * share[:, None]])
+    return [friction * _coefficients(side)[:, None] for side in sides]
 
 
 def _forces(side: Side) -> Float:

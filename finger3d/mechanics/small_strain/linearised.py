@@ -39,10 +39,15 @@ class LinearisedIncrement:
     factor: tuple[Float, Float]
 
     @classmethod
-    def of(cls, problem: Problem, before: ContactState, after: ContactState) -> LinearisedIncrement:
-        """Linearise the increment between two states."""
+    def of(
+        cls, problem: Problem, before: ContactState, after: ContactState, own: Float | None = None
+    ) -> LinearisedIncrement:
+        """Linearise the increment between two states; `own` is a Delassus operator in the directions of the points.
+
+        The equations are then in these directions.
+        """
         c, d = after.force.shape
-        rotations = after.own_bases @ vertical_frame(d).T
+        rotations = after.own_bases @ vertical_frame(d).T if own is None else np.broadcast_to(np.eye(d), (c, d, d))
         turn = block_diagonal(rotations)
         rho = augmentation_parameters(problem.delassus.reshape(c * d, c * d), d)
         slip = after.tangential_displacement - transported(before, after.own_bases).tangential_displacement
@@ -52,7 +57,7 @@ class LinearisedIncrement:
         moved = np.concatenate([after.gap[:, None], slip], axis=1)
         augmented = after.force - rho * np.where(slips[:, None], moved, 0.0)
         if (rotations == np.eye(d)).all():
-            points, delassus = np.arange(c), problem.delassus
+            points, delassus = np.arange(c), problem.delassus if own is None else own
         else:
             points = np.flatnonzero(after.status != OPEN)
             delassus = rotated_delassus(problem.delassus, rotations[points], points)

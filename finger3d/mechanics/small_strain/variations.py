@@ -46,7 +46,7 @@ class Side(NamedTuple):
     """
 
     problem: Problem
-    state: State[Float]
+    state: State[Any]
     pose: ObjectPose
     readings: Float
     work_mJ: float

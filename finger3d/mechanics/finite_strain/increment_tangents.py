@@ -1,0 +1,166 @@
+"""Derivatives of increments at finite strain, from the tangents at their ends.
+
+With the body's tangent K, contact rows B, and forces r = P x of the active set, the derivatives of displacements u and
+of the unknowns x by a parameter solve ::
+
+    K du + dR - d(B^T r) = 0,   D dw + E dx = 0
+
+(`finger3d.mechanics.small_strain.increment_tangents`), where dR is the change of the internal forces at fixed
+displacements.  d(B^T r) and dw are central differences between two sides on the deformed surface; they hold how rows
+and directions change with u.  The equations are solved by iteration with the tangent of the increment, factored once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from finger3d._types import Float
+from finger3d.contact.state import ContactState
+from finger3d.errors import Finger3dError
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.tensors import rotated_delassus
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
+from finger3d.mechanics.finite_strain.formulation import FiniteStrain
+from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
+from finger3d.mechanics.march.parts import Substep, energies
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, Part, rubbed
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
+from finger3d.mechanics.small_strain.variations import Side
+from finger3d.objects import Move, vertical_frame
+
+_CHANGE, _ROUND_OFF, _MOST = 1e-8, 1e-5, 60
+"""Change of forces and displacements, over the largest, at which the iteration ends, that at which it may if it falls
+no further, and the largest number of iterations."""
+
+_NEGLIGIBLE = 1e-7
+"""Derivative by the parameter in units of its step, over the value, that errors are relative to at least."""
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Increment at finite strain, linearised at its end.
+
+    Attributes
+    ----------
+    tangent : (N, N) sparse, of the body
+    body : the same with the contact, factored
+    active : equations of the active set
+    """
+
+    tangent: Any
+    body: Linearisation
+    active: LinearisedIncrement
+
+
+class FiniteIncrementTangents(IncrementTangents):
+    """Derivatives of a press at finite strain, one increment after another."""
+
+    formulation: FiniteStrain
+
+    def _linearised(self, before: State[DeformedBody], after: State[DeformedBody], move: Move) -> _Linear:
+        problem, contact = self.problem, after.contact
+        equations = self._equations(problem, before, move)
+        linearisation = equations.linearise(equations.at(after.body.unknowns), contact.force)
+        delassus, compliance = linearisation.delassus, problem.system.object_compliance
+        if compliance is not None:
+            delassus = delassus + rotated_delassus(compliance, contact.own_bases @ vertical_frame(problem.dim).T)
+        upper = equations.body.tangent(after.body.unknowns).upper
+        active = LinearisedIncrement.of(problem, before.contact, contact, delassus)
+        return _Linear((upper + sp.triu(upper, 1).T).tocsr(), linearisation, active)
+
+    def _equations(self, problem: Problem, start: State[DeformedBody], move: Move) -> IncrementEquations:
+        return IncrementEquations(problem, self.formulation.body(problem), start, move, FiniteStrainWorkspace())
+
+    def _of_material(self, x: Float) -> Float:
+        """Return the derivatives (N, p) of the internal forces at unknowns (N,)."""
+        own, changes = self.problem.model, np.zeros((len(x), len(self._variations)))
+        for k, one in enumerate(self._variations):
+            if any(end.model.design != own.design for end in one.ends):
+                raise Finger3dError("at large deformation numbers have no derivatives by dimensions")
+            if any((end.model.material, end.model.parts) != (own.material, own.parts) for end in one.ends):
+                low, high = (self.formulation.body(end).internal_forces(x) for end in one.ends)
+                changes[:, k] = one.difference(low, high)
+        return changes
+
+    def _after(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
+        """Return the sides after a part of an increment."""
+        problem, contact, x = self.problem, part.after.contact, part.after.body.unknowns
+        linear, active, size = part.linear, problem.system.active_dofs, steps[1::2]
+        p, n = len(size), problem.mesh.points.size
+        equations = [self._equations(side.problem, side.state, m) for side, m in zip(sides, moves, strict=True)]
+
+        def slope(values: Sequence[Float]) -> Float:
+            """Return the derivatives (k, p) of values (2 p, ...)."""
+            array = np.reshape(values, (2 * p, -1))
+            return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
+
+        internal = np.zeros((len(x), p))
+        own = self._of_material(x)
+        internal[:, : own.shape[1]] = own
+        direct = slope(rubbed(part, sides))
+        unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))
+        errors = [np.full(p, np.inf)] * 2
+        for _ in range(_MOST):
+            force = linear.active.forces @ unknowns + direct
+            ends = [
+                _End.of(one, x + t * moved[:, k // 2], contact, t * force[:, k // 2].reshape(contact.force.shape))
+                for k, (one, t) in enumerate(zip(equations, steps, strict=True))
+            ]
+            unbalanced = linear.tangent @ moved + internal
+            unbalanced[:n] -= slope([end.nodal_forces for end in ends])
+            eliminated = linear.body.condensation.eliminated(-unbalanced)
+            relative = slope([end.relative for end in ends])
+            relative[active] += eliminated.displacement
+            change = linear.active.correction(relative, unknowns)
+            step = eliminated.unknowns(-(linear.active.forces @ change)[active])
+            unknowns, moved = unknowns - change, moved + step
+            error = np.maximum(
+                _share(step[:n], moved[:n], np.abs(x[:n]).max() / size),
+                _share(change, unknowns, np.abs(contact.force).max(initial=0.0) / size),
+            )
+            if (error <= np.where(error > 0.5 * errors[-2], _ROUND_OFF, _CHANGE)).all():
+                return [end.side(side, self.formulation) for end, side in zip(ends, sides, strict=True)]
+            errors.append(error)
+        raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
+
+
+@dataclass(frozen=True)
+class _End:
+    """Side at the end of a part of an increment, with forces on nodes (n, d) N, and gap and slip (c, d) mm."""
+
+    equations: IncrementEquations
+    now: Configuration
+    contact: ContactState
+    nodal_forces: Float
+    relative: Float
+
+    @classmethod
+    def of(cls, equations: IncrementEquations, x: Float, contact: ContactState, force: Float) -> _End:
+        """Return the end at unknowns (N,), with contact forces that differ by (c, d) from those of a state."""
+        problem = equations.problem
+        there = contact_of(problem, problem.surface, displacement(problem.mesh, x), equations.move.end)
+        now, state = Configuration(x, np.zeros(0), there), replace(contact, force=contact.force + force)
+        relative = equations.relative_displacement(now, state.force)
+        return cls(equations, now, state, there.nodal_forces(equations.active(state.force.ravel())), relative)
+
+    def side(self, before: Side, formulation: FiniteStrain) -> Side:
+        """Return the side at the end of the part."""
+        problem, move = before.problem, self.equations.move
+        state = self.equations.reached(self.now, self.contact)
+        work, lost = energies(problem, [Substep(before.state, state, move)])
+        found = formulation.readings(problem, state)
+        read = np.array([found[column] for column in problem.model.columns])
+        return Side(problem, state, move.end, read, before.work_mJ + work, before.dissipation_mJ + lost)
+
+
+def _share(change: Float, whole: Float, value: Float) -> Float:
+    """Return the largest change (p,) over the largest derivative, or over the value by a step of the parameter."""
+    largest = np.maximum(np.abs(whole).max(axis=0, initial=0.0), _NEGLIGIBLE * value)
+    return np.asarray(np.abs(change).max(axis=0, initial=0.0) / np.where(largest > 0.0, largest, 1.0))
