@@ -83,10 +83,5 @@ def assert_equal_to_differences(
             for column, slope in slopes[number][k].items():
                 size = 1e-3 if column.startswith("gauge") else 0.1  # of numbers that are zero
                 largest = max(abs(slope), size, *(abs(row[column]) for row in values))
-                assert (rows[1][column] - rows[0][column]) / (2.0 * h) == pytest.approx(
-                    slope, abs=tolerance * largest
-                ), (
-                    name,
-                    number,
-                    column,
-                )
+                difference = (rows[1][column] - rows[0][column]) / (2.0 * h)
+                assert difference == pytest.approx(slope, abs=tolerance * largest), (name, number, column)

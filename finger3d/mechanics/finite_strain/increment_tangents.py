@@ -78,13 +78,12 @@ class FiniteIncrementTangents(IncrementTangents):
     def _equations(self, problem: Problem, start: State[DeformedBody], move: Move) -> IncrementEquations:
         return IncrementEquations(problem, self.formulation.body(problem), start, move, FiniteStrainWorkspace())
 
-    def _of_material(self, x: Float) -> Float:
-        """Return the derivatives (N, p) of the internal forces at unknowns (N,)."""
+    def _of_body(self, x: Float) -> Float:
+        """Return the derivatives (N, p) of the internal forces at unknowns (N,), by material and dimensions."""
         own, changes = self.problem.model, np.zeros((len(x), len(self._variations)))
+        here = (own.design, own.material, own.parts)
         for k, one in enumerate(self._variations):
-            if any(end.model.design != own.design for end in one.ends):
-                raise Finger3dError("at large deformation numbers have no derivatives by dimensions")
-            if any((end.model.material, end.model.parts) != (own.material, own.parts) for end in one.ends):
+            if any((end.model.design, end.model.material, end.model.parts) != here for end in one.ends):
                 low, high = (self.formulation.body(end).internal_forces(x) for end in one.ends)
                 changes[:, k] = one.difference(low, high)
         return changes
@@ -102,7 +101,7 @@ class FiniteIncrementTangents(IncrementTangents):
             return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
 
         internal = np.zeros((len(x), p))
-        own = self._of_material(x)
+        own = self._of_body(x)
         internal[:, : own.shape[1]] = own
         direct = slope(rubbed(part, sides))
         unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))

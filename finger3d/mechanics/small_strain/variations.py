@@ -189,4 +189,7 @@ def _assembled(problem: Problem, end: Problem) -> _Assembled:
     read = sp.vstack(readings, format="csr") if readings else sp.csr_matrix((0, upper.shape[0]))
     points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
     system = replace(end.system, surface=face, points=points)
-    return _Assembled(replace(end, system=system), ((upper + sp.triu(upper, 1).T).tocsr(), contact, read))
+    changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
+    return _Assembled(
+        replace(end, system=system, condensed_body=changed), ((upper + sp.triu(upper, 1).T).tocsr(), contact, read)
+    )
