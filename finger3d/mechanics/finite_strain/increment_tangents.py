@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.tensors import rotated_delassus
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
@@ -64,9 +65,27 @@ class FiniteIncrementTangents(IncrementTangents):
 
     formulation: FiniteStrain
 
+    @cached_property
+    def _body(self) -> FiniteBody:
+        return self.formulation.body(self.problem)
+
+    @cached_property
+    def _bodies(self) -> list[tuple[FiniteBody, FiniteBody] | None]:
+        """Bodies (p,) below and above each parameter that changes material or dimensions; None for others."""
+        own = self.problem.model
+        here = (own.design, own.material, own.parts)
+        changed = [
+            any((end.model.design, end.model.material, end.model.parts) != here for end in one.ends)
+            for one in self._variations
+        ]
+        return [
+            (self.formulation.body(one.low), self.formulation.body(one.high)) if is_changed else None
+            for one, is_changed in zip(self._variations, changed, strict=True)
+        ]
+
     def _linearised(self, before: State[DeformedBody], after: State[DeformedBody], move: Move) -> _Linear:
         problem, contact = self.problem, after.contact
-        equations = self._equations(problem, before, move)
+        equations = IncrementEquations(problem, self._body, before, move, FiniteStrainWorkspace())
         linearisation = equations.linearise(equations.at(after.body.unknowns), contact.force)
         delassus, compliance = linearisation.delassus, problem.system.object_compliance
         if compliance is not None:
@@ -75,34 +94,26 @@ class FiniteIncrementTangents(IncrementTangents):
         active = LinearisedIncrement.of(problem, before.contact, contact, delassus)
         return _Linear((upper + sp.triu(upper, 1).T).tocsr(), linearisation, active)
 
-    def _equations(self, problem: Problem, start: State[DeformedBody], move: Move) -> IncrementEquations:
-        return IncrementEquations(problem, self.formulation.body(problem), start, move, FiniteStrainWorkspace())
-
-    def _of_body(self, x: Float) -> Float:
-        """Return the derivatives (N, p) of the internal forces at unknowns (N,), by material and dimensions."""
-        own, changes = self.problem.model, np.zeros((len(x), len(self._variations)))
-        here = (own.design, own.material, own.parts)
-        for k, one in enumerate(self._variations):
-            if any((end.model.design, end.model.material, end.model.parts) != here for end in one.ends):
-                low, high = (self.formulation.body(end).internal_forces(x) for end in one.ends)
-                changes[:, k] = one.difference(low, high)
-        return changes
-
     def _after(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
         """Return the sides after a part of an increment."""
         problem, contact, x = self.problem, part.after.contact, part.after.body.unknowns
         linear, active, size = part.linear, problem.system.active_dofs, steps[1::2]
         p, n = len(size), problem.mesh.points.size
-        equations = [self._equations(side.problem, side.state, m) for side, m in zip(sides, moves, strict=True)]
+        workspace = FiniteStrainWorkspace()
+        equations = [
+            IncrementEquations(side.problem, self._body, side.state, move, workspace)
+            for side, move in zip(sides, moves, strict=True)
+        ]
 
         def slope(values: Sequence[Float]) -> Float:
             """Return the derivatives (k, p) of values (2 p, ...)."""
             array = np.reshape(values, (2 * p, -1))
             return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
 
-        internal = np.zeros((len(x), p))
-        own = self._of_body(x)
-        internal[:, : own.shape[1]] = own
+        internal = np.zeros((len(x), p))  # of parameters that change the body
+        for k, (one, bodies) in enumerate(zip(self._variations, self._bodies, strict=True)):
+            if bodies is not None:
+                internal[:, k] = one.difference(*(body.internal_forces(x) for body in bodies))
         direct = slope(rubbed(part, sides))
         unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))
         errors = [np.full(p, np.inf)] * 2
