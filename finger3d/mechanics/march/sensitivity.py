@@ -1,7 +1,8 @@
-"""Derivatives of the numbers of a press by its parameters, in small strain.
+"""Derivatives of the numbers of a press by its parameters.
 
 Along an exact path they are those of its events (`finger3d.mechanics.small_strain.path_tangents`), else those of its
-increments (`finger3d.mechanics.small_strain.increment_tangents`).
+increments (`finger3d.mechanics.small_strain.increment_tangents` and
+`finger3d.mechanics.finite_strain.increment_tangents`).
 """
 
 from __future__ import annotations
