@@ -111,6 +111,7 @@ def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> N
     assert honest.low <= 0.5 <= honest.high  # which two increments do not tell any nearer
 
 
+@pytest.mark.slow
 def test_chosen_increments_press_the_curve() -> None:
     """Where the strain hardly depends on them, 20 do, and the error left is told from presses of ten."""
     mus = (0.02, 0.03, 0.04, 0.05)

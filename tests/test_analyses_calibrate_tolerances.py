@@ -71,6 +71,7 @@ def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
     }
 
 
+@pytest.mark.slow
 def test_slopes_between_the_few_mu_that_are_tried() -> None:
     """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
     the effect of nu jumps between two of them, which leaves a quarter.

@@ -108,6 +108,7 @@ def killed_and_resumed(command: list[str], out: Path, total: int, env: dict[str,
     assert lines(out)[: len(before)] == before
 
 
+@pytest.mark.slow
 def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, paper_scene, tmp_path) -> None:
     out = tmp_path / "out"
     env = environment(root, str(tmp_path))
@@ -139,6 +140,7 @@ def dask(
         yield address, process, [running.enter_context(started([*here, *worker], env, where, log)) for log in logs]
 
 
+@pytest.mark.slow
 def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(2, env, tmp_path) as (address, *_):
@@ -200,6 +202,7 @@ def test_a_worker_without_finger3d_is_named(root, paper_scene, tmp_path) -> None
     assert "has no finger3d; install finger3d" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
 def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"

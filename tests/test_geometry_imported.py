@@ -68,6 +68,7 @@ def test_the_face_named_base_is_turned_down(tmp_path: Path, turn: tuple[float, f
     assert body.volume_mm3 == pytest.approx(SMALL.volume_mm3, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
     from build123d import Axis, Box, Pos
 

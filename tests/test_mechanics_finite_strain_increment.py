@@ -86,6 +86,7 @@ def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:
     assert forces[0] == pytest.approx(forces[1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> None:
     """The corners of a block fold under friction; at its end the force falls, and the base carries what is left."""
     design = designs()["block"](half_length_mm=8.76, height_mm=10.0, width_mm=10.36)

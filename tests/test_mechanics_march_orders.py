@@ -59,7 +59,10 @@ def numbers(problem: Problem, count: int) -> np.ndarray:
     return np.array([measured[name] for name in NAMES])
 
 
-@pytest.mark.parametrize("name", PRESSES)
+SLOW = ("at large deformation", "that slides")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PRESSES])
 def test_errors_fall_at_second_order(name: str) -> None:
     # points touch one by one, so that single ratios scatter widely about 4: the median is taken, and the whole fall
     model, finest = PRESSES[name]

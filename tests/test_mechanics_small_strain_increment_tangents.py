@@ -48,7 +48,7 @@ CASES = {
 }
 
 
-SLOW = ("plane", "force", "bar", "ball", "tangential force")
+SLOW = ("plane", "force", "bar", "ball", "tangential force", "turn")
 """Cases that only `make test-all` runs."""
 
 

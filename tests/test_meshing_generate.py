@@ -34,6 +34,7 @@ def test_a_step_finger_is_meshed_on_its_cad_faces(drawn: Path) -> None:
     assert report.volume_mm3 == pytest.approx(SMALL.volume_mm3, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_fillets_are_contact_and_hold_their_nodes(drawn: Path) -> None:
     from build123d import Compound, Vertex
 

@@ -7,6 +7,7 @@ import re
 import runpy
 import shlex
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,11 @@ COARSE = {
 def commands(root: Path) -> list[str]:
     """Every command that the README and the pages of docs/ show, once; those of docs/molds.md are tested apart."""
     return commands_of([root / "README.md", *sorted(set(root.glob("docs/*.md")) - {root / "docs" / "molds.md"})])
+
+
+def of_readme(root: Path) -> list[str]:
+    """Every command that the README shows, once."""
+    return commands_of([root / "README.md"])
 
 
 def commands_of(pages: list[Path]) -> list[str]:
@@ -60,12 +66,14 @@ def folder(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_every_command_is_run(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
-    shown = commands(root)
-    assert {c.split()[1] for c in shown} >= set(
+@pytest.mark.parametrize("shown", [of_readme, pytest.param(commands, marks=pytest.mark.slow)])
+def test_every_command_is_run(
+    shown: Callable[[Path], list[str]], root: Path, folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert {c.split()[1] for c in commands(root)} >= set(
         "new plan cost press compare calibrate estimate identify optimise sweep export show".split()
     )
-    for command in shown:
+    for command in shown(root):
         words = shlex.split(command.split(" > ")[0])[1:]  # what a shell redirects is printed
         for key in COARSE["gear" if "gear" in command else words[0]].split() if words[0] in COARSE else ():
             words += ["--set", key]
