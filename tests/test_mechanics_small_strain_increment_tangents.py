@@ -77,11 +77,21 @@ PATHS = ("mu", "goal 0", "goal 1", "slide 1")
     ],
     ids=["solid with foils", "section with foils", "elastic bar"],
 )
-def test_friction_and_path_have_derivatives_beside_foils_and_elastic_objects(model: Model) -> None:
+def test_derivatives_beside_foils_and_elastic_objects(model: Model) -> None:
     problem, ways = build(model), parameters(model)
-    assert_equal_to_differences(problem, {name: ways[name] for name in PATHS if name in ways})
+    names, refused = [*PATHS], "nu"
+    if model.inclusions is None:
+        thing = model.object_compliance
+        ways["stiffer"] = lambda h: replace(model, object_compliance=replace(thing, E_MPa=thing.E_MPa + h))
+        names += ["E", "x", "stiffer"]
+    else:
+        foils = model.inclusions
+        ways["stiffer"] = lambda h: replace(model, inclusions=replace(foils, E_MPa=foils.E_MPa + h))
+        ways["thicker"] = lambda h: replace(model, inclusions=replace(foils, thickness_mm=foils.thickness_mm + h))
+        names, refused = [*names, "stiffer", "thicker"], "E"
+    assert_equal_to_differences(problem, {name: ways[name] for name in names if name in ways})
     with pytest.raises(Finger3dError, match="it changes"):
-        variation(problem, ways["E"](-STEP), ways["E"](STEP), STEP)
+        variation(problem, ways[refused](-STEP), ways[refused](STEP), STEP)
 
 
 def test_a_hold_changes_no_derivative() -> None:

@@ -27,6 +27,7 @@ _KEYS = re.compile(
     r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
+    r"|effects\.(elastic_object\.E_MPa|embedded_gauge\.(E_MPa|thickness_mm))"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
 
@@ -201,10 +202,12 @@ def has_derivative(key: str, value: float, problem: Problem) -> bool:
         return False  # beside the path there are increments
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
         return False
-    in_body = key.startswith(("finger.", "material.", "parts."))
-    if problem.model.object_compliance is not None and (in_body or key.startswith("object.")):
+    model, in_body = problem.model, key.startswith(("finger.", "material.", "parts."))
+    if model.object_compliance is not None and key != "material.E_MPa" and (in_body or key.startswith("object.")):
         return False
-    if problem.model.inclusions is not None and (in_body or key.startswith(("gauge.", "marker."))):
+    if model.inclusions is not None and (in_body or key.startswith(("gauge.", "marker."))):
+        return False
+    if model.finite_strain and key.startswith("effects.embedded_gauge"):
         return False
     mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())
     return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)

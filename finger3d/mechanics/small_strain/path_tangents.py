@@ -40,8 +40,8 @@ from finger3d.objects import Move, ObjectPose, vertical_frame
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
 
-_JUMP = 1e-8
-"""Share of the path below which forces that change by more than this, over the largest, jump."""
+_JUMP, _JUMPED = 1e-8, 1e-6
+"""Share of the path in which forces jump, and by how much they do so at least, over the largest at its end."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ class PathTangents:
         if way <= _SAME_PLACE:
             return self._at_touch(event, last) if event.amplitude > before.amplitude else last
         force, moved = event.state.force - before.state.force, _relative(event.state) - _relative(before.state)
-        if way <= _JUMP and np.abs(force).max() > _JUMP * np.abs(event.state.force).max():
+        if way <= _JUMP and np.abs(force).max() > _JUMPED * np.abs(self.path.events[-1].state.force).max():
             raise Finger3dError("the forces jump on the path of this press, and have no derivatives there")
         found = self._solved(piece, event)
         if piece + 1 == len(self.path.events):

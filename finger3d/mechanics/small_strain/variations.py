@@ -17,9 +17,10 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.solvers.condense import stiffened
 from finger3d.fem.surface.traces import local_rows, restrict
-from finger3d.mechanics.discretise.build import mesh_part, widened
-from finger3d.mechanics.discretise.problem import Problem, free_surface
+from finger3d.mechanics.discretise.build import contact_rows, mesh_part, widened
+from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
@@ -29,9 +30,8 @@ from finger3d.objects import ObjectPose, vertical_frame
 _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
 
-_ELASTIC = ("design", "material", "parts")
-_IN_BODY = (*_ELASTIC, "gauges", "markers", "taxels")
-_CHANGES = (*_IN_BODY, "friction", "legs", "object")
+_IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
+_CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions")
 """What a parameter may change in a model, in the body and elsewhere."""
 
 
@@ -85,6 +85,18 @@ class BodyChange:
 
 
 @dataclass(frozen=True)
+class ComplianceChange:
+    """Derivatives by a parameter of the compliance of contact points (c d, c d) and of readings (g, c d)."""
+
+    compliance: Float
+    readings: Float
+
+    def of(self, problem: Problem, unknowns: Float, force: Float) -> tuple[Float, Float]:
+        """Return the derivatives of contact displacements (c d, k) and readings (g, k), as of a `BodyChange`."""
+        return self.compliance @ force, self.readings @ force
+
+
+@dataclass(frozen=True)
 class Variation:
     """A parameter of a press, by the problem at its value less and plus a small step, with the same contact points.
 
@@ -98,7 +110,7 @@ class Variation:
     low: Problem
     high: Problem
     step: float
-    body: BodyChange | None
+    body: BodyChange | ComplianceChange | None
 
     @property
     def ends(self) -> tuple[Problem, Problem]:
@@ -135,8 +147,16 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         for model, touch in zip(models, touches, strict=True)
     ]
     changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
-    if own.object_compliance is not None and changed & {*_ELASTIC, "object"}:
-        raise Finger3dError("it changes the share of an elastic object in the compliance")
+    if own.object_compliance is not None:
+        ends = [_beside_object(problem, end, changed) for end in ends]
+    if "inclusions" in changed:
+        return Variation(ends[0], ends[1], step, _of_foils(problem, ends[0].model, ends[1].model, step))
+    if "object_compliance" in changed:
+        size = problem.surface.points.size
+        softer, stiffer = (np.asarray(end.system.object_compliance) for end in ends)
+        delassus = (stiffer - softer) / (2.0 * step)
+        none = np.zeros((len(problem.system.reading_rows), size))
+        return Variation(ends[0], ends[1], step, ComplianceChange(delassus.reshape(size, size), none))
     if not changed & {*_IN_BODY}:
         return Variation(ends[0], ends[1], step, None)
     if own.inclusions is not None:
@@ -146,6 +166,43 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         *((high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True))
     )
     return Variation(below.problem, above.problem, step, change)
+
+
+def _beside_object(problem: Problem, end: Problem, changed: set[str]) -> Problem:
+    """Return a problem with the share of an elastic object by the moduli of its model, which alone may change it."""
+    own, model, system = problem.model, end.model, problem.system
+    assert own.object_compliance is not None
+    assert model.object_compliance is not None
+    assert system.object_compliance is not None
+    assert system.object_share is not None
+    materials = [m.isotropic("derivatives") for m in (own.material, model.material)] if "material" in changed else []
+    finger = materials[0].E_MPa / materials[1].E_MPa if materials else 1.0
+    softer = own.object_compliance.E_MPa / model.object_compliance.E_MPa
+    same = replace(model.object_compliance, E_MPa=own.object_compliance.E_MPa) == own.object_compliance
+    if changed & {"design", "parts", "object"} or not same or len({m.nu for m in materials}) > 1:
+        raise Finger3dError("it changes the share of an elastic object in the compliance")
+    thing, image = softer * system.object_compliance, problem.symmetry.image_of
+    share = object_share(problem.surface, finger * (system.delassus - system.object_compliance), thing)
+    compliance = finger * system.points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
+    points = replace(system.points, compliance=compliance)
+    return replace(end, system=replace(end.system, object_compliance=thing, object_share=share, points=points))
+
+
+def _of_foils(problem: Problem, low: Model, high: Model, step: float) -> ComplianceChange:
+    """Return what the stiffness of all foils along their length changes."""
+    own = problem.model.inclusions
+    assert own is not None
+    assert low.inclusions is not None
+    assert high.inclusions is not None
+    stiff = [foils.E_MPa * foils.thickness_mm for foils in (own, low.inclusions, high.inclusions)]
+    same = all(replace(own, E_MPa=m.E_MPa, thickness_mm=m.thickness_mm) == m for m in (low.inclusions, high.inclusions))
+    if not same or problem.model.finite_strain:
+        raise Finger3dError("it changes the foils in their plane, or at large deformation")
+    springs, system = problem.inclusions.bar_stiffness, problem.system
+    loads = stiffened(problem.body.condensed.compliance, springs)[:, -len(springs) :]
+    change = -(stiff[2] - stiff[1]) / (2.0 * step * stiff[0]) * (loads * springs) @ loads.T
+    delassus, readings = contact_rows(change, system.active_dofs, problem.surface, len(system.reading_rows))
+    return ComplianceChange(delassus.reshape(problem.surface.points.size, -1), readings)
 
 
 class _Assembled(NamedTuple):
@@ -188,6 +245,8 @@ def _assembled(problem: Problem, end: Problem) -> _Assembled:
     contact, *readings = (widened(part, upper.shape[0]) for part in rows)
     read = sp.vstack(readings, format="csr") if readings else sp.csr_matrix((0, upper.shape[0]))
     points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
+    if (share := end.system.object_share) is not None:
+        points = replace(points, compliance=points.compliance / (1.0 - share[problem.symmetry.image_of]))
     system = replace(end.system, surface=face, points=points)
     changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
     return _Assembled(
