@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import Branch, Coulomb, TwoCoefficients
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
@@ -92,6 +92,18 @@ def test_derivatives_beside_foils_and_elastic_objects(model: Model) -> None:
     assert_equal_to_differences(problem, {name: ways[name] for name in names if name in ways})
     with pytest.raises(Finger3dError, match="it changes"):
         variation(problem, ways[refused](-STEP), ways[refused](STEP), STEP)
+
+
+@pytest.mark.parametrize("branch", ["keep", "paper"])
+def test_both_coefficients_of_friction_have_derivatives(branch: Branch) -> None:
+    law = TwoCoefficients(0.3, 0.7, branch)
+    legs = (Leg(0.3, steps=4), Leg(0.3, slide_x_mm=0.1, steps=2))
+    model = small_section(symmetry=(), legs=legs, friction=law)
+    ways = {
+        "mu": lambda h: replace(model, friction=replace(law, mu=law.mu + h)),
+        "ratio": lambda h: replace(model, friction=replace(law, ratio=law.ratio + h)),
+    }
+    assert_equal_to_differences(build(model), ways)
 
 
 def test_a_hold_changes_no_derivative() -> None:

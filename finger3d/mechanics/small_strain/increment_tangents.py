@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Array, Float
-from finger3d.contact.friction import SLIP
+from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -236,7 +236,7 @@ class IncrementTangents:
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
-    """Return the friction (c, d) N of slipping points for the coefficients of friction of sides at the start."""
+    """Return the friction (c, d) N of slipping points for the coefficients of friction of sides."""
     after, before = part.after.contact, part.before.contact
     slid, along = after.accumulated_slip - before.accumulated_slip, after.force[:, 1:]
     along = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, -slid)
@@ -244,7 +244,7 @@ def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
     slips = (length > 0.0) & (after.status == SLIP)
     share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
     friction = np.column_stack([np.zeros(len(along)), along * share[:, None]])
-    return [friction * _coefficients(side)[:, None] for side in sides]
+    return [friction * _coefficients(side, after.status)[:, None] for side in sides]
 
 
 def _forces(side: Side) -> Float:
@@ -260,7 +260,7 @@ def _moved(pose: ObjectPose, numbers: Sequence[int] | Array, change: Sequence[fl
     return ObjectPose(*coordinates.tolist())
 
 
-def _coefficients(side: Side) -> Float:
-    """Return the coefficients of friction (c,) of the next increment."""
-    contact = side.state.contact
-    return side.problem.model.friction.coefficients(contact.status, pressure(contact.force, side.problem.surface.area))
+def _coefficients(side: Side, status: Status) -> Float:
+    """Return the coefficients of friction (c,) of points with a status (c,) at the end of the next increment."""
+    friction, pressed = side.problem.model.friction, pressure(side.state.contact.force, side.problem.surface.area)
+    return friction.updated(friction.coefficients(status, pressed), status, pressed)
