@@ -49,8 +49,8 @@ class SurfaceCheck:
         its deformed surface is known
     place : (d,) mm, that place
     face : number in `FREE_FACES` of its face
-    at_crease : whether its facet, or one beside it, ends at a sharp edge of the finger; a surface that folds over at the
-        edge lifts the next facet
+    at_crease : whether its facet, or one beside it, ends at a sharp edge of the finger; a surface that folds over there
+        lifts the next facet
     depth_mm : largest depth of the press, to which the penetration is compared
     """
 
