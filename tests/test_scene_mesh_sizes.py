@@ -58,7 +58,7 @@ def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> No
     ("height", "radius", "size", "base"),
     [
         # a ball of 6 mm that is 1.6 mm deep overlaps 8.16 mm of the pad, at 1.925 mm 8.8 mm
-        (4.0, 6.0, 8.16 / 600**0.5, 1.25 * 8.16 / 6.25),
+        (4.0, 6.0, 8.16 / 600**0.5, 1.2 * 8.16 / 6.25),
         (1.5, 6.0, 0.15, 0.6),  # a tenth and 0.4 of the height at most
         (40.0, 6.0, 8.8 / 600**0.5, 6.4),  # no layer
     ],

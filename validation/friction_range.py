@@ -6,8 +6,11 @@ for the Fig. 9 section of hard_cases.py (4 mm, nu = 0.45, E = 1 MPa, plane strai
 which it may halve; what counts is the share of the press that is done when it ends.  Its penalty contact needs a stick
 slope, the shear stress over the displacement of a point that sticks.  The deck's is 8 MPa/mm, with which the shear
 stress of 0.11 MPa at mu = 1 moves a sticking point by 0.014 mm; it is raised a hundred times, to 800 MPa/mm, to come
-nearer to points that do not move.  The creep is that of creep_of_a_hold.py, from its committed table.  Where ccx is not
-installed the committed results are judged.
+nearer to points that do not move.  FElupe 11.3: the same mesh and path, with its rigid plane of penalties and its
+cutbacks, which halve an increment up to ten times.  Its defaults take both penalties from the mean stiffness of the
+nodes, with which the finger enters the plane by 1.8 % of the depth; the tangential one is raised a hundred times, too.
+The creep is that of creep_of_a_hold.py, from its committed table.  Where ccx or FElupe is not installed its committed
+results are judged.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from __future__ import annotations
 import csv
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,8 +30,9 @@ from finger3d.analyses.calculix.deck import printed_forces, program, solve
 from finger3d.analyses.calculix.press import press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import MissingError
-from finger3d.mechanics.model import Leg
+from finger3d.mechanics.model import Leg, Model
 
+from ._felupe import felupe_share, is_felupe_installed
 from ._paper import columns
 from ._rows import Result, Row
 from .hard_cases import DEPTH, MU, finger
@@ -36,7 +40,7 @@ from .hard_cases import DEPTH, MU, finger
 STIFFER = 100.0
 LIMIT_S = 900.0
 RESULTS = Path(__file__).resolve().parent / "results"
-COLUMNS = "mu increments settled paper_settled calculix_share calculix_stiff_share"
+COLUMNS = "mu increments settled paper_settled calculix_share calculix_stiff_share felupe_share felupe_stiff_share"
 SHOWN = {  # pads, impratio, noslip_iterations of creep_of_a_hold
     "MuJoCo,\ndefault": ("box", 1.0, 0.0),
     "MuJoCo,\nimpratio 10": ("box", 10.0, 0.0),
@@ -54,10 +58,14 @@ def committed(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def share_done(mu: float, stiffer: float) -> float:
+def press(mu: float) -> Model:
+    """The press of the peers."""
+    return replace(finger(2, 0.45, 4.0).model, friction=Coulomb(mu), legs=(Leg(DEPTH, steps=10),))
+
+
+def calculix_share(mu: float, stiffer: float) -> float:
     """Share of the press that CalculiX has done when it ends."""
-    model = replace(finger(2, 0.45, 4.0).model, friction=Coulomb(mu), legs=(Leg(DEPTH, steps=10),))
-    deck = replace(press_deck(model).deck, fields=False)
+    deck = replace(press_deck(press(mu)).deck, fields=False)
     contact = replace(deck.contact, stick=stiffer * deck.contact.stick)
     with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
         file = Path(folder) / "press.inp"
@@ -70,10 +78,18 @@ def share_done(mu: float, stiffer: float) -> float:
     return float(times[-1]) if len(times) else 0.0
 
 
+def _felupe_share(mu: float, stiffer: float) -> float:
+    model = press(mu)
+    return felupe_share(model, press_deck(model).deck.mesh, stiffer)
+
+
 def run(quick: bool) -> Result:
-    """Quick: CalculiX at one mu only, as the deck is."""
-    theirs = _calculix(quick)
-    lines = [(*_counted(mu), *theirs.get(mu, (np.nan, np.nan))) for mu in MU]
+    """Quick: the peers at one mu only, with their own stick slopes."""
+    theirs = [
+        _peer(quick, program() is not None, calculix_share, "calculix", "ccx (apt install calculix-ccx)"),
+        _peer(quick, is_felupe_installed(), _felupe_share, "felupe", "FElupe (pip install felupe)"),
+    ]
+    lines = [(*_counted(mu), *(x for shares in theirs for x in shares.get(mu, (np.nan, np.nan)))) for mu in MU]
     table = columns(COLUMNS, lines)
     creeps = _creeps()
     return Result(tuple(_rows(table, creeps)), table, lambda figure: _draw(figure, table, creeps))
@@ -85,17 +101,17 @@ def _counted(mu: float) -> tuple[float, int, int, int]:
     return mu, increments, settled, paper
 
 
-def _calculix(quick: bool) -> dict[float, tuple[float, float]]:
-    """Shares by mu, with the deck's stick slope and the stiffer one."""
-    if quick and program() is not None:
-        return {0.25: (share_done(0.25, 1.0), np.nan)}
-    if program() is not None:
-        return {mu: (share_done(mu, 1.0), share_done(mu, STIFFER)) for mu in MU}
+def _peer(
+    quick: bool, installed: bool, share: Callable[[float, float], float], name: str, program: str
+) -> dict[float, tuple[float, float]]:
+    """Shares of the press that a peer does, by mu, with its own stick slope and the stiffer one."""
+    if installed and quick:
+        return {0.25: (share(0.25, 1.0), np.nan)}
+    if installed:
+        return {mu: (share(mu, 1.0), share(mu, STIFFER)) for mu in MU}
     lines = committed("friction_range")
-    print(
-        "friction_range: ccx is not installed (apt install calculix-ccx); the committed results stay", file=sys.stderr
-    )
-    return {float(x["mu"]): (float(x["calculix_share"]), float(x["calculix_stiff_share"])) for x in lines}
+    print(f"friction_range: {program} is not installed; its committed results stay", file=sys.stderr)
+    return {float(x["mu"]): (float(x[f"{name}_share"]), float(x[f"{name}_stiff_share"])) for x in lines}
 
 
 def _creeps() -> dict[str, float]:
@@ -114,20 +130,23 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
     total, settled, paper = (sum(table[k]) for k in ("increments", "settled", "paper_settled"))
     here = f"{total} increments at mu = 0 to 1e6"
 
-    def least(what: str, tried: Sequence[float]) -> Row:
-        return Row(f"least share of the press that CalculiX does, {what}, {np.isfinite(tried).sum()} values of mu",
+    def least(peer: str, what: str, tried: Sequence[float]) -> Row:
+        return Row(f"least share of the press that {peer} does, {what}, {np.isfinite(tried).sum()} values of mu",
                    "finger3d: 1", 1.0, float(np.nanmin(tried)), 0.0, "a bound", "sensitivity", "at most")  # fmt: skip
 
     rows = [
         Row(f"increments that settle, finger3d, of {here}", "hard_cases", total, settled, 0.0, "all"),
         Row(f"the same by the paper's rule, of {here}", "hard_cases, finger3d", settled, paper, 0.0, "a bound",
             "sensitivity", "at most"),
-        least("stick slope of its deck", table["calculix_share"]),
+        least("CalculiX", "stick slope of its deck", table["calculix_share"]),
+        least("FElupe", "its own stick slope", table["felupe_share"]),
         Row("creep of a hold in a minute, finger3d (mm)", "creep_of_a_hold", 1e-12, creeps["finger3d"], 0.0,
             "a bound above round-off", measure="at most"),
     ]  # fmt: skip
-    if np.isfinite(table["calculix_stiff_share"]).any():
-        rows.append(least("stick slope a hundred times that", table["calculix_stiff_share"]))
+    for peer in ("CalculiX", "FElupe"):
+        tried = table[f"{peer.lower()}_stiff_share"]
+        if np.isfinite(tried).any():
+            rows.append(least(peer, "stick slope a hundred times that", tried))
     return rows
 
 
@@ -139,12 +158,14 @@ def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) ->
         (t["settled"] / t["increments"], "o-", 9, "finger3d"),
         (t["calculix_share"], "v:", 4, "CalculiX, stick slope of its deck, 8 MPa/mm"),
         (t["calculix_stiff_share"], "^:", 6, "CalculiX, stick slope 800 MPa/mm"),
+        (t["felupe_share"], "<:", 4, "FElupe, its own stick slope"),
+        (t["felupe_stiff_share"], ">:", 6, "FElupe, a hundred times that"),
         (t["paper_settled"] / t["increments"], "s--", 6, "rule of the 2004 paper"),
     ):
         left.plot(names, 100.0 * share, style, ms=size, label=label)
     left.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
     left.legend(fontsize=8, loc="upper left")
-    left.set_title("increments that settle; CalculiX: share of the press", fontsize=10)
+    left.set_title("increments that settle; peers: share of the press", fontsize=10)
     values = np.maximum(list(creeps.values()), 1e-16)
     bars = right.bar(list(creeps), values, color=["C0"] + ["C4"] * (len(creeps) - 1))
     right.bar_label(bars, [_told(v) for v in creeps.values()], fontsize=8)

@@ -38,10 +38,11 @@ _AT_STICK = 3.0
 """Default edge length at the contact of a solid over that at the border of stick. On Fig. 9 it takes the error of the
 area of stick, a zone one point wide, from unknown to 2 %, in 1.5 times the time of a press."""
 
-_IN_LAYERS, _LARGEST_SCALE = 1.25, 2.5
+_IN_LAYERS, _LARGEST_SCALE = 1.2, 2.5
 """Length that edges follow in layers over the shorter side of the overlap, and at most over the height. On a pad of gel
 2.5 times as wide in contact as it is high, edges of a tenth and 0.4 of the height leave 1 % of depth and contact area;
-those of a finger as high would take ten times the unknowns."""
+those of a finger as high would take ten times the unknowns. Under seven balls whose overlap is about as wide as the
+finger is high, penetration stays below 1 % of the depth with 1.2, and reaches 1.3 % with 1.25."""
 
 _FINEST = 0.2
 """Least edge length over the default: finer is left to those who ask for it."""

@@ -49,7 +49,8 @@ class SurfaceCheck:
         its deformed surface is known
     place : (d,) mm, that place
     face : number in `FREE_FACES` of its face
-    at_crease : whether a sharp edge of the finger bounds its facet
+    at_crease : whether its facet, or one beside it, ends at a sharp edge of the finger; a surface that folds over there
+        lifts the next facet
     depth_mm : largest depth of the press, to which the penetration is compared
     """
 
@@ -65,7 +66,8 @@ def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[Surface
     """Check the free surface after each step; in small strain by one back-substitution for all of them."""
     tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
     free, others = _surfaces(problem, steps)
-    hats, creased = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
+    hats, at_edge = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
+    creased = hats @ (hats.T @ at_edge.astype(float)) > 0.0
     out, largest = [], reached_depth(problem.model, steps)
     for u, step in zip(_displacements(problem, steps), steps, strict=True):
         within = _stays_out(problem, u, step.target, others)
