@@ -34,7 +34,6 @@ def force(compared, model: str, width: float) -> float:
     return found.numbers[FORCE]
 
 
-@pytest.mark.slow
 def test_a_solid_passes_from_plane_stress_to_plane_strain_as_it_widens(compared) -> None:
     forces = [force(compared, "solid", w) for w in (5.0, 20.0, 200.0, 1200.0)]
     assert forces == sorted(forces)
