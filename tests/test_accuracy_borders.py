@@ -87,7 +87,7 @@ FIG9 = {
 @pytest.mark.parametrize(
     ("changes", "refinement"),
     [
-        ({}, 3.0),
+        ({}, 3.5),
         ({"mesh": {"stick_refinement": 1.0}}, 1.0),
         ({"mesh": {"size_mm": 2.0}}, 1.0),
         ({"mesh": {"tolerance": 0.02}}, 1.0),
@@ -103,5 +103,5 @@ def test_the_default_refines_solids_without_sizes(changes: dict[str, object], re
 
 def test_the_default_can_be_run_again_from_what_is_written() -> None:
     scene = scene_of(FIG9)
-    assert scene.as_dict()["mesh"]["stick_refinement"] == 3.0
+    assert scene.as_dict()["mesh"]["stick_refinement"] == 3.5
     assert scene_of(scene.as_dict()).mesh == scene.mesh

@@ -35,3 +35,9 @@ def test_a_solid_beyond_the_memory_says_so() -> None:
     text = price_of_a_third(huge, 10, 10.0)
     assert "GB" in text
     assert "mesh.size_mm" in text
+
+
+def test_shorter_edges_at_the_border_of_stick_stay_with_the_sizes() -> None:
+    # a scene with sizes has none by default, and its areas would get wider bars
+    problem = build(scene(mesh={"size_mm": 1.0, "stick_refinement": 3.0}).model())
+    assert price_of_a_third(problem, 10, 1.0).endswith("mesh.stick_refinement = 3)")

@@ -7,6 +7,7 @@ its own steps here, one by one, on another mesh or with another form.
 from __future__ import annotations
 
 import math
+import resource
 import time
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from finger3d.contact.friction import OPEN, STICK, Coulomb
+from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.mesh.simplex import Mesh
@@ -72,6 +73,12 @@ class Case:
     nu: float | None = None
 
 
+def processor_s() -> float:
+    """Processor time of this process and of those it waited for, s: other work on the machine changes it least."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 def model_of(case: Case) -> Model:
     """The model of a case with ten increments, and one gauge at a point."""
     mesher: Any = case.mesher
@@ -122,6 +129,7 @@ class Parts:
     first_contact_mm: float
     axes: tuple[str, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    processor_seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def thickness(self) -> float:
@@ -133,8 +141,9 @@ def assembled(model: Model, element: str) -> Parts:
     """Mesh and assemble a model with elements of a kind."""
     way, axes = model.first_contact, symmetry(model)
     make = mesh_solid if model.domain == "solid" else mesh_section
+    begin = processor_s()
     mesh, report = make(model.design, model.mesh, way.contact_box, axes)
-    start = time.perf_counter()
+    start, meshed = time.perf_counter(), processor_s()
     if element == "linear":
         mesh = straight(mesh)
     constants = model.material.elasticity(model.domain == "plane-stress")
@@ -146,9 +155,11 @@ def assembled(model: Model, element: str) -> Parts:
     rows = local_rows(face, vertical_frame(mesh.dim))[kept]
     gauges = sp.vstack([g.row(mesh, axes) for g in model.gauges], format="csr")
     seconds = {**report.seconds, "assembly": time.perf_counter() - start}
+    processor = {"mesh": meshed - begin, "assembly": processor_s() - meshed}
     held = held_dofs(mesh, axes, model.held_ends)
     return Parts(
-        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.first_contact_mm, axes, seconds
+        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.first_contact_mm, axes, seconds,
+        processor,
     )  # fmt: skip
 
 
@@ -191,9 +202,8 @@ def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -
 
 
 def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:
-    """The quantities as a press reports them, and the edges of contact and stick between the points."""
+    """The quantities as a press reports them."""
     values = measure(points, frame)
-    contact, stick = edges(points, frame)
     return {
         "force": values["normal_force_N"],
         "contact_length": values["contact_half_length_mm"],
@@ -202,28 +212,4 @@ def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:
         "gauge_strain": values["gauges"]["g"],
         "outward_x": values["outward_friction_x_N"],
         "outward_z": values["outward_friction_z_N"],
-        "contact_edge": contact,
-        "stick_edge": stick,
     }
-
-
-def edges(points: ContactPoints, frame: StepResult, fit: int = 6) -> tuple[float, float]:
-    """Half-lengths (mm) at z = 0 between the points: of the contact where p^2 goes through zero, and of the stick zone.
-
-    p^2 is linear in x at its edge (Johnson 1985, ch. 4): a line through `fit` points, the outermost left out, finds it
-    to a part of the distance of the points.  The stick zone ends half way between its last point and the next.
-    """
-    x, z = points.points[:, 0], points.points[:, 2]
-    line = np.flatnonzero((np.abs(z) <= 1e-9) & (x >= 0.0))
-    line = line[np.argsort(x[line])]
-    state = frame.state
-    p = state.force[line, 0] / points.area[line]
-    on = np.flatnonzero(state.status[line] != OPEN)[-fit - 1 : -1]
-    contact = stick = float("nan")
-    if len(on) >= 3:
-        slope, at_zero = np.polyfit(x[line][on], p[on] ** 2, 1)
-        contact = float(-at_zero / slope)
-    held = np.flatnonzero(state.status[line] == STICK)
-    if len(held):
-        stick = float(x[line][held[-1] : held[-1] + 2].mean())
-    return contact, stick

@@ -61,13 +61,17 @@ def _elements(axes: Any, runs: Sequence[Line]) -> None:
         _plot(axes, _series(runs, SOLID, element), "seconds", "error_force", element, mark, color=colour)
     wild = _series(runs, SOLID, mesher="ftetwild")
     _plot(axes, wild, "seconds", "error_force", "mixed, fTetWild, mesh made anew", "D:", color="C4")
-    axes.set(title="Which element?  Solid, normal force", xlabel="s, mesh to last increment", ylabel="error, %")
+    axes.set(
+        title="Which element?  Solid, normal force",
+        xlabel="processor time, mesh to last increment (s)",
+        ylabel="error, %",
+    )
 
 
 def _numbers(axes: Any, runs: Sequence[Line]) -> None:
     for (quantity, name), mark in zip(NAMES.items(), ("o-", "s-", "^-", "D-", "v-"), strict=True):
         _plot(axes, _series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
-    axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="s, mesh to last increment")
+    axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="processor time, mesh to last increment (s)")
     axes.set(ylabel="error, %")
 
 
@@ -102,7 +106,9 @@ def _condensation(axes: Any, runs: Sequence[Line]) -> None:
         for name, solver, way, mark in ways:
             some = _series(runs, body, solver=solver, way=way)
             _plot(axes, some, "dofs", "seconds", f"{body}, {name}", mark, color=COLOURS[body])
-    axes.set(title="What does one condensation save?", xlabel="unknowns", ylabel="s, mesh to last increment")
+    axes.set(
+        title="What does one condensation save?", xlabel="unknowns", ylabel="processor time, mesh to last increment (s)"
+    )
 
 
 def _large(axes: Any, runs: Sequence[Line]) -> None:
@@ -110,5 +116,7 @@ def _large(axes: Any, runs: Sequence[Line]) -> None:
         _plot(axes, _series(runs, body), "seconds", "error_force", f"{body}, small strain", "o-", color=COLOURS[body])
         large = _series(runs, LARGE[body])
         _plot(axes, large, "seconds", "error_force", f"{body}, large deformation", "v--", color=COLOURS[body])
-    axes.set(title="What does large deformation cost?  Normal force", xlabel="s, mesh to last increment")
+    axes.set(
+        title="What does large deformation cost?  Normal force", xlabel="processor time, mesh to last increment (s)"
+    )
     axes.set(ylabel="error, %")

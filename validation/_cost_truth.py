@@ -16,7 +16,9 @@ import numpy as np
 from ._corner import extrapolated, observed
 from ._cost import QUANTITIES, Case
 
-LENGTHS = {"contact_length": "contact_edge", "stick_length": "stick_edge"}
+LENGTHS = {"contact_length": 0.04, "stick_length": 0.2}
+"""Error of the place of an end over the distance of the points, as finger3d.accuracy.point_resolution has it."""
+
 Runs = Mapping[Case, dict[str, Any]]
 
 
@@ -41,19 +43,12 @@ def value(run: Mapping[str, Any], quantity: str, count: int = 10) -> float:
 def truth(cases: Sequence[Case], runs: Runs, quantity: str) -> Truth:
     """From a series of meshes, coarse to fine.
 
-    Force, friction sum and strain are extrapolated at the rate that the last three show, if that is one (between .6 and
-    4); else the finest stands.  A length is the edge between the points on the finest mesh: of the contact from
-    p^2 = 0, of the stick zone half way between points.
+    Extrapolated at the rate that the last three show, if that is one (between .6 and 4); else the finest stands.
     """
-    sizes = [c.size for c in cases]
-    if quantity in LENGTHS:
-        found = [value(runs[c], LENGTHS[quantity]) for c in cases]
-        off = abs(found[-1] - found[-2]) + 0.5 * sizes[-1]
-        return Truth(found[-1], off / abs(found[-1]), float("nan"), abs(found[-2] / found[-1] - 1.0))
-    found = [value(runs[c], quantity) for c in cases]
+    sizes, found = [c.size for c in cases], [value(runs[c], quantity) for c in cases]
     with_finest, rate = _limit(sizes, found)
     without, _ = _limit(sizes[:-1], found[:-1])
-    off = max(abs(with_finest - without), 0.25 * abs(found[-1] - with_finest))
+    off = max(abs(with_finest - without), 0.25 * abs(found[-1] - with_finest), LENGTHS.get(quantity, 0.0) * sizes[-1])
     return Truth(with_finest, off / abs(with_finest), rate, abs(found[-1] / without - 1.0))
 
 
@@ -90,15 +85,24 @@ def mesh_errors(cases: Sequence[Case], runs: Runs, truths: Mapping[str, Truth]) 
 
 
 def seconds(run: Mapping[str, Any], count: int = 10, pace: float = 1.0) -> float:
-    """Meshing to the last increment; `pace` times the ten increments, where `count` was not run."""
-    parts = run["seconds"]
+    """Processor time to the last increment; `pace` times the ten increments, where `count` was not run."""
+    parts = run["processor_seconds"]
     before = sum(v for k, v in parts.items() if not k.startswith("contact"))
     return float(before + (parts[f"contact {count}"] if pace == 1.0 else pace * parts["contact 10"]))
 
 
+def pace_of(ladder: Mapping[str, Any], count: int) -> float:
+    """Time of so many increments over that of ten, on one mesh."""
+    parts = ladder["processor_seconds"]
+    return float(parts[f"contact {count}"] / parts["contact 10"])
+
+
 @dataclass(frozen=True)
 class Advice:
-    """The cheapest of the runs, and increments, that meets a target for a quantity; no case if none does."""
+    """The cheapest of the runs, and increments, that meets a target for a quantity; no case if none does.
+
+    If it is extrapolated, the case was not run, or its error is not known that well.
+    """
 
     quantity: str
     target: float
@@ -109,6 +113,7 @@ class Advice:
     peak_mb: float
     dofs: int
     uncertainty: float
+    extrapolated: bool = False
 
 
 def advise(
@@ -132,12 +137,12 @@ def advise(
             for k, count in enumerate(counts):
                 if mesh_error + max(by_steps[n] for n in counts[k:]) > target:
                     continue
-                pace = ladder["seconds"][f"contact {count}"] / ladder["seconds"]["contact 10"]
-                cost = seconds(runs[case], pace=pace)
+                cost = seconds(runs[case], pace=pace_of(ladder, count))
                 if best.case is None or cost < best.seconds:
+                    meshing = runs[case]["processor_seconds"]["mesh"]
                     best = Advice(
-                        quantity, target, case, count, cost, runs[case]["seconds"]["mesh"], runs[case]["peak_MB"],
-                        runs[case]["dofs"], truth.uncertainty,
+                        quantity, target, case, count, cost, meshing, runs[case]["peak_MB"], runs[case]["dofs"],
+                        truth.uncertainty,
                     )  # fmt: skip
                 break
     return best

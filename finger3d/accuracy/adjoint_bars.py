@@ -57,7 +57,7 @@ _SHARES = {
     Kind.FORCE: _Shares(change=2.0, body=(2.0, 1.5), points=0.02),
     Kind.MOMENT: _Shares(change=1.5, body=(2.0, 1.5), points=0.06),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),
-    Kind.DISSIPATION: _Shares(change=2.75, points=0.05),
+    Kind.DISSIPATION: _Shares(change=2.72, points=0.05),
     Kind.STRAIN: _Shares(change=2.0, body=(1.5, 1.5)),
     Kind.DISPLACEMENT: _Shares(change=2.0, points=0.003),
     # recovery is poor where a taxel ends, and at the corners of the base

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.readings.columns import AREAS, MAIN
@@ -23,19 +24,41 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
 lie within twice the bar, and 89 % with a factor of 0.1."""
 
-_CONTACT_EDGE, _CURVED_EDGE, _CORNER = {2: 0.036, 3: 0.022}, 0.12, 0.25
-"""Error of the place of the edge of contact over the distance of the points: the first, and the second times the square
-of that distance over the half-width of contact; the third at most, and under an object with edges."""
+_CURVED_EDGE, _CORNER = 0.12, 0.25
+"""Error of the place of the edge of contact over the distance of the points: the first times the square of that
+distance over the half-width of contact, and `_Places.contact` besides; the second at most, and under an object with
+edges."""
 
-_STICK_BORDER = {2: (0.2, 0.3), 3: (0.15, 0.35)}
-"""The same at the border of stick, in sections and solids: where the zone is three points wide and points slip beyond
-it, and elsewhere."""
 
-_STICK_ENDS, _THIN = {2: 0.27, 3: 0.2}, 0.35
-"""Error of an end of stick on a line over the distance to the next point, and over the length before the end in which
-the zone is not three points wide."""
+@dataclass(frozen=True)
+class _Places:
+    """Calibrated errors of the places of borders over the distance of the points; see validation/error_bars.py.
 
-_AT_ENDS = {2: 1.0, 3: 5.0}
+    Attributes
+    ----------
+    contact : of the edge of contact
+    stick : of the border of stick: where points slip beyond it, where it reaches open points, and where the zone is not
+        three points wide
+    ends : of an end of stick on a line, where the next point slips and where it is open
+    """
+
+    contact: float
+    stick: tuple[float, float, float]
+    ends: tuple[float, float]
+
+
+_PLACES = {
+    (2, False): _Places(0.026, (0.35, 0.15, 0.25), (0.35, 0.15)),
+    (2, True): _Places(0.04, (0.35, 0.3, 0.3), (0.35, 0.3)),
+    (3, False): _Places(0.022, (0.15, 0.35, 0.35), (0.2, 0.2)),
+    (3, True): _Places(0.022, (0.15, 0.35, 0.35), (0.2, 0.2)),
+}
+"""By dimension, in small strain and at large deformation."""
+
+_THIN = 0.35
+"""Error of an end of stick on a line over the length before it in which the zone is not three points wide."""
+
+_AT_ENDS = {2: 1.0, 3: 5.5}
 """Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others."""
 
 _ONE_POINT = 0.375
@@ -76,7 +99,7 @@ class PointResolution:
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             spacing = float(np.sqrt(np.median(points.area)))
             along_z = _edge_length(points, step.state.status != OPEN)
-            least = least_bars(points, step, along_z, problem.model.object.has_edges)
+            least = least_bars(points, step, along_z, problem.model.object.has_edges, problem.model.finite_strain)
             share = _share(spacing, reach, spacing, half_width)
             return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
         at = np.round(points.points, 9)
@@ -87,7 +110,7 @@ class PointResolution:
         rows = np.diff(np.unique(at[:, 2]))
         along_z = float(np.median(rows)) if len(rows) else 0.0
         share = _share(spacing, reach, along_z, half_width)
-        least = least_bars(points, step, along_z, problem.model.object.has_edges)
+        least = least_bars(points, step, along_z, problem.model.object.has_edges, problem.model.finite_strain)
         if points.dim == 2:
             friction = float(np.linalg.norm(points.with_basis_of(step.state).friction(step.state.force), axis=1).sum())
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
@@ -111,7 +134,9 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
     return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
 
 
-def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_edges: bool = False) -> dict[str, float]:
+def least_bars(
+    points: ContactPoints, step: StepResult, along_z_mm: float, has_edges: bool = False, finite_strain: bool = False
+) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by a share of the area of the facets that the border of its zone cuts: the length of the border
@@ -124,21 +149,20 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_e
     ----------
     along_z_mm : spacing of the points along z
     has_edges : whether the object has edges, at which the pressure does not fall to zero
+    finite_strain : whether the deformation is large
     """
     zones = dict(zip(("contact", "stick"), points.zones(step.state), strict=True))
     touching, line = step.state.status != OPEN, points.middle_line()
     reach = measure(points, step)["contact_half_length_mm"]
     one = _ONE_POINT * float(np.median(points.area[touching])) if touching.any() else 0.0
-    edge = _edge_error(points, zones["contact"], has_edges)
-    at_ends = {"contact": (min(_AT_ENDS[points.dim] * edge, _CORNER), 0.0), "stick": (_STICK_ENDS[points.dim], _THIN)}
+    places = _PLACES[points.dim, finite_strain]
+    edge = _edge_error(points, zones["contact"], places.contact, has_edges)
+    at_contact = np.full(len(touching), min(_AT_ENDS[points.dim] * edge, _CORNER)), 0.0
+    at_ends = {"contact": at_contact, "stick": (np.where(touching, *places.ends), _THIN)}
     found: dict[str, float] = {}
     for name, zone in zones.items():
-        cut, thin = _cut_areas(points, zone.inside, ~touching)
-        if name == "contact":
-            area = edge * cut
-        else:
-            wide, narrow = _STICK_BORDER[points.dim]
-            area = wide * (cut - thin) + narrow * thin
+        cuts = _cut_areas(points, zone.inside, ~touching)
+        area = edge * sum(cuts) if name == "contact" else float(np.dot(places.stick, cuts))
         found[f"{name}_area_mm2"] = area if np.count_nonzero(zone.inside) > 1 else max(area, one)
         found[f"{name}_half_length_mm"] = _half_length_bar(points, at_ends[name], zone.inside, line, reach)
         found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
@@ -157,31 +181,34 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, has_e
     return found
 
 
-def _cut_areas(points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the area (mm2) of the facets that the border of a zone cuts, and of those where it is not resolved.
+def _cut_areas(
+    points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]
+) -> tuple[float, float, float]:
+    """Return areas (mm2) of the facets that the border of a zone cuts.
 
-    There the zone is thin, or reaches open points, so that a strip of slip may hide between the points.
+    They are those where the zone is wide and slip begins beyond it; where it reaches open points, so that a strip of
+    slip may hide between the points; and where it is thin.
     """
     among = inside[points.facets]
     cut = among.any(axis=1) & ~among.all(axis=1)
-    wide = (points.resolved(inside)[points.facets] & among).any(axis=1) & ~is_open[points.facets].any(axis=1)
-    return float(points.facet_area[cut].sum()), float(points.facet_area[cut & ~wide].sum())
+    reaches = cut & is_open[points.facets].any(axis=1)
+    wide = cut & ~reaches & (points.resolved(inside)[points.facets] & among).any(axis=1)
+    resolved, opens, all_cut = (float(points.facet_area[some].sum()) for some in (wide, reaches, cut))
+    return resolved, opens, all_cut - resolved - opens
 
 
-def _edge_error(points: ContactPoints, contact: Zone, has_edges: bool) -> float:
-    """Return the error of the place of the edge of contact over the distance of the points."""
+def _edge_error(points: ContactPoints, contact: Zone, place: float, has_edges: bool) -> float:
+    """Return the error of the place of the edge of contact over the distance of points; `place` where contact is wide."""
     if has_edges:
         return _CORNER
-    area, cut = (
-        zone_area(points.facets, points.facet_area, contact),
-        _cut_areas(points, contact.inside, ~contact.inside)[0],
-    )
-    return min(_CONTACT_EDGE[points.dim] + _CURVED_EDGE * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
+    area = zone_area(points.facets, points.facet_area, contact)
+    cut = sum(_cut_areas(points, contact.inside, ~contact.inside))
+    return min(place + _CURVED_EDGE * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
 
 
 def _half_length_bar(
     points: ContactPoints,
-    errors: tuple[float, float],
+    errors: tuple[Float, float],
     zone: NDArray[np.bool_],
     line: tuple[NDArray[np.float64], NDArray[np.int64]],
     reach: float,
@@ -190,11 +217,11 @@ def _half_length_bar(
 
     Parameters
     ----------
-    errors : of an end over the distance to the next point, and over the length of what is thin before it
+    errors : of an end over the distance to the next point, by that point, and over the length of what is thin before it
     """
     at, nearest = line
     on = zone[nearest]
-    ends = errors[0] * _to_next_points(at, on)
+    ends = _to_next_points(at, on, errors[0][nearest])
     if ends == 0.0 and np.count_nonzero(on) == 1:  # a single point, and no other on the line: what it stands for
         return 0.5 * float(points.area[nearest[on]].sum()) / (2.0 * points.half_width_mm)
     if points.dim == 2 or not on.any():
@@ -205,16 +232,16 @@ def _half_length_bar(
     return max(0.5 * max(half, reach - half), ends)
 
 
-def _to_next_points(line: NDArray[np.float64], on: NDArray[np.bool_]) -> float:
-    """Return the mean distance (mm) from the ends of a zone to the next points of its line.
+def _to_next_points(line: Float, on: NDArray[np.bool_], errors: Float) -> float:
+    """Return the mean error (mm) of the ends of a zone: distances to the next points of its line times their `errors`.
 
-    For an empty zone it is the median distance of the points, which may hide a zone between them.
+    For an empty zone it is the median distance of the points, which may hide a zone between them, times the largest.
     """
     if not on.any():
         spacings = np.diff(np.unique(line))
-        return float(np.median(spacings)) if len(spacings) else 0.0
+        return float(np.median(spacings) * errors.max()) if len(spacings) else 0.0
     left, right = line[on].min(), line[on].max()
-    below, above = line[line < left], line[line > right]
-    before = float(left - below.max()) if below.size else 0.0
-    after = float(above.min() - right) if above.size else 0.0
+    below, above = line < left, line > right
+    before = float((left - line[below].max()) * errors[below][np.argmax(line[below])]) if below.any() else 0.0
+    after = float((line[above].min() - right) * errors[above][np.argmin(line[above])]) if above.any() else 0.0
     return 0.5 * (before + after)

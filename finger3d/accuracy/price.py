@@ -41,8 +41,11 @@ def price_of_a_third(problem: Problem, increments: int, seconds: float) -> str:
     memory = 1e-3 * (finer.factor_mb + BASE_MB) + rows_gb(own.dim * finer.contact_points)
     size, base = (_FACTOR * length for length in (model.mesh.size_mm, model.mesh.base_size_mm))
     where = f"mesh.size_mm = {size:.3g}, mesh.base_size_mm = {base:.3g}"
+    if model.mesh.stick_refinement > 1.0:  # by default a mesh with sizes has none
+        where += f", mesh.stick_refinement = {model.mesh.stick_refinement:g}"
     try:
         check_memory(memory, "a third of the error bars")
     except Finger3dError:
         return f"{memory:.2g} GB, more than this machine has ({where})"
-    return f"about {needed:.2g} s and {memory:.2g} GB ({where})"
+    time = f"{needed:.2g} s" if needed < 90.0 else f"{needed / 60.0:.2g} min"
+    return f"about {time} and {memory:.2g} GB ({where})"

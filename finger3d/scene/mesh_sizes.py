@@ -34,9 +34,9 @@ _MOST_POINTS = 600.0
 """Contact points of a solid across the overlap from which edges stay at `_LEAST_ACROSS`: a press under a long edge took
 88 s instead of 18 s to lower the penetration from 1.3 to 0.8 % of the depth."""
 
-_AT_STICK = 3.0
+_AT_STICK = 3.5
 """Default edge length at the contact of a solid over that at the border of stick. On Fig. 9 it takes the error of the
-area of stick, a zone one point wide, from unknown to 2 %, in 1.5 times the time of a press."""
+area of stick, a zone one point wide, from unknown to 2 %, and its bar to 11 %, in 1.5 times the time of a press."""
 
 _IN_LAYERS, _LARGEST_SCALE = 1.2, 2.5
 """Length that edges follow in layers over the shorter side of the overlap, and at most over the height. On a pad of gel

@@ -173,7 +173,7 @@ class MeshTable(TomlTable):
     gauge_refinement : edge length at the contact over that around gauges and on the contact face close to them; 1:
         gauges do not change the mesh
     stick_refinement : in a press, edge length at the contact over that at the border of stick, which a press on the
-        coarser mesh finds; absent: 3 in a solid without sizes, with friction, in small strain at given depths, else 1
+        coarser mesh finds; absent: 3.5 in a solid without sizes, with friction, in small strain at given depths, else 1
     mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
     tolerance : instead of sizes: refine until the estimated error of the goal is below it
     goal : with tolerance: the number that the mesh is refined for, such as gauge_g36 or stick_area_mm2, or "all";

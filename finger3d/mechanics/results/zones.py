@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,14 +86,18 @@ def zones(state: ContactState, places: Float, area: Float, compliance: Float, ed
     mu = float(shear[slips].sum()) / normal if normal > 0.0 else 0.0
     square = np.where(sticks, np.maximum(mu * pressure - shear, 0.0), 0.0) ** 2
 
+    @cache
+    def slopes() -> tuple[Int, Float, NDArray[np.bool_]]:
+        points = np.flatnonzero(sticks)
+        return np.cumsum(sticks) - 1, *_slopes(points, square, sticks, places, edges)
+
     def in_stick(last: Int, beyond: Int) -> Float:
         if not len(last):
             return np.zeros(0)
-        points, number = np.unique(last, return_inverse=True)
-        slope, has_slope = _slopes(points, square, sticks, places, edges)
-        fall = -np.einsum("kd,kd->k", slope[number], places[beyond] - places[last])
+        number, slope, has_slope = slopes()
+        fall = -np.einsum("kd,kd->k", slope[number[last]], places[beyond] - places[last])
         reached = np.where(square[last] < fall, square[last] / np.where(fall > 0.0, fall, 1.0), 1.0)
-        reached = np.where(has_slope[number], reached, 0.5)
+        reached = np.where(has_slope[number[last]], reached, 0.5)
         within = np.minimum(0.5 * (0.5 + reached) + _STICK_SHIFT, 1.0)
         return np.where(touches[beyond], within, in_contact(last, beyond))
 
