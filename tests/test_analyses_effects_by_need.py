@@ -120,7 +120,7 @@ def test_a_press_too_shallow_for_coarser_meshes_is_judged_on_its_own() -> None:
     text = changed(HALF_CYLINDER, depth_mm=0.02, size_mm=0.3)
     plain = parse(tomllib.loads(text)).model()
     with pytest.raises(UnresolvedError):
-        CoarsePresses(plain, 2.0).numbers({})
+        CoarsePresses(plain, 2.0).check({})
     found = judge(parse(tomllib.loads(text) | {"effects": {"auto": True}}), QUIET)
     assert found.used == ()
     assert abs(found.judged["large_deformation"].change) < 0.02
