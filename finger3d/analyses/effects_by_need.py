@@ -41,7 +41,7 @@ _NEUTRAL: Mapping[str, Tree] = {
 """Settings with which an effect changes nothing.  With these effects increments are as they are given, without them of
 second order or exact: few increments would make a difference of their own."""
 
-_RAISED, _LOWERED = 8.0, 1.5
+_RAISED, _LOWERED = 4.0, 1.25
 """Factors by which large deformation is taken to raise the change by another effect at most, and to lower it where that
 is not one of friction or stick."""
 
@@ -144,7 +144,7 @@ def judge(scene: Scene, report: Progress) -> Need:
     presses = _presses(plain, {name: on[name] for name in scene.effects})
     found, failed = _beside_each_other(presses, on, off, scene.auto, report)
     largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
-    used = {name for name, (_, change) in largest.items() if (1.0 + LEAST_ERROR) * abs(change) > scene.auto}
+    used = {name for name, (_, change) in largest.items() if abs(change) > _least_used(scene.auto)}
     added_s = _added_seconds(plain, {name: on[name] for name in found}, used)
     estimates = {name: ChangeEstimate() if name in used else _with_error(one) for name, one in found.items()}
     judged = {
@@ -201,8 +201,8 @@ def _beside_each_other(
 ) -> tuple[dict[str, Callable[..., ChangeEstimate]], dict[str, str]]:
     """Return the estimate of each effect beside all others, as a function, and why others cannot be judged, by name.
 
-    Effects are judged beside each other in small strain, and large deformation beside them; then again beside it those
-    that it may make needed or needless.
+    Effects are judged beside each other in small strain, and large deformation beside them; if it is used, those that
+    it may make needed or needless are judged again beside it.
     """
     found, failed = dict[str, Callable[..., ChangeEstimate]](), dict[str, str]()
 
@@ -232,14 +232,19 @@ def _beside_each_other(
         judge_beside(name, together)
     together |= alone(LARGE_DEFORMATION)
     judge_beside(LARGE_DEFORMATION, together, alone(LARGE_DEFORMATION))
-    large = found.get(LARGE_DEFORMATION)
-    if large is None or _RAISED * abs(_largest(large(with_error=False))[1]) < tolerance:
+    large, least = found.get(LARGE_DEFORMATION), _least_used(tolerance)
+    if large is None or abs(_largest(large(with_error=False))[1]) <= least:
         return found, failed
     for name in sorted(found.keys() - {LARGE_DEFORMATION}):
         estimate = found[name](with_error=False)
-        if abs(_largest(estimate)[1]) * _RAISED > tolerance > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
+        if abs(_largest(estimate)[1]) * _RAISED > least > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
             judge_beside(name, together)
     return found, failed
+
+
+def _least_used(tolerance: float) -> float:
+    """Return the change from which on an effect is used: it may be the tolerance within its least error."""
+    return tolerance / (1.0 + LEAST_ERROR)
 
 
 def _largest(estimate: ChangeEstimate, firm: bool = False) -> tuple[str, float]:
