@@ -89,10 +89,9 @@ def press_cost(model: Model) -> PressCost:
     runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
     marched = len(runs) * fixed + sum(runs) * free
-    tetwild = size.dim == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
     seconds = {
         "start": START_S,
-        "mesh": meshing_s(cells) if tetwild else 3e-7 * size.dofs,
+        "mesh": meshing_s(cells) if _is_meshed_by_tetwild(model) else 3e-7 * size.dofs,
         "assembly": size.assembly_s + len(model.gauges) * (GAUGE_S + GAUGE_CELL_S * cells),
         "condensation": size.condensation_s,
         "contact": marched * size.contact_s,
@@ -113,9 +112,8 @@ def forecast(model: Model) -> Tree:
     """
     axes, press = symmetry(model), press_cost(model)
     size, seconds = press.size, press.seconds
-    tetwild = size.dim == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
     memory = size.factor_mb + 1e3 * rows_gb(size.dim * size.contact_points + len(model.gauges)) + BASE_MB
-    memory += CAD_MB * tetwild + _states_mb(model, press, axes)
+    memory += CAD_MB * _is_meshed_by_tetwild(model) + _states_mb(model, press, axes)
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
@@ -139,6 +137,10 @@ def forecast(model: Model) -> Tree:
 def without_output_s(expected: Tree) -> float:
     """Return the seconds of a forecast without those to start and to draw."""
     return float(expected["total_s"] - expected["start_s"] - expected["output_s"])
+
+
+def _is_meshed_by_tetwild(model: Model) -> bool:
+    return model.domain == "solid" and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
 
 
 def _runs(model: Model, size: PressSize) -> list[int]:

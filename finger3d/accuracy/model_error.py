@@ -41,6 +41,9 @@ _SAFETY, LEAST_ERROR = 1.5, 0.15
 Enriched = Callable[[Model], Model]
 """Function that returns a model with more effects on."""
 
+Numbers = tuple[dict[str, float], Mapping[str, float]]
+"""Numbers at the end of a press, and the resolution of its lengths and areas by the contact points, by name."""
+
 
 def enriched(model: Model, effects: Mapping[str, Enriched]) -> Model:
     """Return a model with some effects on."""
@@ -64,9 +67,7 @@ class CoarsePresses:
     factor: float
     still: float = 2.0
     _bodies: dict[tuple[bool, ...], Problem] = field(default_factory=dict)
-    _known: dict[tuple[bool, tuple[str, ...]], tuple[dict[str, float], Mapping[str, float]]] = field(
-        default_factory=dict
-    )
+    _known: dict[tuple[bool, tuple[str, ...]], Numbers] = field(default_factory=dict)
 
     def check(self, effects: Mapping[str, Enriched]) -> None:
         """Raise an error if a mesh is too coarse.
@@ -80,7 +81,7 @@ class CoarsePresses:
         if self.still > 1.0 and edge_ratio(fine, coarse) < LEAST_RATIO:
             raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
 
-    def numbers(self, effects: Mapping[str, Enriched], still: bool) -> tuple[dict[str, float], Mapping[str, float]]:
+    def numbers(self, effects: Mapping[str, Enriched], still: bool) -> Numbers:
         """Return the numbers with some effects on, and the resolution of lengths and areas, by name.
 
         Parameters
@@ -181,9 +182,7 @@ def cheap_factor(model: Callable[[float], Model], press_s: float) -> float:
     model : function of this factor that returns the model whose edges are to be multiplied
     """
     budget = min(CHANGES.seconds(press_s), LARGE_DEFORMATION_S)
-    return affordable_factor(
-        lambda factor: at_large_deformation(coarse_model(model(factor), factor, _STEPS[0])), budget
-    )
+    return affordable_factor(lambda f: at_large_deformation(coarse_model(model(f), f, _STEPS[0])), budget)
 
 
 def coarse_model(model: Model, factor: float, steps: int) -> Model:

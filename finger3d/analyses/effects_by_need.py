@@ -142,9 +142,10 @@ def judge(scene: Scene, report: Progress) -> Need:
     }
     report.stage("judging which effects the scene calls for")
     presses = _presses(plain, {name: on[name] for name in scene.effects})
-    found, failed = _beside_each_other(presses, on, off, scene.auto, report)
+    least = scene.auto / (1.0 + LEAST_ERROR)  # such a change may be the tolerance
+    found, failed = _beside_each_other(presses, on, off, least, report)
     largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
-    used = {name for name, (_, change) in largest.items() if abs(change) > _least_used(scene.auto)}
+    used = {name for name, (_, change) in largest.items() if abs(change) > least}
     added_s = _added_seconds(plain, {name: on[name] for name in found}, used)
     estimates = {name: ChangeEstimate() if name in used else _with_error(one) for name, one in found.items()}
     judged = {
@@ -196,55 +197,46 @@ def _beside_each_other(
     presses: CoarsePresses,
     on: Mapping[str, Enriched],
     off: Mapping[str, Mapping[str, Enriched]],
-    tolerance: float,
+    least: float,
     report: Progress,
 ) -> tuple[dict[str, Callable[..., ChangeEstimate]], dict[str, str]]:
     """Return the estimate of each effect beside all others, as a function, and why others cannot be judged, by name.
 
     Effects are judged beside each other in small strain, and large deformation beside them; if it is used, those that
     it may make needed or needless are judged again beside it.
+
+    Parameters
+    ----------
+    least : change above which an effect is used
     """
     found, failed = dict[str, Callable[..., ChangeEstimate]](), dict[str, str]()
 
     def judge_beside(name: str, *groups: Mapping[str, Enriched]) -> None:
         report.say(f"judging {name}")
-        why = ""
         for group in groups:
             estimate = partial(presses.changes, group, name, neutral=off.get(name))
             try:
                 estimate(with_error=False)
             except _FAILURES as error:
-                why = why or str(error) or type(error).__name__
-                continue
-            found[name] = estimate
-            return
-        if name not in found:
-            failed[name] = why
-
-    def alone(name: str) -> dict[str, Enriched]:
-        return {name: on[name]}
+                failed.setdefault(name, str(error) or type(error).__name__)
+            else:
+                found[name] = estimate
+                return
 
     small = {name: on[name] for name in sorted(on) if name != LARGE_DEFORMATION}
     for name in small:
-        judge_beside(name, small, alone(name))
+        judge_beside(name, small, {name: on[name]})
     together = {name: small[name] for name in found}
-    for name in together if failed else ():
+    for name in together if len(together) < len(small) else ():
         judge_beside(name, together)
-    together |= alone(LARGE_DEFORMATION)
-    judge_beside(LARGE_DEFORMATION, together, alone(LARGE_DEFORMATION))
-    large, least = found.get(LARGE_DEFORMATION), _least_used(tolerance)
-    if large is None or abs(_largest(large(with_error=False))[1]) <= least:
-        return found, failed
-    for name in sorted(found.keys() - {LARGE_DEFORMATION}):
-        estimate = found[name](with_error=False)
-        if abs(_largest(estimate)[1]) * _RAISED > least > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
-            judge_beside(name, together)
-    return found, failed
-
-
-def _least_used(tolerance: float) -> float:
-    """Return the change from which on an effect is used: it may be the tolerance within its least error."""
-    return tolerance / (1.0 + LEAST_ERROR)
+    large = {LARGE_DEFORMATION: on[LARGE_DEFORMATION]}
+    judge_beside(LARGE_DEFORMATION, together | large, large)
+    if LARGE_DEFORMATION in found and abs(_largest(found[LARGE_DEFORMATION](with_error=False))[1]) > least:
+        for name in together:
+            estimate = found[name](with_error=False)
+            if abs(_largest(estimate)[1]) * _RAISED > least > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
+                judge_beside(name, together | large)
+    return found, {name: why for name, why in failed.items() if name not in found}
 
 
 def _largest(estimate: ChangeEstimate, firm: bool = False) -> tuple[str, float]:
