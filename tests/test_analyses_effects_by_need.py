@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 
 import finger3d
+from finger3d.accuracy.changes import changing_numbers
 from finger3d.accuracy.model_error import CoarsePresses
 from finger3d.analyses.effects_by_need import judge
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse
+from tests.models import ended
 from tests.scenes import HALF_CYLINDER, changed
 from tests.sensor_cases import scene
 
@@ -63,13 +65,49 @@ def test_few_increments_make_no_difference_of_their_own() -> None:
         assert abs(found.judged[name].change) < 0.01  # both change the limit of friction or the force by 0.1 %
 
 
+GAUGES = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}
+LONG = [{"name": "long", "x_mm": 30.0, "y_mm": 38.0, "angle_deg": 10.0, "length_mm": 4.0}]
+
+
+def test_bodies_that_share_what_is_condensed_are_those_condensed_alone() -> None:
+    """Without foils the body alone is meshed by half, so that its cells about the gauge differ."""
+    soft = {"E_MPa": 2.0, "nu": 0.4}
+    effects = {"auto": True, "embedded_gauge": GAUGES, "elastic_object": soft, "kinetic_friction": {"ratio": 0.7}}
+    asked = parse({**needs(2.0).given, "gauge": LONG, "effects": effects})
+    plain, on = asked.with_effects(()).model(), {name: effect.apply for name, effect in asked.effects.items()}
+    shared = CoarsePresses(plain, 2.0)
+    shared.numbers(on, False)
+    for left_out, error in (("embedded_gauge", 5e-3), ("elastic_object", 1e-9), ("kinetic_friction", 1e-9)):
+        some = {name: on[name] for name in on if name != left_out}
+        alone = CoarsePresses(plain, 2.0).numbers(some, False)[0]
+        assert shared.numbers(some, False)[0] == pytest.approx(alone, rel=error)
+
+
+def test_an_effect_is_judged_beside_all_others() -> None:
+    """By static friction alone most points stick unless the deformation is large; by kinetic friction few stick at all.
+
+    The truth is pressed on the scene's own mesh.
+    """
+    shallow = {
+        "material": {"E_MPa": 1.0, "nu": 0.392}, "object": {"shape": "cylinder", "radius_mm": 74.0},
+        "friction": {"mu": 0.058}, "press": {"depth_mm": 0.48, "steps": 4},
+        "mesh": {"size_mm": 0.75, "base_size_mm": 8.0}, "gauge": [],
+    }  # fmt: skip
+    beside = scene(**shallow, effects={"auto": True, "kinetic_friction": {"ratio": 0.63}})
+    assert judge(beside, QUIET).used == ("kinetic_friction",)
+    assert judge(scene(**shallow, effects={"auto": True}), QUIET).used == ("large_deformation",)
+    large, small = (
+        changing_numbers(*ended(beside.with_effects(names).model()))["friction_sum_N"]
+        for names in (("large_deformation", "kinetic_friction"), ("kinetic_friction",))
+    )
+    assert large == pytest.approx(small, rel=0.02)
+
+
 @pytest.mark.slow
 def test_effects_are_judged_beside_stiff_gauges() -> None:
     """The free strain of such gauges is no number of a press without them."""
-    gauges = {"E_MPa": 3000.0, "thickness_mm": 0.02, "width_mm": 3.0}
-    long = [{"name": "long", "x_mm": 30.0, "y_mm": 38.0, "angle_deg": 10.0, "length_mm": 4.0}]
-    effects = {"auto": True, "embedded_gauge": gauges, "kinetic_friction": {"ratio": 0.9}}
-    given = {**needs().given, "gauge": long, "effects": effects}
+    effects = {"auto": True, "embedded_gauge": GAUGES, "kinetic_friction": {"ratio": 0.9}}
+    given = {**needs().given, "gauge": LONG, "effects": effects}
     found = judge(parse(given), QUIET)
     assert {"embedded_gauge", "kinetic_friction"} <= set(found.judged)
     assert not any(name.endswith("_free") for one in found.judged.values() for name in one.estimate.changes)
@@ -120,7 +158,7 @@ def test_a_press_too_shallow_for_coarser_meshes_is_judged_on_its_own() -> None:
     text = changed(HALF_CYLINDER, depth_mm=0.02, size_mm=0.3)
     plain = parse(tomllib.loads(text)).model()
     with pytest.raises(UnresolvedError):
-        CoarsePresses(plain, 2.0).numbers({})
+        CoarsePresses(plain, 2.0).check({})
     found = judge(parse(tomllib.loads(text) | {"effects": {"auto": True}}), QUIET)
     assert found.used == ()
     assert abs(found.judged["large_deformation"].change) < 0.02

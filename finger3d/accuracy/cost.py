@@ -57,12 +57,15 @@ class PressCost:
     Attributes
     ----------
     size : of the meshed part
-    increments : number of increments in all runs
+    cells : number of its cells
+    steps, increments : number of increments in the last run, and in all runs
     runs : number of runs, each with another number of increments
     seconds : time of each stage by name
     """
 
     size: PressSize
+    cells: int
+    steps: int
     increments: int
     runs: int
     seconds: dict[str, float]
@@ -80,6 +83,25 @@ class AddedCost:
         return f"about {self.seconds:.2g} s and {self.memory_mb:.2g} MB: {self.reason}"
 
 
+def press_cost(model: Model) -> PressCost:
+    """Return the estimated cost of a press without its effects."""
+    cells, size = _size(model, symmetry(model))
+    runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
+    fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
+    marched = len(runs) * fixed + sum(runs) * free
+    seconds = {
+        "start": START_S,
+        "mesh": meshing_s(cells) if _is_meshed_by_tetwild(model) else 3e-7 * size.dofs,
+        "assembly": size.assembly_s + len(model.gauges) * (GAUGE_S + GAUGE_CELL_S * cells),
+        "condensation": size.condensation_s,
+        "contact": marched * size.contact_s,
+        "output": FIGURES_S[size.dim],
+    }
+    return PressCost(
+        size=size, cells=cells, steps=fixed + runs[-1] * free, increments=marched, runs=len(runs), seconds=seconds
+    )
+
+
 def forecast(model: Model) -> Tree:
     """Size, seconds and memory of a press.
 
@@ -88,36 +110,23 @@ def forecast(model: Model) -> Tree:
     dict
         Printable values by name: domain, symmetry, cells, dofs, contact points, steps, seconds of each stage, memory.
     """
-    axes = symmetry(model)
-    cells, size = _size(model, axes)
-    runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
-    fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
-    marched = len(runs) * fixed + sum(runs) * free
-    tetwild = size.dim == 3 and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
-    seconds = {
-        "start": START_S,
-        "mesh": meshing_s(cells) if tetwild else 3e-7 * size.dofs,
-        "assembly": size.assembly_s + len(model.gauges) * (GAUGE_S + GAUGE_CELL_S * cells),
-        "condensation": size.condensation_s,
-        "contact": marched * size.contact_s,
-        "output": FIGURES_S[size.dim],
-    }
-    press = PressCost(size=size, increments=marched, runs=len(runs), seconds=seconds)
+    axes, press = symmetry(model), press_cost(model)
+    size, seconds = press.size, press.seconds
     memory = size.factor_mb + 1e3 * rows_gb(size.dim * size.contact_points + len(model.gauges)) + BASE_MB
-    memory += CAD_MB * tetwild + _states_mb(model, press, axes)
+    memory += CAD_MB * _is_meshed_by_tetwild(model) + _states_mb(model, press, axes)
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
     return {
         "domain": model.domain,
         "formulation": "mixed quadratic/linear" if model.mixed else "quadratic displacement",
         "symmetry": " and ".join(axes) if axes else "none",
-        "cells": round(cells),
+        "cells": round(press.cells),
         "dofs": round(size.dofs),
         "contact_points": round(size.contact_points),
         **({"gauges": len(model.gauges)} if model.gauges else {}),
         **_triangles(model),
-        "steps": fixed + runs[-1] * free,
-        **({"steps_of_all_runs": marched} if len(runs) > 1 else {}),
+        "steps": press.steps,
+        **({"steps_of_all_runs": press.increments} if press.runs > 1 else {}),
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
         **{name: f"costs {cost}" for name, cost in costs.items()},
         "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
@@ -128,6 +137,10 @@ def forecast(model: Model) -> Tree:
 def without_output_s(expected: Tree) -> float:
     """Return the seconds of a forecast without those to start and to draw."""
     return float(expected["total_s"] - expected["start_s"] - expected["output_s"])
+
+
+def _is_meshed_by_tetwild(model: Model) -> bool:
+    return model.domain == "solid" and model.mesh.mesher == "ftetwild" and not isinstance(model.design, GivenMesh)
 
 
 def _runs(model: Model, size: PressSize) -> list[int]:

@@ -26,25 +26,35 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.build import build, with_elastic_object
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
 
 _STEPS = (5, 3)
-"""Increments in each leg, on the coarse mesh and on the one that is coarser still."""
+"""Most increments in each leg, on the coarse mesh and on the one that is coarser still."""
 
-_SAFETY, _LEAST_ERROR = 1.5, 0.15
+_SAFETY, LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
 
 Enriched = Callable[[Model], Model]
 """Function that returns a model with more effects on."""
 
+Numbers = tuple[dict[str, float], Mapping[str, float]]
+"""Numbers at the end of a press, and the resolution of its lengths and areas by the contact points, by name."""
+
+
+def enriched(model: Model, effects: Mapping[str, Enriched]) -> Model:
+    """Return a model with some effects on."""
+    for name in sorted(effects):
+        model = effects[name](model)
+    return model
+
 
 @dataclass
 class CoarsePresses:
-    """Presses of a model on two coarse meshes, with any effects on; each is solved once.
+    """Presses of a model on two coarse meshes, with any effects on; each is solved, and each body condensed, once.
 
     Attributes
     ----------
@@ -56,36 +66,57 @@ class CoarsePresses:
     model: Model
     factor: float
     still: float = 2.0
-    _known: dict[tuple[str, ...], tuple[dict[str, float], dict[str, float]]] = field(default_factory=dict)
-    _zones: dict[tuple[str, ...], Mapping[str, float]] = field(default_factory=dict)
+    _bodies: dict[tuple[bool, ...], Problem] = field(default_factory=dict)
+    _known: dict[tuple[bool, tuple[str, ...]], Numbers] = field(default_factory=dict)
 
-    def numbers(self, effects: Mapping[str, Enriched]) -> tuple[dict[str, float], dict[str, float]]:
-        """Return the numbers by name with some effects on, on the coarse mesh and on the one that is coarser still.
+    def check(self, effects: Mapping[str, Enriched]) -> None:
+        """Raise an error if a mesh is too coarse.
 
         Raises
         ------
         Finger3dError
-            If a mesh is too coarse, or a press does not converge.
+            If the model refuses an effect, contact is not resolved, or both meshes hardly differ.
         """
-        key = tuple(sorted(effects))
+        fine, coarse = (self._problem(effects, still) for still in (False, True))
+        if self.still > 1.0 and edge_ratio(fine, coarse) < LEAST_RATIO:
+            raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
+
+    def numbers(self, effects: Mapping[str, Enriched], still: bool) -> Numbers:
+        """Return the numbers with some effects on, and the resolution of lengths and areas, by name.
+
+        Parameters
+        ----------
+        still : whether on the coarser of both meshes
+
+        Raises
+        ------
+        Finger3dError
+            If the model refuses an effect, contact is not resolved, or the press does not converge.
+        """
+        key = still, tuple(sorted(effects))
         if key not in self._known:
-            fine, finer, zones = self._pressed(self.factor, _STEPS[0], effects)
-            coarse, coarser_still, _ = self._pressed(self.still * self.factor, _STEPS[1], effects)
-            if self.still > 1.0 and edge_ratio(finer, coarser_still) < LEAST_RATIO:
-                raise Finger3dError("the mesh is too coarse for a coarser one; lower mesh.size_mm")
-            self._known[key], self._zones[key] = (fine, coarse), zones
+            problem = self._problem(effects, still)
+            last = last_step(problem)
+            self._known[key] = changing_numbers(problem, last), PointResolution.of(problem, last).zone_bars
         return self._known[key]
 
-    def _pressed(
-        self, factor: float, steps: int, effects: Mapping[str, Enriched]
-    ) -> tuple[dict[str, float], Problem, Mapping[str, float]]:
-        model = coarse_model(self.model, factor, steps)
-        for name in sorted(effects):
-            model = effects[name](model)
+    def _problem(self, effects: Mapping[str, Enriched], still: bool) -> Problem:
+        coarse = coarse_model(self.model, self.factor * (self.still if still else 1.0), _STEPS[still])
         # the strain without foils is that of a press of its own, and no other press has it
-        problem = replace(build(model), without_inclusions=None)
-        last = last_step(problem)
-        return changing_numbers(problem, last), problem, PointResolution.of(problem, last).zone_bars
+        return replace(self._body(enriched(coarse, effects), still), without_inclusions=None)
+
+    def _body(self, model: Model, still: bool) -> Problem:
+        """Return a condensed model; an elastic object is added to the body without it, foils are taken from it."""
+        key = still, model.finite_strain, model.inclusions is not None, model.object_compliance is not None
+        with_foils = self._bodies.get((*key[:2], True, key[3]))
+        if key not in self._bodies and with_foils and with_foils.without_inclusions:
+            self._bodies[key] = with_foils.without_inclusions
+        elif key not in self._bodies and model.object_compliance:
+            alone = self._body(replace(model, object_compliance=None), still)
+            self._bodies[key] = with_elastic_object(_with_model(alone, model))
+        elif key not in self._bodies:
+            self._bodies[key] = build(model)
+        return _with_model(self._bodies[key], model)
 
     def changes(
         self,
@@ -93,6 +124,7 @@ class CoarsePresses:
         added: str,
         press: Mapping[str, float] | None = None,
         neutral: Mapping[str, Enriched] | None = None,
+        with_error: bool = True,
     ) -> ChangeEstimate:
         """Return what one of several effects changes beside the others.
 
@@ -102,57 +134,63 @@ class CoarsePresses:
         added : name of the one in question
         press : numbers of the press itself without it, if they are known
         neutral : what stands in its place in the presses without it, by another name
+        with_error : whether to press on the coarser of both meshes, too; otherwise the errors are the least
         """
         others = {name: effects[name] for name in effects if name != added} | dict(neutral or {})
-        before, before_still = self.numbers(others)
-        after, after_still = self.numbers(effects)
+        (before, zones), (after, more_zones) = (self.numbers(chosen, False) for chosen in (others, effects))
         values = press or before
         names = [name for name in values if name in after and name in before]
         change = {name: after[name] - before[name] for name in names}
-        errors = {
-            name: max(
-                _SAFETY * abs(change[name] - after_still[name] + before_still[name]),
-                _LEAST_ERROR * abs(change[name]),
-                abs(before[name] - values[name]),
-            )
-            for name in names
-        }
+        errors = {name: max(LEAST_ERROR * abs(change[name]), abs(before[name] - values[name])) for name in names}
+        if with_error:
+            start, end = (self.numbers(chosen, True)[0] for chosen in (others, effects))
+            errors = {name: max(errors[name], _SAFETY * abs(change[name] - end[name] + start[name])) for name in names}
         mesh = coarser(self.model, self.factor).mesh
-        zones = [self._zones[tuple(sorted(chosen))] for chosen in (others, effects)]
         return ChangeEstimate(
             changes=judged({name: values[name] for name in names}, change, errors, kinds_of(self.model.columns)),
             method=f"presses with and without it, with {mesh.size_mm:.4g} and {mesh.base_size_mm:.4g} mm in "
-            f"{_STEPS[0]} increments a leg; error: with {self.still:g} times these edges in {_STEPS[1]} increments,"
-            " and from how far the coarse press without it is from the press",
-            resolution={name: sum(bars.get(name, 0.0) for bars in zones) for name in zones[0]},
+            f"at most {_STEPS[0]} increments a leg; error: with {self.still:g} times these edges in at most {_STEPS[1]}"
+            ", and from how far the coarse press without it is from the press",
+            resolution={name: bar + more_zones.get(name, 0.0) for name, bar in zones.items()},
         )
+
+
+def _with_model(problem: Problem, model: Model) -> Problem:
+    """Return a problem with another model of the same body."""
+    body = problem.without_inclusions
+    return replace(problem, model=model, without_inclusions=body and replace(body, model=model))
 
 
 @attempted
 def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
     """Estimate what large deformation would change in the last increment of a press in small strain."""
     check_kind(problem.model)
-    factor = cheap_factor(problem.model, problem.size.press_s(increments))
+    factor = cheap_factor(lambda _: problem.model, problem.size.press_s(increments))
     presses = CoarsePresses(problem.model, factor)
-    presses.numbers({})
+    presses.check({})
     on = {"large_deformation": at_large_deformation}
     return presses.changes(on, "large_deformation", changing_numbers(problem, last))
 
 
-def cheap_factor(model: Model, press_s: float) -> float:
+def cheap_factor(model: Callable[[float], Model], press_s: float) -> float:
     """Return the edge lengths of the coarse mesh over those of a press that takes some seconds.
 
     The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
+
+    Parameters
+    ----------
+    model : function of this factor that returns the model whose edges are to be multiplied
     """
     budget = min(CHANGES.seconds(press_s), LARGE_DEFORMATION_S)
-    return affordable_factor(lambda factor: at_large_deformation(coarse_model(model, factor, _STEPS[0])), budget)
+    return affordable_factor(lambda f: at_large_deformation(coarse_model(model(f), f, _STEPS[0])), budget)
 
 
 def coarse_model(model: Model, factor: float, steps: int) -> Model:
     """Return a model with longer edges, none shorter at the border of stick, and few increments a leg."""
     found = coarser(model, factor)
     mesh = replace(found.mesh, borders=None)
-    return replace(found, mesh=mesh, legs=tuple(replace(leg, steps=steps) for leg in model.legs))
+    legs = (replace(leg, steps=steps if leg.steps == "auto" else min(leg.steps, steps)) for leg in model.legs)
+    return replace(found, mesh=mesh, legs=tuple(legs))
 
 
 def at_large_deformation(model: Model) -> Model:

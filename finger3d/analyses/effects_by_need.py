@@ -1,22 +1,22 @@
 """Which effects a scene calls for: those that change a number of its press by more than a tolerance.
 
-Every effect that the scene names, and large deformation in any case, is added to coarse presses, first alone and then,
-since one effect may matter or not because of another, beside all others that may matter.  What is left out is a part of
-the model's error.
+Every effect that the scene names, and large deformation in any case, is judged by coarse presses with all effects and
+without it, since one effect may matter or not because of another.  What is left out is a part of the model's error.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from finger3d._types import Tree
 from finger3d.accuracy.changes import ChangeEstimate, two_digits
-from finger3d.accuracy.cost import forecast, without_output_s
-from finger3d.accuracy.model_error import CoarsePresses, Enriched, cheap_factor
+from finger3d.accuracy.cost import added_cost, forecast, press_cost, without_output_s
+from finger3d.accuracy.model_error import LEAST_ERROR, CoarsePresses, Enriched, cheap_factor, enriched
 from finger3d.effects import effect_names
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
@@ -41,15 +41,9 @@ _NEUTRAL: Mapping[str, Tree] = {
 """Settings with which an effect changes nothing.  With these effects increments are as they are given, without them of
 second order or exact: few increments would make a difference of their own."""
 
-_FINER_AT_CONTACT = 2.0
-"""Edge lengths of the coarse meshes relative to their bases, over those of the press: few points of contact say nothing
-about friction."""
-
-_ROUND_OFF = 1e-9
-"""Relative change up to which nothing changes."""
-
-_INTERACTION = 8.0
-"""Factor by which other effects are taken to raise or lower the change by one at most."""
+_RAISED, _LOWERED = 4.0, 1.25
+"""Factors by which large deformation is taken to raise the change by another effect at most, and to lower it where that
+is not one of friction or stick."""
 
 _FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
 
@@ -61,7 +55,7 @@ class Judged:
     Attributes
     ----------
     used : whether the effect is on
-    estimate : what it changes, alone or beside the other effects that may matter
+    estimate : what it changes beside the others, with its error; empty if it is used
     number : name of the number that it changes most, relative to its scale
     change : relative change of that number
     seconds : that it adds to the press by the forecast
@@ -135,7 +129,7 @@ def judge(scene: Scene, report: Progress) -> Need:
     Raises
     ------
     Finger3dError
-        If the coarse presses without any effect fail, so that nothing can be judged.
+        If no mesh for coarse presses resolves the contact, so that nothing can be judged.
     """
     assert scene.auto is not None
     start = time.perf_counter()
@@ -147,20 +141,15 @@ def judge(scene: Scene, report: Progress) -> Need:
         name: {f"no {name}": replace(effects[name], **_NEUTRAL[name]).apply} for name in on.keys() & _NEUTRAL.keys()
     }
     report.stage("judging which effects the scene calls for")
-    presses = _presses(plain)
-    found, failed = dict[str, ChangeEstimate](), dict[str, str]()
-    for name in sorted(on):
-        report.say(f"judging {name}")
-        try:
-            found[name] = presses.changes({name: on[name]}, name, neutral=off.get(name))
-        except _FAILURES as error:
-            failed[name] = str(error) or type(error).__name__
-    found |= _beside_each_other(presses, on, off, found, scene.auto, report)
-    largest = {name: _largest(estimate) for name, estimate in found.items()}
-    used = {name: on[name] for name, (_, change) in largest.items() if abs(change) > scene.auto}
+    presses = _presses(plain, {name: on[name] for name in scene.effects})
+    least = scene.auto / (1.0 + LEAST_ERROR)  # such a change may be the tolerance
+    found, failed = _beside_each_other(presses, on, off, least, report)
+    largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
+    used = {name for name, (_, change) in largest.items() if abs(change) > least}
+    added_s = _added_seconds(plain, {name: on[name] for name in found}, used)
+    estimates = {name: ChangeEstimate() if name in used else _with_error(one) for name, one in found.items()}
     judged = {
-        name: Judged(name in used, found[name], *largest[name], _added_seconds(plain, used, name, on[name]))
-        for name in found
+        name: Judged(name in used, estimates[name], *largest[name], added_s[name]) for name in on if name in found
     }
     unjudged = {name: why for name, why in _NEEDS.items() if name not in on and name in effect_names()}
     return Need(scene.auto, judged, failed | unjudged, time.perf_counter() - start)
@@ -177,63 +166,110 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
     }
 
 
-def _presses(model: Model) -> CoarsePresses:
-    """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it."""
+def _presses(model: Model, effects: Mapping[str, Enriched]) -> CoarsePresses:
+    """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it.
+
+    Edges at the contact are those of the press unless that is too costly: on them depends what an effect changes in
+    friction.
+    """
     mesh, press_s = model.mesh, without_output_s(forecast(model))
-    fine = replace(model, mesh=replace(mesh, size_mm=mesh.size_mm / _FINER_AT_CONTACT))
+
+    def as_fine_at_contact(factor: float) -> Model:
+        return replace(model, mesh=replace(mesh, size_mm=mesh.size_mm / factor))
+
     try:
-        presses = CoarsePresses(fine, cheap_factor(fine, press_s))
+        factor = cheap_factor(as_fine_at_contact, press_s)
+        presses = CoarsePresses(as_fine_at_contact(factor), factor)
     except Finger3dError:  # too costly
-        presses = CoarsePresses(model, cheap_factor(model, press_s))
-    try:
-        presses.numbers({})
-    except Finger3dError:
-        presses = CoarsePresses(model, 1.0, 1.0)
-        presses.numbers({})
-    return presses
+        presses = CoarsePresses(model, cheap_factor(lambda _: model, press_s))
+    for tried in (presses, CoarsePresses(model, 1.0, 1.0)):
+        for chosen in (effects, {}):  # bodies with the effects are needed later
+            try:
+                tried.check(chosen)
+            except Finger3dError as error:
+                why = error
+            else:
+                return tried
+    raise why
 
 
 def _beside_each_other(
     presses: CoarsePresses,
     on: Mapping[str, Enriched],
     off: Mapping[str, Mapping[str, Enriched]],
-    alone: Mapping[str, ChangeEstimate],
-    tolerance: float,
+    least: float,
     report: Progress,
-) -> dict[str, ChangeEstimate]:
-    """Return what effects change beside all others that may matter, where others may decide whether they are needed."""
-    reach = {
-        name: max((abs(c.relative) for c in estimate.changes.values()), default=0.0) for name, estimate in alone.items()
-    }
-    # kinetic friction alone changes nothing where all points stick: others may let them slip
-    near = {name: on[name] for name in alone if not _ROUND_OFF < reach[name] < tolerance / _INTERACTION}
-    found = dict[str, ChangeEstimate]()
-    for name in near if len(near) > 1 else ():
-        if abs(_largest(alone[name])[1]) > _INTERACTION * tolerance:
-            continue
-        report.say(f"judging {name}, beside {', '.join(other for other in near if other != name)}")
-        try:
-            found[name] = presses.changes(near, name, neutral=off.get(name))
-        except _FAILURES as error:
-            report.say(f"{name} is judged alone: {error}")
-    return found
+) -> tuple[dict[str, Callable[..., ChangeEstimate]], dict[str, str]]:
+    """Return the estimate of each effect beside all others, as a function, and why others cannot be judged, by name.
+
+    Effects are judged beside each other in small strain, and large deformation beside them; if it is used, those that
+    it may make needed or needless are judged again beside it.
+
+    Parameters
+    ----------
+    least : change above which an effect is used
+    """
+    found, failed = dict[str, Callable[..., ChangeEstimate]](), dict[str, str]()
+
+    def judge_beside(name: str, *groups: Mapping[str, Enriched]) -> None:
+        report.say(f"judging {name}")
+        for group in groups:
+            estimate = partial(presses.changes, group, name, neutral=off.get(name))
+            try:
+                estimate(with_error=False)
+            except _FAILURES as error:
+                failed.setdefault(name, str(error) or type(error).__name__)
+            else:
+                found[name] = estimate
+                return
+
+    small = {name: on[name] for name in sorted(on) if name != LARGE_DEFORMATION}
+    for name in small:
+        judge_beside(name, small, {name: on[name]})
+    together = {name: small[name] for name in found}
+    for name in together if len(together) < len(small) else ():
+        judge_beside(name, together)
+    large = {LARGE_DEFORMATION: on[LARGE_DEFORMATION]}
+    judge_beside(LARGE_DEFORMATION, together | large, large)
+    if LARGE_DEFORMATION in found and abs(_largest(found[LARGE_DEFORMATION](with_error=False))[1]) > least:
+        for name in together:
+            estimate = found[name](with_error=False)
+            if abs(_largest(estimate)[1]) * _RAISED > least > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
+                judge_beside(name, together | large)
+    return found, {name: why for name, why in failed.items() if name not in found}
 
 
-def _largest(estimate: ChangeEstimate) -> tuple[str, float]:
+def _largest(estimate: ChangeEstimate, firm: bool = False) -> tuple[str, float]:
     """Return the number that changes most relative to its scale, and its change.
 
     A length or an area, which changes by whole contact points, counts if it changes by more than they resolve.
+
+    Parameters
+    ----------
+    firm : whether friction and stick do not count, which other effects may alter altogether
     """
     known = {
         name: change.relative
         for name, change in estimate.changes.items()
         if abs(change.change) >= estimate.resolution.get(name, 0.0)
+        and not (firm and name.startswith(("friction", "stick")))
     }
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
 
-def _added_seconds(model: Model, used: Mapping[str, Enriched], name: str, added: Enriched) -> float:
-    """Return the seconds that an effect adds to a press with those that are used by the forecast."""
-    for other in sorted(used.keys() - {name}):
-        model = used[other](model)
-    return max(float(forecast(added(model))["total_s"] - forecast(model)["total_s"]), 0.0)
+def _with_error(estimate: Callable[..., ChangeEstimate]) -> ChangeEstimate:
+    """Return the estimate with its error, without changes if the press on the coarser mesh fails."""
+    try:
+        return estimate()
+    except _FAILURES as error:
+        return ChangeEstimate(method=f"no estimate: {error}")
+
+
+def _added_seconds(model: Model, on: Mapping[str, Enriched], used: Set[str]) -> dict[str, float]:
+    """Return the seconds by name that each effect adds to a press with those that are used, by the forecast."""
+    press, added = press_cost(model), dict[str, float]()
+    for name in on:
+        beside = enriched(model, {other: on[other] for other in used | {name}})
+        slots = [slot for slot, filled_by in beside.filled if filled_by == name]
+        added[name] = sum(added_cost(slot, beside, press).seconds for slot in slots)
+    return added

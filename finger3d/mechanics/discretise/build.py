@@ -117,14 +117,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
         ),
         seconds={**mesh_report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )
-    whole = with_bars(problem, bars) if bars else problem
-    thing = model.object_compliance
-    if thing is None:
-        return whole
-    # a press imports only what its scene names
-    from finger3d.mechanics.discretise.elastic_object import object_response
-
-    return with_object_compliance(whole, object_response(problem, thing, contact.contact_box, report))
+    return with_elastic_object(with_bars(problem, bars) if bars else problem, report)
 
 
 def _bars(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
@@ -159,6 +152,18 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
         ),
         without_inclusions=problem,
     )
+
+
+def with_elastic_object(problem: Problem, report: Progress = QUIET) -> Problem:
+    """Return the problem of a finger with the compliance of its model's object, if that is elastic."""
+    model, body = problem.model, problem.without_inclusions or problem
+    if model.object_compliance is None:
+        return problem
+    # a press imports only what its scene names
+    from finger3d.mechanics.discretise.elastic_object import object_response
+
+    response = object_response(body, model.object_compliance, model.first_contact.contact_box, report)
+    return with_object_compliance(problem, response)
 
 
 def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
