@@ -198,11 +198,7 @@ def _cut_areas(
 
 
 def _edge_error(points: ContactPoints, contact: Zone, place: float, has_edges: bool) -> float:
-<<<<<<< HEAD
-    """Return the error of the place of the edge of contact, over the distance of points; `place` in a wide contact."""
-=======
     """Return the error of the place of the edge of contact over the distance of points; `place`: if contact is wide."""
->>>>>>> w-cost
     if has_edges:
         return _CORNER
     area = zone_area(points.facets, points.facet_area, contact)
