@@ -13,7 +13,7 @@ out, as in the tutorial, and the readings are those of the calibrated model.
 Objects of small mu are held harder than needed because the gauge tells little there.  The standard deviation of mu is
 the noise over the slope of the strain against mu, to a few percent in the median; the slope is 0.055 below mu = 0.17
 and 0.13 above 0.2, so that three deviations are up to half of mu at mu = 0.1.  Of 20 objects held by more than 1.3
-times the least force 18 would be with an errorless reading, too.  The mean of 16 readings with errors of their own has
+times the least force 13 would be with an errorless reading, too.  The mean of 16 readings with errors of their own has
 a quarter of the noise; the normal force that follows from it is counted as well.
 
 Each object is also held by 0.999 of the least force, under which the whole contact must slip.  Last, a tangential force
