@@ -42,7 +42,7 @@ from ._paper import columns
 from ._rows import Result, Row
 
 SEED = 20261126
-SECTIONS, SOLIDS = 81, 19
+SECTIONS, SOLIDS = 69, 15
 FINER = {"solid": 0.75, "section": 0.7}
 """Edge lengths of the truth over those of the press."""
 MOST_S = 60.0
