@@ -76,6 +76,7 @@ def test_a_number_that_is_given_is_kept() -> None:
     assert found.legs == model.legs
 
 
+@pytest.mark.slow
 def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
     """Within a factor 2 of the true one wherever that is above the noise; of 4 increments it is over 4 noises."""
     problem = build(steps(4).model())

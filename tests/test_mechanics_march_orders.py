@@ -59,7 +59,7 @@ def numbers(problem: Problem, count: int) -> np.ndarray:
     return np.array([measured[name] for name in NAMES])
 
 
-SLOW = ("at large deformation", "that slides")
+SLOW = ("at large deformation", "that slides", "that is released")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PRESSES])

@@ -16,7 +16,7 @@ from finger3d.cli import main
 
 COARSE = {
     "press": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
-    "gear": "mesh.mesher=swept mesh.size_mm=1.0 mesh.base_size_mm=4.0",
+    "gear": "mesh.mesher=swept mesh.size_mm=1.5 mesh.base_size_mm=5.0",
     "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
     "sensitivity": "mesh.size_mm=3.0 mesh.base_size_mm=10.0",
     "cost": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
