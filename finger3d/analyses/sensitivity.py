@@ -145,9 +145,7 @@ def sensitivity(
         if has_derivative(key, value, problem):
             try:
                 variations.append(varied(scene, problem, key))
-            except Finger3dError:  # dimensions that change the cells of the mesh
-                if not key.startswith("finger."):
-                    raise
+            except Finger3dError:  # such as dimensions that change the cells of the mesh; it is named with the result
                 continue
             keys[key] = value
     *_, (step, sides) = tangents(problem, variations)
@@ -201,13 +199,6 @@ def has_derivative(key: str, value: float, problem: Problem) -> bool:
     if key.endswith("turn_z_deg") and has_exact_path(problem.model):
         return False  # beside the path there are increments
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
-        return False
-    model, in_body = problem.model, key.startswith(("finger.", "material.", "parts."))
-    if model.object_compliance is not None and key != "material.E_MPa" and (in_body or key.startswith("object.")):
-        return False
-    if model.inclusions is not None and (in_body or key.startswith(("gauge.", "marker."))):
-        return False
-    if model.finite_strain and key.startswith("effects.embedded_gauge"):
         return False
     mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())
     return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)

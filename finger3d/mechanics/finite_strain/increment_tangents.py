@@ -31,17 +31,18 @@ from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, Part, rubbed
+from finger3d.mechanics.small_strain.increment_tangents import (
+    MOST,
+    IncrementTangents,
+    Part,
+    are_converged,
+    derivative_scale,
+    rubbed,
+    slopes,
+)
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
-
-_CHANGE, _ROUND_OFF, _MOST = 1e-8, 1e-5, 60
-"""Change of forces and displacements, over the largest, at which the iteration ends, that at which it may if it falls
-no further, and the largest number of iterations."""
-
-_NEGLIGIBLE = 1e-7
-"""Derivative by the parameter in units of its step, over the value, that errors are relative to at least."""
 
 
 @dataclass(frozen=True)
@@ -98,46 +99,39 @@ class FiniteIncrementTangents(IncrementTangents):
         """Return the sides after a part of an increment."""
         problem, contact, x = self.problem, part.after.contact, part.after.body.unknowns
         linear, active, size = part.linear, problem.system.active_dofs, steps[1::2]
-        p, n = len(size), problem.mesh.points.size
+        p, n, largest = len(size), problem.mesh.points.size, np.abs(contact.force).max(initial=0.0)
         workspace = FiniteStrainWorkspace()
         equations = [
             IncrementEquations(side.problem, self._body, side.state, move, workspace)
             for side, move in zip(sides, moves, strict=True)
         ]
 
-        def slope(values: Sequence[Float]) -> Float:
-            """Return the derivatives (k, p) of values (2 p, ...)."""
-            array = np.reshape(values, (2 * p, -1))
-            return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
-
         internal = np.zeros((len(x), p))  # of parameters that change the body
         for k, (one, bodies) in enumerate(zip(self._variations, self._bodies, strict=True)):
             if bodies is not None:
                 internal[:, k] = one.difference(*(body.internal_forces(x) for body in bodies))
-        direct = slope(rubbed(part, sides))
+        direct = slopes(rubbed(part, sides), steps)
         unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))
-        errors = [np.full(p, np.inf)] * 2
-        for _ in range(_MOST):
+        errors = list[Float]()
+        for _ in range(MOST):
             force = linear.active.forces @ unknowns + direct
             ends = [
                 _End.of(one, x + t * moved[:, k // 2], contact, t * force[:, k // 2].reshape(contact.force.shape))
                 for k, (one, t) in enumerate(zip(equations, steps, strict=True))
             ]
             unbalanced = linear.tangent @ moved + internal
-            unbalanced[:n] -= slope([end.nodal_forces for end in ends])
+            unbalanced[:n] -= slopes([end.nodal_forces for end in ends], steps)
             eliminated = linear.body.condensation.eliminated(-unbalanced)
-            relative = slope([end.relative for end in ends])
+            relative = slopes([end.relative for end in ends], steps)
             relative[active] += eliminated.displacement
             change = linear.active.correction(relative, unknowns)
             step = eliminated.unknowns(-(linear.active.forces @ change)[active])
             unknowns, moved = unknowns - change, moved + step
-            error = np.maximum(
-                _share(step[:n], moved[:n], np.abs(x[:n]).max() / size),
-                _share(change, unknowns, np.abs(contact.force).max(initial=0.0) / size),
-            )
-            if (error <= np.where(error > 0.5 * errors[-2], _ROUND_OFF, _CHANGE)).all():
+            scales = derivative_scale(moved[:n], np.abs(x[:n]).max(), size), derivative_scale(unknowns, largest, size)
+            both = zip((step[:n], change), scales, strict=True)
+            errors.append(np.max([np.abs(by).max(axis=0, initial=0.0) / scale for by, scale in both], axis=0))
+            if are_converged(errors):
                 return [end.side(side, self.formulation) for end, side in zip(ends, sides, strict=True)]
-            errors.append(error)
         raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
 
 
@@ -168,9 +162,3 @@ class _End:
         found = formulation.readings(problem, state)
         read = np.array([found[column] for column in problem.model.columns])
         return Side(problem, state, move.end, read, before.work_mJ + work, before.dissipation_mJ + lost)
-
-
-def _share(change: Float, whole: Float, value: Float) -> Float:
-    """Return the largest change (p,) over the largest derivative, or over the value by a step of the parameter."""
-    largest = np.maximum(np.abs(whole).max(axis=0, initial=0.0), _NEGLIGIBLE * value)
-    return np.asarray(np.abs(change).max(axis=0, initial=0.0) / np.where(largest > 0.0, largest, 1.0))

@@ -36,9 +36,12 @@ from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upri
 from finger3d.mechanics.small_strain.variations import Side, Variation
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
-_CHANGE, _ROUND_OFF, _MOST = 1e-7, 1e-5, 60
+_CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
 """Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
 and the largest number of iterations."""
+
+_NEGLIGIBLE = 1e-7
+"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
@@ -74,6 +77,7 @@ class _End:
         contact = replace(after.contact, force=after.contact.force + force)
         body, place = LinearBody(side.problem.delassus, np.zeros_like(after.body)), after.body + displacement
         increment = Increment(side.problem, side.state, move, body, DistanceTracker())
+        # as in the solution of the increment, whose geometry is linear under a flat object
         expansion_point = np.zeros_like(place) if side.problem.model.object.is_flat else place
         geometry = increment.geometry(expansion_point, np.inf)
         state = increment.reached(geometry, expansion_point, place, contact, None)
@@ -197,11 +201,6 @@ class IncrementTangents:
         delassus, size = self.problem.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
 
-        def slope(values: Sequence[Float]) -> Float:
-            """Return the derivatives (c d, p) of values (2 p, c, d)."""
-            array = np.reshape(values, (2 * p, c * d))
-            return np.asarray((array[1::2] - array[::2]).T / (2.0 * size))
-
         other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
         if any(one.body for one in self._variations):
             flat = self.problem.upright_force(contact)
@@ -209,10 +208,10 @@ class IncrementTangents:
             for k, one in enumerate(self._variations):
                 if one.body:
                     other[:, k : k + 1], readings[:, k : k + 1] = one.body.of(self.problem, field, flat.reshape(-1, 1))
-        direct = slope([upright(contact, friction) for friction in rubbed(part, sides)])
+        direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
         unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
-        errors = [np.full(p, np.inf)] * 2  # unknowns and directions are corrected in turn
-        for _ in range(_MOST):
+        errors = list[Float]()
+        for _ in range(MOST):
             fixed_basis = linear.forces @ unknowns + direct
             moved = delassus @ (fixed_basis + turned) + other
             force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
@@ -221,18 +220,38 @@ class IncrementTangents:
                 _End.of(side, move, part.after, t * force[k // 2], t * place[k // 2], t * readings[:, k // 2])
                 for k, (side, move, t) in enumerate(zip(sides, moves, steps, strict=True))
             ]
-            turns = slope([end.turned_force @ frame.T for end in ends])
-            change = linear.correction(slope([upright(contact, end.relative) for end in ends]), unknowns)
+            turns = slopes([end.turned_force @ frame.T for end in ends], steps)
+            change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
             error = np.abs(np.concatenate([change, turns - turned])).max(axis=0, initial=0.0)
             unknowns, turned = unknowns - change, turns
-            scale = np.maximum(np.abs(unknowns).max(axis=0, initial=0.0), 0.1 * _STEP * largest / size)
-            if (error <= np.where(error > 0.5 * errors[-2], _ROUND_OFF, _CHANGE) * scale).all():
+            errors.append(error / derivative_scale(unknowns, largest, size))
+            if are_converged(errors):
                 return [end.side for end in ends]
-            errors.append(error)
         raise Finger3dError(
             f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
             "abruptly where it touches"
         )
+
+
+def slopes(values: Sequence[Float], steps: Float) -> Float:
+    """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
+    array = np.reshape(values, (len(steps), -1))
+    return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))
+
+
+def derivative_scale(derivatives: Float, value: float, size: Float) -> Float:
+    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
+    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def are_converged(errors: Sequence[Float]) -> bool:
+    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
+
+    Unknowns and directions are corrected in turn, so that errors fall every second time.
+    """
+    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
+    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
