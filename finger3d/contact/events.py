@@ -51,6 +51,10 @@ _LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
 _JUMP = 1e-9
 """Share of the path that an increment over a jump begins with."""
 
+_MANY_JUMPS = 20
+"""Jumps on a path after which each increment over one begins ten times longer than the last: points that snap off one
+after the other, by the hundred with mu = 1e6 and nu = 0, would cost as many searches for the state after a jump."""
+
 
 @dataclass(frozen=True)
 class Resultant:
@@ -154,7 +158,8 @@ class _Path:
         self._limit = 1.0 + problem.friction
         self._first = STICK if problem.friction.any() else SLIP  # status of a point that touches
         self._touched = np.zeros(len(self.force), dtype=bool)  # points that touched last; the next do what these do
-        self._landed, self._stride = -1.0, _JUMP  # end and length of the last increment over a jump
+        # increments over jumps: their number, end and length of the last
+        self._jumps, self._landed, self._stride = 0, -1.0, _JUMP
 
     def followed(self) -> Outcome:
         """Go on to the end of the path, or to where it cannot be continued."""
@@ -363,7 +368,8 @@ class _Path:
         if self.resultant is not None:
             return Outcome.FORCE_JUMPS
         # one that follows at once is longer, else jumps in a row would go on in the smallest increments
-        stride = 10.0 * self._stride if self.share - self._landed <= self._stride else _JUMP
+        follows = self.share - self._landed <= self._stride or self._jumps > _MANY_JUMPS
+        stride = 10.0 * self._stride if follows else _JUMP
         while True:
             share = min(self.share + stride, 1.0)
             free = self._start + share * self._rate
@@ -379,7 +385,7 @@ class _Path:
         if not self._record(found.state.force, moved, found.state.status, 0.0, share):
             return Outcome.NO_CONVERGENCE
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
-        self._landed, self._stride = share, stride
+        self._landed, self._stride, self._jumps = share, stride, self._jumps + 1
         return Outcome.CONVERGED if share >= 1.0 else None
 
     def _touches(self, more: Resultant) -> bool:

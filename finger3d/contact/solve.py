@@ -42,7 +42,11 @@ _SMALL_STRAIN = _Limits(2000, (20, 50, 100, 200, 400, 800))
 _FINITE_STRAIN = _Limits(500, (20, 100))
 """At finite strain another linearisation, or half the increment, is cheaper than a long attempt."""
 
-_FRICTION_CAPS = (np.inf, 1e4, 1e3, 1e2)
+_QUICK_ROWS = 500
+"""Rows of the tableau up to which Lemke's method comes before the friction continuation in two dimensions, where its
+polygon is exact: where forces jump, the continuation mostly fails, after hundreds of Newton iterations."""
+
+_FRICTION_CAPS = (1e4, 1e3, 1e2)
 """Bounds of mu tried with Lemke's method: with mu = 1e6 round-off can spoil its pivots, and a smaller mu gives the
 same active set."""
 
@@ -119,6 +123,8 @@ def _attempts(
     else:
         yield "newton", accelerated_newton(problem, start, 30, damped=False)
         yield "damped", newton(problem, start, 60, damped=True)
+    if problem.free_motion.shape[1] == 2:  # a polygon of two directions is exact
+        yield "pivots", _lemke_start(problem, start, _QUICK_ROWS)
     yield "ramp", _friction_continuation(problem, start)
     yield "pivots", _lemke_start(problem, start, limits.lemke_rows)
     force = start
@@ -132,7 +138,7 @@ def _lemke_start(problem: ContactProblem, start: Float, rows: int) -> NewtonResu
     """Apply Newton's method from the active set of Lemke's method; points that then penetrate join, and it repeats."""
     spent = 0
     for cap in _FRICTION_CAPS:
-        if np.isfinite(cap) and problem.friction.max(initial=0.0) <= cap:
+        if cap < _FRICTION_CAPS[0] and problem.friction.max(initial=0.0) <= cap:
             continue
         capped = replace(problem, friction=np.minimum(problem.friction, cap))
         candidates = (problem.free_motion[:, 0] < 0.0) | (start[:, 0] > 0.0)
