@@ -115,10 +115,11 @@ def _scenes(package: Path) -> list[Path]:
 
 
 def _with_helpers(path: Path) -> list[Path]:
-    """A study's file and those beside it that it imports (``from ._name import``), and those that these import."""
+    """A study's file and those beside it that it imports, and those that these import."""
     found = [path]
     for file in found:
-        names = re.findall(r"^from \.(\w+) import", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        imports = re.findall(r"^from \.(\w*) import (.*)", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        names = [name for module, what in imports for name in ([module] if module else what.split(", "))]
         found += [p for n in names if (p := path.with_name(f"{n}.py")) not in found and p.is_file()]
     return found
 
