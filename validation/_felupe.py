@@ -20,8 +20,8 @@ def is_felupe_installed() -> bool:
     return hasattr(felupe, "ContactRigidPlane") and hasattr(felupe, "CutbackPlugin")
 
 
-def felupe_share(model: Model, mesh: Mesh, stiffer: float) -> float:
-    """Share of a press of a section in plane strain that FElupe has done when it ends.
+def felupe_press(model: Model, mesh: Mesh, stiffer: float = 1.0) -> tuple[float, float]:
+    """Press of a section in plane strain by FElupe: the share that it has done when it ends, and the normal force (N).
 
     Parameters
     ----------
@@ -62,7 +62,8 @@ def felupe_share(model: Model, mesh: Mesh, stiffer: float) -> float:
     except fem.NewtonConvergenceError:
         pass  # it gave up, which is what is measured
     done = [parts[-1] if parts else 0.0 for parts in cutback.load_factors[1:]]  # the first is the finger at rest
-    return float(sum(done)) / leg.steps
+    reaction = fem.tools.force(field, solid.assemble.vector(), boundaries["base"])[1]
+    return float(sum(done)) / leg.steps, 2.0 * model.design.width_mm * abs(float(reaction))
 
 
 def _nodes(mesh: Mesh, *faces: str) -> np.ndarray:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from numpy.typing import ArrayLike
 
 from finger3d._types import Tree
+from finger3d.errors import MissingError
 
 Kind = Literal["verification", "validation", "sensitivity", "statement"]
 Measure = Literal["relative", "absolute", "at most", "at least"]
@@ -150,3 +153,12 @@ def score(rows: Sequence[Row]) -> str:
             f"{sum(row.within for row in others)} of {len(others)} {'other ' if by_paper else ''}statements hold"
         )
     return ", ".join(parts)
+
+
+def committed(name: str) -> list[dict[str, str]]:
+    """Return the lines of the committed table of a study."""
+    path = Path(__file__).resolve().parent / "results" / f"{name}_table.csv"
+    if not path.is_file():
+        raise MissingError(f"there are no results of {name}; run python -m validation {name}")
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))

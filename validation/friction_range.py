@@ -15,7 +15,6 @@ results are judged.
 
 from __future__ import annotations
 
-import csv
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -29,17 +28,15 @@ from finger3d._types import Float
 from finger3d.analyses.calculix.deck import printed_forces, program, solve
 from finger3d.analyses.calculix.press import press_deck
 from finger3d.contact.friction import Coulomb
-from finger3d.errors import MissingError
 from finger3d.mechanics.model import Leg, Model
 
-from ._felupe import felupe_share, is_felupe_installed
+from ._felupe import felupe_press, is_felupe_installed
 from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, committed
 from .hard_cases import DEPTH, MU, finger
 
 STIFFER = 100.0
 LIMIT_S = 900.0
-RESULTS = Path(__file__).resolve().parent / "results"
 COLUMNS = "mu increments settled paper_settled calculix_share calculix_stiff_share felupe_share felupe_stiff_share"
 SHOWN = {  # pads, impratio, noslip_iterations of creep_of_a_hold
     "MuJoCo,\ndefault": ("box", 1.0, 0.0),
@@ -47,15 +44,6 @@ SHOWN = {  # pads, impratio, noslip_iterations of creep_of_a_hold
     "MuJoCo,\nnoslip 10": ("box", 1.0, 10.0),
     "MuJoCo, noslip\n10, ellipsoids": ("ellipsoid", 1.0, 10.0),
 }
-
-
-def committed(name: str) -> list[dict[str, str]]:
-    """Lines of the committed table of a study."""
-    path = RESULTS / f"{name}_table.csv"
-    if not path.is_file():
-        raise MissingError(f"friction_range: needs the results of {name}; run python -m validation {name}")
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
 
 
 def press(mu: float) -> Model:
@@ -80,7 +68,7 @@ def calculix_share(mu: float, stiffer: float) -> float:
 
 def _felupe_share(mu: float, stiffer: float) -> float:
     model = press(mu)
-    return felupe_share(model, press_deck(model).deck.mesh, stiffer)
+    return felupe_press(model, press_deck(model).deck.mesh, stiffer)[0]
 
 
 def run(quick: bool) -> Result:
