@@ -48,7 +48,6 @@ MU = (0.0, 1e-6, 0.06, 0.25, 1.0, 5.0, 1e6)
 STEPS = (1, 10, 200)
 SIZES = {2: (4.0, 0.6), 3: (6.0, 4.0)}
 LEGS = ("press", "slide", "release")
-JUMP = 1e-6  # of a leg
 COLUMNS = (
     "dim nu mu increments contact_points leg settled parts residual violation events iterations_median iterations_max "
     "fallback cut_back slipping paper_settled paper_wrong_way paper_cycled"
@@ -130,25 +129,28 @@ def violation(mu: float, before: ContactState, state: ContactState, change: np.n
     return max(float(np.max(lengths)) / DEPTH, float(np.max(forces)) / largest)
 
 
-def violation_on_path(problem: Problem, mu: float, start: StepResult | None, end: ObjectPose) -> tuple[float, int]:
+def violation_on_path(
+    problem: Problem, mu: float, start: StepResult | None, end: ObjectPose, steps: int
+) -> tuple[float, int]:
     """Largest violation at the events of a leg of a section, from forces and poses alone; and the number of events.
 
     Statuses at an event are those on the way from the one before, so that no point has just closed.  Only where forces
-    jump, an increment shorter than JUMP is solved; a point that slips in it and then sticks moves by the slip reported.
+    jump, an increment is solved; a point that slips in it and then sticks moves by the slip reported.
     """
     state = start.meshed_state if start else formulation_of(problem.model).start(problem)
     move, worst = Move(start.target if start else problem.origin, end), 0.0
-    path = solve_path(problem, state, move)
-    before, last, share = relative(problem, move.start, state.contact), state.contact, 0.0
+    path = solve_path(problem, state, move, shares=[k / steps for k in range(1, steps + 1)])
+    before, last = relative(problem, move.start, state.contact), state.contact
     for event in path.events:
         there = relative(problem, move.end if event.share == 1.0 else move.at(event.share), event.state)
         change = (there - before)[:, 1:]
-        if event.share - share < JUMP:
+        if event.is_increment:
             caught = (last.status == SLIP) & (event.state.status == STICK)
             rest = change - (event.state.accumulated_slip - last.accumulated_slip)
             change = np.where(caught[:, None], rest, change)
-        worst = max(worst, violation(mu, event.state, event.state, change, there[:, 0]))
-        before, last, share = there, event.state, event.share
+        begin = last if event.is_increment else event.state
+        worst = max(worst, violation(mu, begin, event.state, change, there[:, 0]))
+        before, last = there, event.state
     return worst if path.outcome.ok else np.inf, len(path.events)
 
 
@@ -172,7 +174,7 @@ def case(problem: Problem, mu: float, steps: int) -> Iterator[tuple[Any, ...]]:
         apart, events = 0.0, 0
         if problem.dim == 2 and len(found) >= (k + 1) * steps:
             start = found[k * steps - 1][0] if k else None
-            apart, events = violation_on_path(problem, mu, start, found[(k + 1) * steps - 1][0].target)
+            apart, events = violation_on_path(problem, mu, start, found[(k + 1) * steps - 1][0].target, steps)
         here, theirs = found[leg], outcomes[leg]
         frames = [f for f, _ in here]
         counts = [f.iterations / max(len(f.parts), 1) for f in frames] or [0]

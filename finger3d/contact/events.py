@@ -19,6 +19,8 @@ friction is large: forces then jump, and a short increment of the path is solved
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -30,7 +32,7 @@ from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
 from finger3d.contact.lemke import rates_start
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.contact.state import ContactSolution, ContactState, Event, next_state
 from finger3d.errors import Outcome
 
 _ZERO = 1e-13
@@ -75,25 +77,6 @@ class Resultant:
     largest: float
 
 
-class Event(NamedTuple):
-    """Event on a path.
-
-    Attributes
-    ----------
-    share : of the path
-    amplitude : of the motion under a prescribed resultant
-    state : at the event; the status of a point is the one on the way from the event before
-    residual : largest violation of the contact conditions since the event before, dimensionless
-    systems : number of systems of equations that were solved on the path so far
-    """
-
-    share: float
-    amplitude: float
-    state: ContactState
-    residual: float
-    systems: int
-
-
 class _ActiveSet(NamedTuple):
     """Status (c,), and direction of friction (c,) where points slip."""
 
@@ -112,7 +95,7 @@ class _Line(NamedTuple):
 
 
 def follow(
-    problem: ContactProblem, resultant: Resultant | None = None
+    problem: ContactProblem, resultant: Resultant | None = None, stops: Sequence[float] = ()
 ) -> tuple[ContactSolution[ContactState], list[Event]]:
     """Solve contact along the path of an increment, during which the free motion changes in proportion.
 
@@ -122,6 +105,9 @@ def follow(
         In two dimensions; its coefficients of friction are kept.
     resultant : Resultant, optional
         Its motion is added to that of the problem.
+    stops : sequence of float, optional
+        Shares of the path, in order, that no increment over a jump goes past: between events forces are linear, within
+        an increment they are not known.
 
     Returns
     -------
@@ -130,7 +116,7 @@ def follow(
     """
     if problem.refusal:
         return ContactSolution(problem.previous, problem.refusal, np.inf, 0, "none"), []
-    path = _Path(problem, resultant)
+    path = _Path(problem, resultant, stops)
     outcome = path.followed()
     state = path.state if outcome.ok else problem.previous
     return ContactSolution(state, outcome, path.residual, path.systems, "events"), path.events
@@ -144,10 +130,12 @@ class _Path:
     share, amplitude : reached
     force : (c, d) N
     displacement : (c, d) mm, gap, and tangential displacement since the start of the path
+    stops : shares that no increment over a jump goes past
     """
 
-    def __init__(self, problem: ContactProblem, resultant: Resultant | None) -> None:
+    def __init__(self, problem: ContactProblem, resultant: Resultant | None, stops: Sequence[float]) -> None:
         self.problem, self.resultant, self.state = problem, resultant, problem.previous
+        self.stops = [*stops, 1.0]
         self.share = self.amplitude = self.residual = 0.0
         self.systems, self.events = 0, list[Event]()
         self.force = self.state.force.copy()
@@ -351,7 +339,9 @@ class _Path:
         until = step * (1.0 + 1e-12)
         return step, touch <= until, (limit <= until) & (leave > until), leave <= until
 
-    def _record(self, force: Float, moved: Float, status: Status, amplitude: float, share: float) -> bool:
+    def _record(
+        self, force: Float, moved: Float, status: Status, amplitude: float, share: float, is_increment: bool = False
+    ) -> bool:
         """Keep a state if the contact conditions hold on the way to it; return whether they do."""
         part = np.column_stack([moved[:, 0], moved[:, 1] - self.displacement[:, 1]])
         error = residual(force, part, status, self.problem.friction, self.problem.length_scale)
@@ -360,7 +350,7 @@ class _Path:
             return False
         self.force, self.displacement, self.share, self.amplitude = force, moved, share, amplitude
         self.state = next_state(self.state, force, part, status)
-        self.events.append(Event(share, amplitude, self.state, error, self.systems))
+        self.events.append(Event(share, amplitude, self.state, error, self.systems, is_increment))
         return True
 
     def _jump(self) -> Outcome | None:
@@ -370,19 +360,20 @@ class _Path:
         # one that follows at once is longer, else jumps in a row would go on in the smallest increments
         follows = self.share - self._landed <= self._stride or self._jumps > _MANY_JUMPS
         stride = 10.0 * self._stride if follows else _JUMP
+        stop = self.stops[bisect_right(self.stops, self.share)]
         while True:
-            share = min(self.share + stride, 1.0)
+            share = min(self.share + stride, stop)
             free = self._start + share * self._rate
             free[:, 1] -= self.displacement[:, 1]
             found = solve_increment(replace(self.problem, previous=self.state, free_motion=free))
             self.systems += found.iterations
-            if found.outcome.ok or share >= 1.0:
+            if found.outcome.ok or share >= stop:
                 break
             stride *= 10.0
         if not found.outcome.ok:
             return found.outcome
         moved = self._through_body(found.state.force) + self._start + share * self._rate
-        if not self._record(found.state.force, moved, found.state.status, 0.0, share):
+        if not self._record(found.state.force, moved, found.state.status, 0.0, share, is_increment=True):
             return Outcome.NO_CONVERGENCE
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
         self._landed, self._stride, self._jumps = share, stride, self._jumps + 1

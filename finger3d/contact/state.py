@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +134,27 @@ class ContactSolution(Generic[S]):
     def with_state(self, state: T) -> ContactSolution[T]:
         """Return the solution with another state, such as that of contact and body."""
         return ContactSolution(state, self.outcome, self.residual, self.iterations, self.method, self.detail)
+
+
+class Event(NamedTuple):
+    """Event on a path in two dimensions, followed exactly.
+
+    Attributes
+    ----------
+    share : of the path
+    amplitude : of the motion under a prescribed resultant
+    state : at the event; the status of a point is the one on the way from the event before
+    residual : largest violation of the contact conditions since the event before, dimensionless
+    systems : number of systems of equations that were solved on the path so far
+    is_increment : whether an increment led here from the event before, in which forces jump
+    """
+
+    share: float
+    amplitude: float
+    state: ContactState
+    residual: float
+    systems: int
+    is_increment: bool = False
 
 
 def pressure(force: Float, area: Float | None) -> Float:

@@ -45,12 +45,14 @@ class Station:
     load : the forces to which depth and slides are found, if any is prescribed
     leg_end : pose at the end of the leg, by default that of the station
     share : of the leg that ends here
+    leg_shares : those of all stations of the leg
     """
 
     pose: ObjectPose
     load: Load | None = None
     leg_end: ObjectPose | None = None
     share: float = 1.0
+    leg_shares: tuple[float, ...] = (1.0,)
 
 
 def stations(legs: tuple[Leg, ...]) -> list[Station]:
@@ -60,10 +62,11 @@ def stations(legs: tuple[Leg, ...]) -> list[Station]:
     for leg in legs:
         count = leg.steps if isinstance(leg.steps, int) else AUTO_START
         end = leg.end(start)
-        poses = [Move(start, end).at(k / count) for k in range(1, count)] + [end]
-        for k, pose in enumerate(poses, 1):
-            load = Load(np.array(leg.forces, dtype=float), k / count, k == 1) if leg.is_under_force else None
-            out.append(Station(pose, load, end, k / count))
+        shares = tuple(k / count for k in range(1, count + 1))
+        for share in shares:
+            pose = Move(start, end).at(share) if share < 1.0 else end
+            load = Load(np.array(leg.forces, dtype=float), share, share == shares[0]) if leg.is_under_force else None
+            out.append(Station(pose, load, end, share, shares))
         start = end
     return out
 

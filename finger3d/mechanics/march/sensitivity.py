@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from finger3d.contact.events import Event
+from finger3d.contact.state import Event
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of

@@ -257,7 +257,7 @@ class Press:
         path, leg = self.path, (end, None if load is None else float(load.forces[0]))
         if path is None or self._leg != leg or self._share == 1.0:
             force = NormalForce(self._normal_force(self.state), leg[1], self._deepest) if leg[1] is not None else None
-            path = solve_path(self.problem, self.state, Move(self.pose, end), force)
+            path = solve_path(self.problem, self.state, Move(self.pose, end), force, station.leg_shares)
             self.path, self._leg, self._share = path, leg, 0.0
         there = path.between(self._share, station.share)
         self._share = station.share

@@ -10,9 +10,9 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.events import Event, Resultant, follow
+from finger3d.contact.events import Resultant, follow
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import ContactSolution, ContactState, Event
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry
@@ -148,10 +148,17 @@ def has_exact_path(model: Model) -> bool:
     )
 
 
-def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalForce | None = None) -> ExactPath:
+def solve_path(
+    problem: Problem,
+    state: State[Float],
+    move: Move,
+    force: NormalForce | None = None,
+    shares: Sequence[float] = (),
+) -> ExactPath:
     """Follow the path on which the object moves straight from one pose to another.
 
-    Under a prescribed force the depth at the end of the move is not used.
+    Under a prescribed force the depth at the end of the move is not used.  Where forces jump, states are those of
+    increments, none of which goes past one of the shares of the path at which results are wanted.
     """
     if force is not None:
         move = Move(move.start, replace(move.end, depth_mm=move.start.depth_mm))
@@ -190,7 +197,7 @@ def solve_path(problem: Problem, state: State[Float], move: Move, force: NormalF
             motion=deeper - free,
             largest=force.largest_depth_mm - move.start.depth_mm,
         )
-    found, events = follow(contact, resultant)
+    found, events = follow(contact, resultant, shares)
     detail = found.detail
     if found.outcome is Outcome.EVENTS:
         detail = _place_of_change(problem, events)

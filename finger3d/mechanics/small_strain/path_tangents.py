@@ -27,9 +27,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.contact.events import Event
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.state import ContactState
+from finger3d.contact.state import ContactState, Event
 from finger3d.errors import Finger3dError
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
@@ -40,8 +39,8 @@ from finger3d.objects import Move, ObjectPose, vertical_frame
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
 
-_JUMP, _JUMPED = 1e-8, 1e-6
-"""Share of the path in which forces jump, and by how much they do so at least, over the largest at its end."""
+_JUMPED = 1e-6
+"""Change of the forces in an increment over a jump, over the largest at the end of the path."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +179,7 @@ class PathTangents:
         if way <= _SAME_PLACE:
             return self._at_touch(event, last) if event.amplitude > before.amplitude else last
         force, moved = event.state.force - before.state.force, _relative(event.state) - _relative(before.state)
-        if way <= _JUMP and np.abs(force).max() > _JUMPED * np.abs(self.path.events[-1].state.force).max():
+        if event.is_increment and np.abs(force).max() > _JUMPED * np.abs(self.path.events[-1].state.force).max():
             raise Finger3dError("the forces jump on the path of this press, and have no derivatives there")
         found = self._solved(piece, event)
         if piece + 1 == len(self.path.events):
