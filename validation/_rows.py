@@ -83,16 +83,17 @@ class Settled(NamedTuple):
 
     converged: int
     increments: int
-    residual: float
+    residual: float | None
 
     def __str__(self) -> str:
-        return f"{self.converged} of {self.increments} increments settle, largest residual {self.residual:.1e}"
+        largest = "" if self.residual is None else f", largest residual {self.residual:.1e}"
+        return f"{self.converged} of {self.increments} increments settle{largest}"
 
 
 def settled(counts: Sequence[Settled]) -> Settled:
     """Return the sum over several studies or parts of one."""
     converged, increments, residuals = zip(*counts, strict=True)
-    return Settled(sum(converged), sum(increments), max(residuals))
+    return Settled(sum(converged), sum(increments), None if None in residuals else max(residuals))
 
 
 @dataclass(frozen=True)

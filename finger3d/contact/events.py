@@ -50,8 +50,8 @@ _TOGETHER, _ONE_BY_ONE = 12, 60
 _LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
 """Largest number of events: a constant, and one for each contact point."""
 
-_JUMP = 1e-9
-"""Share of the path that an increment over a jump begins with."""
+_STRIDES = tuple(10.0**k for k in range(-9, 1))
+"""Shares of the path that an increment over a jump is tried with, until there is a solution."""
 
 _MANY_JUMPS = 20
 """Jumps on a path after which each increment over one begins ten times longer than the last: points that snap off one
@@ -147,7 +147,7 @@ class _Path:
         self._first = STICK if problem.friction.any() else SLIP  # status of a point that touches
         self._touched = np.zeros(len(self.force), dtype=bool)  # points that touched last; the next do what these do
         # increments over jumps: their number, end and length of the last
-        self._jumps, self._landed, self._stride = 0, -1.0, _JUMP
+        self._jumps, self._landed, self._stride = 0, -1.0, 0.0
 
     def followed(self) -> Outcome:
         """Go on to the end of the path, or to where it cannot be continued."""
@@ -299,8 +299,8 @@ class _Path:
         if more is not None:
             moved = moved + amplitude * more.motion
         moved[(status != OPEN) | touch, 0] = 0.0
-        if not self._record(force, moved, status, amplitude, share):
-            return Outcome.NO_CONVERGENCE
+        if not self._record(force, moved, status, amplitude, share):  # rates without bound, but for round-off
+            return self._jump() if more is None else Outcome.NO_CONVERGENCE
         if too_far:
             return Outcome.FORCE_NOT_REACHED
         into = status.copy()
@@ -345,9 +345,9 @@ class _Path:
         """Keep a state if the contact conditions hold on the way to it; return whether they do."""
         part = np.column_stack([moved[:, 0], moved[:, 1] - self.displacement[:, 1]])
         error = residual(force, part, status, self.problem.friction, self.problem.length_scale)
-        self.residual = max(self.residual, error)
         if error > TOLERANCE:
             return False
+        self.residual = max(self.residual, error)
         self.force, self.displacement, self.share, self.amplitude = force, moved, share, amplitude
         self.state = next_state(self.state, force, part, status)
         self.events.append(Event(share, amplitude, self.state, error, self.systems, is_increment))
@@ -359,24 +359,22 @@ class _Path:
             return Outcome.FORCE_JUMPS
         # one that follows at once is longer, else jumps in a row would go on in the smallest increments
         follows = self.share - self._landed <= self._stride or self._jumps > _MANY_JUMPS
-        stride = 10.0 * self._stride if follows else _JUMP
+        first = 10.0 * self._stride if follows else _STRIDES[0]
         stop = self.stops[bisect_right(self.stops, self.share)]
-        while True:
-            share = min(self.share + stride, stop)
+        for share in dict.fromkeys(min(self.share + stride, stop) for stride in (first, *_STRIDES)):
             free = self._start + share * self._rate
             free[:, 1] -= self.displacement[:, 1]
             found = solve_increment(replace(self.problem, previous=self.state, free_motion=free))
             self.systems += found.iterations
-            if found.outcome.ok or share >= stop:
+            if found.outcome.ok:
                 break
-            stride *= 10.0
-        if not found.outcome.ok:
+        else:
             return found.outcome
+        self._jumps, self._landed, self._stride = self._jumps + 1, share, share - self.share
         moved = self._through_body(found.state.force) + self._start + share * self._rate
         if not self._record(found.state.force, moved, found.state.status, 0.0, share, is_increment=True):
             return Outcome.NO_CONVERGENCE
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
-        self._landed, self._stride, self._jumps = share, stride, self._jumps + 1
         return Outcome.CONVERGED if share >= 1.0 else None
 
     def _touches(self, more: Resultant) -> bool:

@@ -42,7 +42,7 @@ _SMALL_STRAIN = _Limits(2000, (20, 50, 100, 200, 400, 800))
 _FINITE_STRAIN = _Limits(500, (20, 100))
 """At finite strain another linearisation, or half the increment, is cheaper than a long attempt."""
 
-_QUICK_ROWS = 500
+_QUICK_ROWS = 700
 """Rows of the tableau up to which Lemke's method comes before the friction continuation in two dimensions, where its
 polygon is exact: where forces jump, the continuation mostly fails, after hundreds of Newton iterations."""
 
