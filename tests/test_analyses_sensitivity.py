@@ -28,6 +28,21 @@ def test_derivatives_of_scene_keys_are_those_of_presses() -> None:
         assert slopes[key] == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=1e-5)
 
 
+def test_moduli_times_and_durations_of_a_viscous_press_have_derivatives() -> None:
+    slow = {
+        "effects": {"viscosity": {"prony": [[0.3, 0.5]]}},
+        "press": {"depth_mm": 4.0, "steps": 3, "duration_s": 1.0},
+    }
+    given = scene(**SECTION | slow)
+    found = finger3d.sensitivity(given, ["normal_force_N"])
+    for key in ("effects.viscosity.prony.0.0", "effects.viscosity.prony.0.1", "press.duration_s"):
+        ends = [
+            finger3d.press(given, error=False, overrides=[f"{key}={found.keys[key] + h!r}"]).last.normal_force_N
+            for h in (-1e-5, 1e-5)
+        ]
+        assert found.derivatives["normal_force_N"][key] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-5)
+
+
 def test_at_the_bound_of_a_key_the_derivative_is_one_sided() -> None:
     found = finger3d.sensitivity(scene(**SECTION | {"material": {"E_MPa": 1.0, "nu": 0.5}}), ["normal_force_N"])
     near = finger3d.sensitivity(scene(**SECTION | {"material": {"E_MPa": 1.0, "nu": 0.4999}}), ["normal_force_N"])

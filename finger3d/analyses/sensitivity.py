@@ -28,6 +28,7 @@ _KEYS = re.compile(
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
     r"|effects\.(elastic_object\.E_MPa|embedded_gauge\.(E_MPa|thickness_mm)|kinetic_friction\.ratio)"
+    r"|press\.(leg\.\d+\.)?duration_s|effects\.viscosity\.prony\.\d+\.[01]"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
 
@@ -198,6 +199,8 @@ def has_derivative(key: str, value: float, problem: Problem) -> bool:
         return False
     if key.endswith("turn_z_deg") and has_exact_path(problem.model):
         return False  # beside the path there are increments
+    if key.endswith("duration_s") and problem.model.relaxation is None:
+        return False
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
         return False
     mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())

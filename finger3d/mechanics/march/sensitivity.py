@@ -1,7 +1,7 @@
 """Derivatives of the numbers of a press by its parameters.
 
 Along an exact path they are those of its events (`finger3d.mechanics.small_strain.path_tangents`), else those of its
-increments (`finger3d.mechanics.small_strain.increment_tangents` and
+increments (`finger3d.mechanics.small_strain.increment_tangents`, `finger3d.mechanics.small_strain.viscous_tangents` and
 `finger3d.mechanics.finite_strain.increment_tangents`).
 """
 
@@ -32,6 +32,7 @@ from finger3d.mechanics.small_strain.path_tangents import (
     moved_pose,
 )
 from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
 """Numbers of an increment that have no derivative."""
@@ -42,8 +43,8 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if model.relaxation is not None:
-        return "derivatives are not known with viscosity"
+    if model.relaxation is not None and model.finite_strain:
+        return "derivatives are not known at large deformation with viscosity"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""
@@ -87,7 +88,8 @@ def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Iterato
 
 def _increment_tangents(problem: Problem, variations: Sequence[Variation]) -> IncrementTangents:
     if not problem.model.finite_strain:
-        return IncrementTangents(problem, variations)
+        viscous = problem.model.relaxation is not None
+        return ViscousTangents(problem, variations) if viscous else IncrementTangents(problem, variations)
     from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
 
     return FiniteIncrementTangents(problem, variations)

@@ -31,7 +31,7 @@ _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
 
 _IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
-_CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions")
+_CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
 
 
@@ -196,8 +196,8 @@ def _of_foils(problem: Problem, low: Model, high: Model, step: float) -> Complia
     assert high.inclusions is not None
     stiff = [foils.E_MPa * foils.thickness_mm for foils in (own, low.inclusions, high.inclusions)]
     same = all(replace(own, E_MPa=m.E_MPa, thickness_mm=m.thickness_mm) == m for m in (low.inclusions, high.inclusions))
-    if not same or problem.model.finite_strain:
-        raise Finger3dError("it changes the foils in their plane, or at large deformation")
+    if not same or not problem.model.is_linear_elastic:
+        raise Finger3dError("it changes the foils in their plane, at large deformation or with viscosity")
     springs, system = problem.inclusions.bar_stiffness, problem.system
     loads = stiffened(problem.body.condensed.compliance, springs)[:, -len(springs) :]
     change = -(stiff[2] - stiff[1]) / (2.0 * step * stiff[0]) * (loads * springs) @ loads.T
