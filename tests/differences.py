@@ -70,7 +70,10 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
 
 def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[list[StepResult], list[list[Numbers]]]:
     """All increments of a press, and the derivatives of their numbers by each parameter."""
-    found = [(step, derivatives(step, variations, sides)) for step, sides in tangents(problem, variations)]
+    found = list[tuple[StepResult, list[Numbers]]]()
+    for step, falling, growing in tangents(problem, variations):
+        assert falling is growing  # no kink
+        found.append((step, derivatives(step, variations, growing)))
     return [step for step, _ in found], [slopes for _, slopes in found]
 
 

@@ -31,6 +31,7 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.mechanics.small_strain.variations import Side, Variation
@@ -117,28 +118,63 @@ class IncrementTangents:
         self._stations = [stations(end.model.legs) for end in ends]
         self._state, self._pose, self._number = self.formulation.start(problem), problem.origin, 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
+        self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
+        self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
 
-    def advance(self, step: StepResult) -> list[Side]:
+    def advance(self, step: StepResult, way: int = 0) -> Sides:
         """Return the sides at the end of the next increment, which has this result.
+
+        At a kink they are those of falling (`way` -1) or growing (1) parameters, or those of its own active set (0).
 
         Raises
         ------
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
+        sides, (here, length) = self._sides(self._parts(step), step), self._end(step)
+        if way and is_kink(here, length):
+
+            def solved(status: Status) -> tuple[list[Side], list[End]]:
+                found = self._sides(self._parts(step, status), step)
+                befores = zip(self._last, found, strict=True)
+                ends = [
+                    End(before.state.contact, side.state.contact, _coefficients(before, status))
+                    for before, side in befores
+                ]
+                return found, ends
+
+            chosen = one_sided(here, length, solved, way)
+            self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
+            sides = [own or side for own, side in zip(chosen, sides, strict=True)]
+        self.sides = sides
+        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
+        return [None if unknown else side for unknown, side in zip(self._is_unknown, sides, strict=True)]
+
+    def is_at_kink(self, step: StepResult) -> bool:
+        """Whether the next increment, which has this result, ends as a point is about to change its status."""
+        return is_kink(*self._end(step))
+
+    def _end(self, step: StepResult) -> tuple[End, float]:
+        """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
+        states = [self._state, *(after for _, after in step.parts)]
+        before, contact = self._begun(self.problem)._replace(state=states[-2]), states[-1].contact
+        friction = _coefficients(before, contact.status)
+        return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
+
+    def _sides(self, parts: Sequence[Part], step: StepResult) -> list[Side]:
         targets = [own[self._number] for own in self._stations]
-        parts, poses = self._parts(step), self._poses(targets)
+        poses = self._poses(targets)
         if any(target.load for target in targets):
             poses = self._in_equilibrium(step, parts, targets, poses)
-        self.sides = self._through(parts, self.sides, self._steps, poses)
-        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
-        return self.sides
+        return self._through(parts, self.sides, self._steps, poses)
 
-    def _parts(self, step: StepResult) -> list[Part]:
-        """Return the parts of an increment, linearised."""
+    def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
+        """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
         whole, parts = Move(self._pose, step.target).change, list[Part]()
         before, start = self._state, 0.0
         for pose, after in step.parts:
+            if status is not None and after is step.parts[-1][1]:
+                after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
                 linear = self._linearised(before, after, Move(self._pose, pose))
@@ -232,6 +268,7 @@ class IncrementTangents:
         """Return the sides after all parts of an increment, which ends in these poses."""
         moves = [Move(side.pose, pose) for side, pose in zip(sides, poses, strict=True)]
         for part in parts:
+            self._last = sides
             sides = self._after(part, sides, steps, [Move(move.at(part.start), move.at(part.end)) for move in moves])
         return list(sides)
 
