@@ -98,7 +98,7 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
     active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
     if not any(one.body for one in variations):
         return [None] * len(variations)
-    unknowns = problem.body.condensed.unknowns(np.eye(count, len(active)))
+    unknowns = problem.unknowns_of_rows(np.eye(count, len(active)))
     force = np.zeros((problem.surface.points.size, len(active)))
     force[active, np.arange(len(active))] = 1.0
 
