@@ -49,7 +49,18 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
     for name in ("radius_mm", "edge_height_mm", "width_mm"):
         if hasattr(model.design, name) and not isinstance(getattr(type(model.design), name, None), property):
             found[name] = with_dimension(model, name)
+    if (slow := model.relaxation) is not None:
+        for k, (g, tau) in enumerate(slow.prony):
+            for name, one in (
+                ("g", lambda h, g=g, tau=tau: (g + h, tau)),
+                ("tau", lambda h, g=g, tau=tau: (g, tau + h)),
+            ):
+                found[f"{name} {k}"] = lambda h, k=k, one=one: replace(
+                    model, relaxation=replace(slow, prony=(*slow.prony[:k], one(h), *slow.prony[k + 1 :]))
+                )
     for number, leg in enumerate(model.legs):
+        if slow is not None:
+            found[f"duration {number}"] = with_leg(model, number, "duration_s")
         found[f"goal {number}"] = with_leg(model, number, "depth_mm" if leg.force_N is None else "force_N")
         for name in ("slide_x_mm", "force_x_N", "force_z_N", "turn_y", "turn_z"):
             if getattr(leg, name):
@@ -59,7 +70,10 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
 
 def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[list[StepResult], list[list[Numbers]]]:
     """All increments of a press, and the derivatives of their numbers by each parameter."""
-    found = [(step, derivatives(step, variations, sides)) for step, sides in tangents(problem, variations)]
+    found = list[tuple[StepResult, list[Numbers]]]()
+    for step, falling, growing in tangents(problem, variations):
+        assert falling is growing  # no kink
+        found.append((step, derivatives(step, variations, growing)))
     return [step for step, _ in found], [slopes for _, slopes in found]
 
 

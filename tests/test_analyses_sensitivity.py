@@ -14,6 +14,15 @@ SECTION = {
     "friction": {"mu": 0.4},
 }
 
+HELD = {"depth_mm": 4.0, "steps": 1, "duration_s": 1.0}
+HOLD = {
+    "press": {"leg": [HELD, HELD]},
+    "friction": {"mu": 0.2},
+    "mesh": {"size_mm": 6.0, "base_size_mm": 15.0},
+    "effects": {"viscosity": {"prony": [[0.3, 0.5]]}},
+}
+"""A viscous finger that is held at the end, as points that slipped rest at their friction limit."""
+
 
 def test_derivatives_of_scene_keys_are_those_of_presses() -> None:
     given = scene(**SECTION)
@@ -26,6 +35,33 @@ def test_derivatives_of_scene_keys_are_those_of_presses() -> None:
             for h in (-step, step)
         ]
         assert slopes[key] == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=1e-5)
+
+
+def test_moduli_times_and_durations_of_a_viscous_press_have_derivatives() -> None:
+    slow = {
+        "effects": {"viscosity": {"prony": [[0.3, 0.5]]}},
+        "press": {"depth_mm": 4.0, "steps": 3, "duration_s": 1.0},
+    }
+    given = scene(**SECTION | slow)
+    found = finger3d.sensitivity(given, ["normal_force_N"])
+    for key in ("effects.viscosity.prony.0.0", "effects.viscosity.prony.0.1", "press.duration_s"):
+        ends = [
+            finger3d.press(given, error=False, overrides=[f"{key}={found.keys[key] + h!r}"]).last.normal_force_N
+            for h in (-1e-5, 1e-5)
+        ]
+        assert found.derivatives["normal_force_N"][key] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-5)
+
+
+def test_at_a_kink_both_derivatives_are_told() -> None:
+    given = scene(**SECTION | HOLD)
+    found = finger3d.sensitivity(given, ["gauge_g36"])
+    key = "press.leg.1.depth_mm"
+    growing, falling = found.derivatives["gauge_g36"], found.falling["gauge_g36"]
+    assert abs(growing[key] - falling[key]) > 1e-3 * abs(growing[key])
+    assert "material.nu" not in falling
+    row = next(row for row in found.rows() if row["key"] == key)
+    assert (row["derivative"], row["derivative_falling"]) == (growing[key], falling[key])
+    assert finger3d.press(given).derivatives("gauge_g36", falling=True) == {**growing, **falling}
 
 
 def test_at_the_bound_of_a_key_the_derivative_is_one_sided() -> None:

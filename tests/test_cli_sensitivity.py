@@ -9,6 +9,7 @@ import pytest
 
 from finger3d.cli import main
 from tests.sensor_cases import scene
+from tests.test_analyses_sensitivity import HOLD
 
 SECTION = {
     "model": {"domain": "plane-strain"},
@@ -27,6 +28,18 @@ def test_the_command_writes_table_json_and_figure(tmp_path: Path, capsys: pytest
     assert set(found["derivatives"]) == {"gauge_g36", "stick_area_mm2"}
     assert found["tolerances"]["press.depth_mm"] == 0.1
     assert {p.name for p in out.iterdir()} >= {"sensitivity.csv", "sensitivity.png"}
+
+
+def test_at_a_kink_the_table_has_both_derivatives(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "scene.toml"
+    file.write_text(scene(**SECTION | HOLD).to_toml(), encoding="utf-8")
+    out = tmp_path / "out"
+    assert main(["sensitivity", str(file), "--of", "gauge_g36", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "derivative_falling" in printed
+    assert "ends at a kink" in printed
+    found = json.loads((out / "sensitivity.json").read_text())
+    assert "press.leg.1.depth_mm" in found["derivatives_falling"]["gauge_g36"]
 
 
 @pytest.mark.parametrize(

@@ -127,8 +127,10 @@ class PressResult:
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
         return pandas.DataFrame(history_table(self.history.points, self.history.steps))
 
-    def derivatives(self, number: str) -> dict[str, float]:
+    def derivatives(self, number: str, falling: bool = False) -> dict[str, float]:
         """Return the derivatives of a number at the end of the press by the keys of its scene, per unit of each key.
+
+        They hold as keys grow, or as they fall; both differ where the press ends at a kink.
 
         Raises
         ------
@@ -137,7 +139,8 @@ class PressResult:
         """
         from finger3d.analyses.sensitivity import sensitivity  # a press needs none of it
 
-        return dict(sensitivity(self._numbers["scene"], [number]).derivatives[number])
+        found = sensitivity(self._numbers["scene"], [number])
+        return {**found.derivatives[number], **(found.falling.get(number, {}) if falling else {})}
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction, its limit and the zones of stick and slip along x in the last good increment."""

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.free_keys import scene_with
@@ -27,7 +29,8 @@ _KEYS = re.compile(
     r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
-    r"|effects\.(elastic_object\.E_MPa|embedded_gauge\.(E_MPa|thickness_mm)|kinetic_friction\.ratio)"
+    r"|effects\.(elastic_object\.(E_MPa|nu)|embedded_gauge\.(E_MPa|thickness_mm|width_mm)|kinetic_friction\.ratio)"
+    r"|press\.(leg\.\d+\.)?duration_s|effects\.viscosity\.prony\.\d+\.[01]"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
 
@@ -45,6 +48,9 @@ _STEP, _NU_STEP, _LEAST = 1e-6, 1e-5, 0.1
 """Step of central differences over the value, or over `_LEAST` if that is larger; that of nu is larger, since the bulk
 modulus is bounded at nu = 0.5."""
 
+_SAME = 1e-6
+"""Relative difference of the derivatives as a key falls and grows that is none."""
+
 _PERCENT = 0.01
 """Relative change of a key without a tolerance that the figure shows the effect of."""
 
@@ -59,7 +65,8 @@ class Sensitivity:
     numbers : values of the numbers by name
     keys : values of the keys
     tolerances : standard deviations of those keys that have one (`finger3d.analyses.calibrate.tolerance_table`)
-    derivatives : of each number by each key, per unit of the key
+    derivatives : of each number by each key, per unit of the key, as the key grows
+    falling : the same as the key falls, for those that differ, since the press ends at a kink
     without : keys of the scene that have no derivative, since they change the mesh or the object
     """
 
@@ -68,6 +75,7 @@ class Sensitivity:
     keys: Mapping[str, float]
     tolerances: Mapping[str, float]
     derivatives: Mapping[str, Mapping[str, float]]
+    falling: Mapping[str, Mapping[str, float]]
     without: tuple[str, ...]
 
     def change(self, key: str) -> float:
@@ -82,6 +90,7 @@ class Sensitivity:
             "keys": dict(self.keys),
             "tolerances": dict(self.tolerances),
             "derivatives": {name: dict(row) for name, row in self.derivatives.items()},
+            "derivatives_falling": {name: dict(row) for name, row in self.falling.items()},
             "without_derivative": list(self.without),
         }
 
@@ -93,11 +102,14 @@ class Sensitivity:
                 "key": key,
                 "value": self.keys[key],
                 "derivative": slope,
+                "derivative_falling": self.falling.get(name, {}).get(key, slope),
                 "change": self.change(key),
                 "effect": slope * self.change(key),
             }
             for name, by_key in self.derivatives.items()
-            for key, slope in sorted(by_key.items(), key=lambda item: -abs(item[1] * self.change(item[0])))
+            for key, slope in sorted(
+                by_key.items(), key=lambda item: -abs(np.nan_to_num(item[1]) * self.change(item[0]))
+            )
         ]
 
 
@@ -148,10 +160,13 @@ def sensitivity(
             except Finger3dError:  # such as dimensions that change the cells of the mesh; it is named with the result
                 continue
             keys[key] = value
-    *_, (step, sides) = tangents(problem, variations)
+    *_, (step, *both) = tangents(problem, variations)
     values = table_row(problem.points, step)
     numbers = {name: values[name] for name in tuple(of) or names}
-    found = _result(scene, keys, numbers, derivatives(step, variations, sides))
+    falling = growing = derivatives(step, variations, both[0])
+    if both[1] is not both[0]:
+        falling, growing = (derivatives(step, variations, sides, way) for sides, way in zip(both, (-1, 1), strict=True))
+    found = _result(scene, keys, numbers, (falling, growing))
     if out is not None:
         _write(Path(out), found)
     return found
@@ -198,17 +213,28 @@ def has_derivative(key: str, value: float, problem: Problem) -> bool:
         return False
     if key.endswith("turn_z_deg") and has_exact_path(problem.model):
         return False  # beside the path there are increments
+    if key.endswith("duration_s") and problem.model.relaxation is None:
+        return False
     if key.startswith("object.") and (has_exact_path(problem.model) or flat):
         return False
     mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())
     return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)
 
 
-def _result(scene: Scene, keys: Mapping[str, float], numbers: Numbers, rows: Sequence[Numbers]) -> Sensitivity:
-    """Return the derivatives (k,) of the last increment with the names of gauges and markers in place of numbers."""
+def _result(
+    scene: Scene, keys: Mapping[str, float], numbers: Numbers, both: tuple[Sequence[Numbers], Sequence[Numbers]]
+) -> Sensitivity:
+    """Return the derivatives (k,) as keys fall and grow with the names of gauges and markers in place of numbers."""
     given = scene.as_dict()
     titles = {key: _named(key, given) for key in keys}
-    slopes = {name: {titles[key]: row[name] for key, row in zip(keys, rows, strict=True)} for name in numbers}
+    falling, growing = (
+        {name: {titles[key]: row.get(name, np.nan) for key, row in zip(keys, rows, strict=True)} for name in numbers}
+        for rows in both
+    )
+    kinks = {
+        name: {key: slope for key, slope in row.items() if not _is_close(slope, growing[name][key])}
+        for name, row in falling.items()
+    }
     tolerances = {titles[key]: sd for key, value in keys.items() if (sd := _tolerance(key, value)) is not None}
     without = [_named(key, given) for key, _ in _numbers_of(given) if key not in keys]
     skipped = ("mesh.", "contact.", "effects.")
@@ -217,9 +243,14 @@ def _result(scene: Scene, keys: Mapping[str, float], numbers: Numbers, rows: Seq
         numbers=numbers,
         keys={titles[key]: value for key, value in keys.items()},
         tolerances=tolerances,
-        derivatives=slopes,
+        derivatives=growing,
+        falling={name: row for name, row in kinks.items() if row},
         without=tuple(key for key in without if not key.startswith(skipped)),
     )
+
+
+def _is_close(one: float, other: float) -> bool:
+    return abs(one - other) <= _SAME * max(abs(one), abs(other))
 
 
 def _named(key: str, given: TreeView) -> str:

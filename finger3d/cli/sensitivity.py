@@ -37,9 +37,19 @@ def sensitivity(
     if json_:
         print_json(found.as_dict())
         return
-    head = ["number", "key", "value", "derivative", "change", "effect"]
+    head = [
+        "number",
+        "key",
+        "value",
+        "derivative",
+        *(["derivative_falling"] if found.falling else []),
+        "change",
+        "effect",
+    ]
     print_columns(head, [[_text(row[name]) for name in head] for row in found.rows()])
     print("change: standard deviation of the key in a careful set-up where one is known, else 1 % of its value")
+    if found.falling:
+        print("the press ends at a kink, so that some derivatives differ as the key grows and as it falls")
     if found.without:
         print(f"keys without a derivative, since they change mesh, object or symmetry: {', '.join(found.without)}")
     print(f"results: {out}")

@@ -214,8 +214,10 @@ class Simulation:
             return None
         try:
             variations = [varied(scene, problem, key) for key in keys]
-            rows = [derivatives(step, variations, sides) for step, sides in tangents(problem, variations)]
+            rows = [derivatives(step, variations, sides) for step, _, sides in tangents(problem, variations)]
         except Finger3dError:  # forces that jump have no derivatives; differences of presses have
+            return None
+        if not all(all(row) for row in rows):  # of a side of a kink that is not known
             return None
         return [{n: np.array([0.0, *(row[k][n] for row in rows)]) for n in rows[0][k]} for k in range(len(keys))]
 

@@ -84,9 +84,9 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     active = active_dofs(candidates, axes)
     count = len(model.columns)
     check_rows(len(active), count)
-    bars = _bars(model, mesh, axes)
+    bars = bars_of(model, mesh, axes)
     contact_part = local_rows(candidates, vertical_frame(mesh.dim))[active]
-    readings = _readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, report)
+    readings = rows_of_readings(model, MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic)), bars, report)
     rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
     report.say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
@@ -120,7 +120,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     return with_elastic_object(with_bars(problem, bars) if bars else problem, report)
 
 
-def _bars(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
+def bars_of(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
     """Return the bars of the model's inclusions, if there are any."""
     if model.inclusions is None:
         return None
@@ -203,8 +203,10 @@ def mesh_part(
     return locally_refined(model, mesh, mesh_report, axes)
 
 
-def _readings(model: Model, body: MeshedBody, bars: EmbeddedBars | None, report: Progress) -> list[sp.csr_matrix]:
-    """Rows of the readings, and of the bars if there are any."""
+def rows_of_readings(
+    model: Model, body: MeshedBody, bars: EmbeddedBars | None, report: Progress = QUIET
+) -> list[sp.csr_matrix]:
+    """Return the rows of the readings, and of the bars if there are any."""
     if len(model.readings) >= _MANY_READINGS:
         report.say(f"placing {len(model.readings)} gauges, markers and taxels")
     if not bars:

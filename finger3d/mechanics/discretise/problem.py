@@ -255,16 +255,16 @@ class Problem:
 
     def unknowns(self, force: Float) -> Float:
         """All unknowns (N,) of the part's body under contact forces (c, d)."""
-        return self._unknowns(self.row_forces(force))
+        return self.unknowns_of_rows(self.row_forces(force))
 
     def unknowns_of(self, forces: Sequence[Float], block: int = _AT_ONCE) -> Iterator[Float]:
         """All unknowns (N,) for each of several forces (c, d), by solutions for about `block` unknowns at once."""
         at_once = max(1, block // self.body.stiffness.upper.shape[0])
         for first in range(0, len(forces), at_once):
             rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
-            yield from self._unknowns(rows).T
+            yield from self.unknowns_of_rows(rows).T
 
-    def _unknowns(self, rows: Float) -> Float:
+    def unknowns_of_rows(self, rows: Float) -> Float:
         """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
         condensed, bars = self.body.condensed, self.inclusions.bar_stiffness
         if len(bars):

@@ -1,19 +1,19 @@
 """Derivatives of the numbers of a press by its parameters.
 
 Along an exact path they are those of its events (`finger3d.mechanics.small_strain.path_tangents`), else those of its
-increments (`finger3d.mechanics.small_strain.increment_tangents` and
+increments (`finger3d.mechanics.small_strain.increment_tangents`, `finger3d.mechanics.small_strain.viscous_tangents` and
 `finger3d.mechanics.finite_strain.increment_tangents`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
-from finger3d.contact.state import Event
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -25,16 +25,16 @@ from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
-from finger3d.mechanics.small_strain.path_tangents import (
-    PathTangent,
-    PathTangents,
-    compliance_changes,
-    moved_pose,
-)
+from finger3d.mechanics.small_strain.kinks import Sides
+from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, compliance_changes
 from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
 """Numbers of an increment that have no derivative."""
+
+_NO_FRICTION = 1e-8
+"""Friction of a point, over the largest, that is none."""
 
 Numbers: TypeAlias = dict[str, float]
 """Numbers of an increment by the names of their columns in history.csv, or their derivatives."""
@@ -42,15 +42,20 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if model.relaxation is not None:
-        return "derivatives are not known with viscosity"
+    if model.relaxation is not None and model.finite_strain:
+        return "derivatives are not known at large deformation with viscosity"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""
 
 
-def tangents(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
-    """Yield every increment of a press, and the sides (2 p,) of p variations at its end.
+Tangents: TypeAlias = Iterator[tuple[StepResult, Sides, Sides]]
+
+
+def tangents(problem: Problem, variations: Sequence[Variation]) -> Tangents:
+    """Yield every increment of a press, and the sides (2 p,) of p variations at its end as they fall and as they grow.
+
+    Both are the same list until an increment ends at a kink, along an exact path until the press does.
 
     Raises
     ------
@@ -63,12 +68,20 @@ def tangents(problem: Problem, variations: Sequence[Variation]) -> Iterator[tupl
     yield from follow(problem, variations)
 
 
-def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sequence[Side]) -> list[Numbers]:
-    """Return the derivatives (p,) of the numbers of an increment, per unit of each parameter.
+def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0) -> list[Numbers]:
+    """Return the derivatives (p,) of the numbers of an increment, per unit of each parameter; none if not known.
 
-    The numbers are the columns of history.csv, by their names.
+    The numbers are the columns of history.csv, by their names.  At points without friction the sum of its magnitudes
+    has a kink; its derivative is that as parameters fall (`way` -1) or grow (1), or the mean of both (0).
     """
-    return [_of_numbers(step, *one) for one in zip(variations, sides[::2], sides[1::2], strict=True)]
+    friction = np.linalg.norm(step.meshed_state.contact.force[:, 1:], axis=1)
+    starts = friction <= _NO_FRICTION * friction.max(initial=0.0)
+    found = [_of_numbers(step, *one) for one in zip(variations, sides[::2], sides[1::2], strict=True)]
+    for numbers, one, side in zip(found, variations, sides[1::2], strict=True):
+        if way and side is not None:
+            begun = np.linalg.norm(side.state.contact.force[:, 1:], axis=1) * starts
+            numbers["friction_sum_N"] += way * side.problem.symmetry.total(begun) / one.step
+    return found
 
 
 def _advanced(press: Press, station: Station) -> StepResult:
@@ -78,22 +91,30 @@ def _advanced(press: Press, station: Station) -> StepResult:
     return step
 
 
-def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
-    press, tangents = Press(problem), _increment_tangents(problem, variations)
+def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Tangents:
+    press, falling = Press(problem), _increment_tangents(problem, variations)
+    growing = falling
     for station in stations(problem.model.legs):
         step = _advanced(press, station)
-        yield step, tangents.advance(step)
+        if growing is falling and falling.is_at_kink(step):
+            growing = copy(falling)
+        if growing is falling:
+            sides = falling.advance(step)
+            yield step, sides, sides
+        else:
+            yield step, falling.advance(step, -1), growing.advance(step, 1)
 
 
 def _increment_tangents(problem: Problem, variations: Sequence[Variation]) -> IncrementTangents:
     if not problem.model.finite_strain:
-        return IncrementTangents(problem, variations)
+        viscous = problem.model.relaxation is not None
+        return ViscousTangents(problem, variations) if viscous else IncrementTangents(problem, variations)
     from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
 
     return FiniteIncrementTangents(problem, variations)
 
 
-def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Iterator[tuple[StepResult, list[Side]]]:
+def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangents:
     press, count = Press(problem), len(variations)
     c = len(press.state.contact.gap)
     ends = [[at_rest(end).gap for end in one.ends] for one in variations]
@@ -101,39 +122,26 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Iterato
     moved = np.stack([rest, np.zeros_like(rest)], axis=2)
     tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
-    changes = compliance_changes(problem, variations)
-    for station in stations(problem.model.legs):
+    changes, way = compliance_changes(problem, variations), stations(problem.model.legs)
+    for station in way:
         step = _advanced(press, station)
         if press.path is None:
             raise Finger3dError("the path of the press is not exact")
         follower = follower or PathTangents(press.path, variations, changes, rest, tangent, motion, number)
-        tangent, added = follower.at_share(station.share)
-        motion, total = follower.motion(tangent, station.share), energies + added
-        here = Event(0.0, 0.0, step.meshed_state.contact, 0.0, 0)
-        force, sides = problem.upright_force(step.meshed_state.contact).ravel(), []
-        for k, one in enumerate(variations):
-            change = changes[k]
-            read = change[1] @ force if change else np.zeros(len(problem.system.reading_rows))
-            for end, t in zip(one.ends, (-one.step, one.step), strict=True):
-                contact = tangent.changed(here, k, t).state
-                sides.append(
-                    Side(
-                        end,
-                        replace(step.meshed_state, contact=contact),
-                        moved_pose(step.target, t * motion[k]),
-                        t * read + problem.system.reading_rows @ problem.upright_force(contact).ravel(),
-                        step.external_work_mJ + t * total[0, k],
-                        step.dissipation_mJ + t * total[1, k],
-                    )
-                )
-        yield step, sides
+        place = follower.at_share(station.share)
+        sides: Sides = list(follower.sides(step, station.share, place, energies)[0])
+        both = follower.one_sided(step, station.share, energies) if station is way[-1] else None
+        yield step, *(both or (sides, sides))
         if station.share == 1.0:
-            number, follower, energies = number + 1, None, total
+            tangent, energies = place.tangent, energies + place.energies
+            motion, number, follower = follower.motion(tangent, 1.0), number + 1, None
             tangent = replace(tangent, amplitude=np.zeros(count))
 
 
-def _of_numbers(step: StepResult, one: Variation, low: Side, high: Side) -> Numbers:
+def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None) -> Numbers:
     """Return the derivatives of the numbers of an increment, by differences of their formulas."""
+    if low is None or high is None:
+        return {}
 
     def numbers(side: Side) -> Numbers:
         problem, contact = side.problem, side.state.contact

@@ -23,7 +23,7 @@ import numpy as np
 
 from finger3d._types import Array, Float
 from finger3d.contact.friction import SLIP, Status
-from finger3d.contact.state import pressure
+from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -31,6 +31,7 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.mechanics.small_strain.variations import Side, Variation
@@ -59,33 +60,39 @@ class Part:
 
 
 @dataclass(frozen=True)
+class Linear:
+    """Equations of the active set of an increment in small strain, and the compliance (c, d, c, d) mm/N within it."""
+
+    active: LinearisedIncrement
+    delassus: Float
+
+
+@dataclass(frozen=True)
+class FixedForces:
+    """Derivatives by p parameters, at fixed contact forces, of contact displacements (c d, p) and readings (g, p)."""
+
+    displacement: Float
+    readings: Float
+
+
+@dataclass(frozen=True)
 class _End:
     """Side at the end of a part of an increment, with gap and slip (c, d) mm and forces (c, d) N in its directions."""
 
-    side: Side
+    state: State[Float]
     relative: Float
     turned_force: Float
 
     @classmethod
-    def of(
-        cls, side: Side, move: Move, after: State[Float], force: Float, displacement: Float, readings: Float
-    ) -> _End:
-        """Return the end of a motion.
-
-        Forces and displacements (c, d) differ by so much from those of a state, readings (g,) from those under forces.
-        """
-        contact = replace(after.contact, force=after.contact.force + force)
-        body, place = LinearBody(side.problem.delassus, np.zeros_like(after.body)), after.body + displacement
-        increment = Increment(side.problem, side.state, move, body, DistanceTracker())
+    def of(cls, increment: Increment, contact: ContactState, force: Float, place: Float) -> _End:
+        """Return the end at displacements (c, d), with contact forces that differ by (c, d) from those of a state."""
         # as in the solution of the increment, whose geometry is linear under a flat object
-        expansion_point = np.zeros_like(place) if side.problem.model.object.is_flat else place
+        expansion_point = np.zeros_like(place) if increment.problem.model.object.is_flat else place
         geometry = increment.geometry(expansion_point, np.inf)
-        state = increment.reached(geometry, expansion_point, place, contact, None)
-        work, lost = energies(side.problem, [Substep(side.state, state, move)])
-        read = readings + side.problem.system.reading_rows @ side.problem.upright_force(state.contact).ravel()
-        end = Side(side.problem, state, move.end, read, side.work_mJ + work, side.dissipation_mJ + lost)
-        turned = np.einsum("ca,cak->ck", after.contact.force, geometry.bases)
-        return cls(end, increment.relative(geometry, expansion_point, place), turned)
+        changed = replace(contact, force=contact.force + force)
+        state = increment.reached(geometry, expansion_point, place, changed, None)
+        turned = np.einsum("ca,cak->ck", contact.force, geometry.bases)
+        return cls(state, increment.relative(geometry, expansion_point, place), turned)
 
 
 class IncrementTangents:
@@ -111,28 +118,63 @@ class IncrementTangents:
         self._stations = [stations(end.model.legs) for end in ends]
         self._state, self._pose, self._number = self.formulation.start(problem), problem.origin, 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
+        self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
+        self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
 
-    def advance(self, step: StepResult) -> list[Side]:
+    def advance(self, step: StepResult, way: int = 0) -> Sides:
         """Return the sides at the end of the next increment, which has this result.
+
+        At a kink they are those of falling (`way` -1) or growing (1) parameters, or those of its own active set (0).
 
         Raises
         ------
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
+        sides, (here, length) = self._sides(self._parts(step), step), self._end(step)
+        if way and is_kink(here, length):
+
+            def solved(status: Status) -> tuple[list[Side], list[End]]:
+                found = self._sides(self._parts(step, status), step)
+                befores = zip(self._last, found, strict=True)
+                ends = [
+                    End(before.state.contact, side.state.contact, _coefficients(before, status))
+                    for before, side in befores
+                ]
+                return found, ends
+
+            chosen = one_sided(here, length, solved, way)
+            self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
+            sides = [own or side for own, side in zip(chosen, sides, strict=True)]
+        self.sides = sides
+        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
+        return [None if unknown else side for unknown, side in zip(self._is_unknown, sides, strict=True)]
+
+    def is_at_kink(self, step: StepResult) -> bool:
+        """Whether the next increment, which has this result, ends as a point is about to change its status."""
+        return is_kink(*self._end(step))
+
+    def _end(self, step: StepResult) -> tuple[End, float]:
+        """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
+        states = [self._state, *(after for _, after in step.parts)]
+        before, contact = self._begun(self.problem)._replace(state=states[-2]), states[-1].contact
+        friction = _coefficients(before, contact.status)
+        return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
+
+    def _sides(self, parts: Sequence[Part], step: StepResult) -> list[Side]:
         targets = [own[self._number] for own in self._stations]
-        parts, poses = self._parts(step), self._poses(targets)
+        poses = self._poses(targets)
         if any(target.load for target in targets):
             poses = self._in_equilibrium(step, parts, targets, poses)
-        self.sides = self._through(parts, self.sides, self._steps, poses)
-        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
-        return self.sides
+        return self._through(parts, self.sides, self._steps, poses)
 
-    def _parts(self, step: StepResult) -> list[Part]:
-        """Return the parts of an increment, linearised."""
+    def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
+        """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
         whole, parts = Move(self._pose, step.target).change, list[Part]()
         before, start = self._state, 0.0
         for pose, after in step.parts:
+            if status is not None and after is step.parts[-1][1]:
+                after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
                 linear = self._linearised(before, after, Move(self._pose, pose))
@@ -147,7 +189,42 @@ class IncrementTangents:
 
     def _linearised(self, before: State[Any], after: State[Any], move: Move) -> Any:
         """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
-        return LinearisedIncrement.of(self.problem, before.contact, after.contact)
+        return Linear(LinearisedIncrement.of(self.problem, before.contact, after.contact), self.problem.delassus)
+
+    def _displaced(self, state: State[Any]) -> State[Float]:
+        """Return a state whose body is the displacement (c, d) mm of the contact points."""
+        return state
+
+    def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
+        """Return the derivatives of the body at the end of a part of an increment under its forces."""
+        force = self.problem.upright_force(part.after.contact)
+        return self._changes(force[None], len(steps) // 2)[0]
+
+    def _changes(self, forces: Float, count: int) -> list[FixedForces]:
+        """Return what variations change in the body under each of several forces (k, c, d), for `count` parameters."""
+        columns = forces.reshape(len(forces), -1).T
+        displacement = np.zeros((*columns.shape, count))
+        readings = np.zeros((len(self.problem.system.reading_rows), len(forces), count))
+        if any(one.body for one in self._variations):
+            unknowns = np.column_stack(list(self.problem.unknowns_of(list(forces))))
+            for k, one in enumerate(self._variations):
+                if one.body:
+                    displacement[..., k], readings[..., k] = one.body.of(self.problem, unknowns, columns)
+        return [FixedForces(displacement[:, i], readings[:, i]) for i in range(len(forces))]
+
+    def _reached(
+        self,
+        part: Part,
+        fixed: FixedForces,
+        states: Sequence[State[Float]],
+        sides: Sequence[Side],
+        steps: Float,
+        moves: Sequence[Move],
+    ) -> list[tuple[State[Any], Float]]:
+        """Return the states of all sides at the end of a part of an increment, and their readings (g,)."""
+        forces = [self.problem.upright_force(state.contact).ravel() for state in states]
+        read = self.problem.system.reading_rows @ np.transpose(forces) + np.repeat(fixed.readings, 2, axis=1) * steps
+        return list(zip(states, read.T, strict=True))
 
     def _poses(self, targets: Sequence[Station]) -> list[ObjectPose]:
         """Return the poses at stations; slides that forces have determined are taken back in proportion to the leg."""
@@ -191,34 +268,33 @@ class IncrementTangents:
         """Return the sides after all parts of an increment, which ends in these poses."""
         moves = [Move(side.pose, pose) for side, pose in zip(sides, poses, strict=True)]
         for part in parts:
+            self._last = sides
             sides = self._after(part, sides, steps, [Move(move.at(part.start), move.at(part.end)) for move in moves])
         return list(sides)
 
     def _after(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> list[Side]:
         """Return the sides after a part of an increment."""
-        contact, linear, frame = part.after.contact, part.linear, vertical_frame(self.problem.dim)
+        contact, linear, frame = part.after.contact, part.linear.active, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
-        delassus, size = self.problem.delassus.reshape(c * d, c * d), steps[1::2]
+        delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
-
-        other, readings = np.zeros((c * d, p)), np.zeros((len(self.problem.system.reading_rows), p))
-        if any(one.body for one in self._variations):
-            flat = self.problem.upright_force(contact)
-            field = self.problem.unknowns(flat)[:, None]
-            for k, one in enumerate(self._variations):
-                if one.body:
-                    other[:, k : k + 1], readings[:, k : k + 1] = one.body.of(self.problem, field, flat.reshape(-1, 1))
+        fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
+        body = LinearBody(self.problem.delassus, np.zeros_like(there))
+        increments = [
+            Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker())
+            for side, move in zip(sides, moves, strict=True)
+        ]
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
         unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
         errors = list[Float]()
         for _ in range(MOST):
             fixed_basis = linear.forces @ unknowns + direct
-            moved = delassus @ (fixed_basis + turned) + other
+            moved = delassus @ (fixed_basis + turned) + fixed.displacement
             force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
             place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
             ends = [
-                _End.of(side, move, part.after, t * force[k // 2], t * place[k // 2], t * readings[:, k // 2])
-                for k, (side, move, t) in enumerate(zip(sides, moves, steps, strict=True))
+                _End.of(replace(one, tracker=DistanceTracker()), contact, t * force[k // 2], there + t * place[k // 2])
+                for k, (one, t) in enumerate(zip(increments, steps, strict=True))
             ]
             turns = slopes([end.turned_force @ frame.T for end in ends], steps)
             change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
@@ -226,11 +302,19 @@ class IncrementTangents:
             unknowns, turned = unknowns - change, turns
             errors.append(error / derivative_scale(unknowns, largest, size))
             if are_converged(errors):
-                return [end.side for end in ends]
+                reached = self._reached(part, fixed, [end.state for end in ends], sides, steps, moves)
+                return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
         raise Finger3dError(
             f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
             "abruptly where it touches"
         )
+
+
+def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:
+    """Return the side after a motion, which has reached a state and readings (g,)."""
+    state, readings = reached
+    work, lost = energies(before.problem, [Substep(before.state, state, move)])
+    return Side(before.problem, state, move.end, readings, before.work_mJ + work, before.dissipation_mJ + lost)
 
 
 def slopes(values: Sequence[Float], steps: Float) -> Float:

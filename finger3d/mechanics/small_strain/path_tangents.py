@@ -22,22 +22,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.friction import OPEN, SLIP, STICK, Status
 from finger3d.contact.state import ContactState, Event
 from finger3d.errors import Finger3dError
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.exact_path import ExactPath
-from finger3d.mechanics.small_strain.variations import Variation
+from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
+from finger3d.mechanics.small_strain.variations import Side, Variation
 from finger3d.objects import Move, ObjectPose, vertical_frame
 
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
+
+_SHORT = 1e-8
+"""Share of the path, over that up to a place, below which an event is at the same place for the slip since it."""
 
 _JUMPED = 1e-6
 """Change of the forces in an increment over a jump, over the largest at the end of the path."""
@@ -71,6 +77,18 @@ class PathTangent:
         return event._replace(share=share, amplitude=amplitude, state=state)
 
 
+class PlaceOnPath(NamedTuple):
+    """Derivatives at a place on a path and at an event before, and those (2, p) of work and dissipation up to it.
+
+    The event is the last that is not at the same place.
+    """
+
+    before: Event
+    first: PathTangent
+    tangent: PathTangent
+    energies: Float
+
+
 def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> list[tuple[Float, Float] | None]:
     """Return the derivatives of compliance (c d, c d) and reading rows (g, c d) by p parameters.
 
@@ -79,7 +97,7 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
     active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
     if not any(one.body for one in variations):
         return [None] * len(variations)
-    unknowns = problem.body.condensed.unknowns(np.eye(count, len(active)))
+    unknowns = problem.unknowns_of_rows(np.eye(count, len(active)))
     force = np.zeros((problem.surface.points.size, len(active)))
     force[active, np.arange(len(active))] = 1.0
 
@@ -119,6 +137,8 @@ class PathTangents:
         self.path, self.variations, self._rest = path, variations, rest
         self._delassus = self._local(path.problem.delassus)
         self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
+        none = np.zeros((len(path.problem.system.reading_rows), path.bases[:, 0].size))
+        self._reading_changes = [none if change is None else change[1] for change in changes]
         self._mu = np.array(
             [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
         )
@@ -140,10 +160,12 @@ class PathTangents:
             self._tangents.append(self._at_event(piece, event))
             self._events.append(event)
 
-    def at_share(self, share: float) -> tuple[PathTangent, Float]:
-        """Return the derivatives at a share of the path, and those (2, p) of work and dissipation since its start."""
+    def at_share(self, share: float, status: Status | None = None) -> PlaceOnPath:
+        """Return the derivatives at a share of the path, where the points may have other statuses (c,)."""
         place, done = self.path.at(share)
         piece = done - 1 if place is self._events[done] else done
+        if status is not None:
+            place = place._replace(state=replace(place.state, status=status))
         events = [*self._events[: piece + 1], place]
         tangents = [*self._tangents[: piece + 1], self._solved(piece, place)]
         out = np.zeros((2, len(self.variations)))
@@ -153,7 +175,49 @@ class PathTangents:
                 for t in (-one.step, one.step)
             )
             out[:, k] = one.difference(np.array(low), np.array(high))
-        return tangents[-1], out
+        start = next((i for i in range(piece, 0, -1) if self._events[i].share < share * (1.0 - _SHORT)), 0)
+        return PlaceOnPath(self._events[start], self._tangents[start], tangents[-1], out)
+
+    def sides(
+        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
+    ) -> tuple[list[Side], list[End]]:
+        """Return the sides (2 p,) of an increment that ends at a place, and their contact since the event before.
+
+        The energies (2, p) are the derivatives of work and dissipation at the start of the path.
+        """
+        problem, contact, sides, ends = self.path.problem, step.meshed_state.contact, list[Side](), list[End]()
+        contact = contact if status is None else replace(contact, status=status)
+        here, force = Event(0.0, 0.0, contact, 0.0, 0), problem.upright_force(contact).ravel()
+        motion, total = self.motion(place.tangent, share), energies + place.energies
+        for k, one in enumerate(self.variations):
+            read = self._reading_changes[k] @ force
+            for end, t in zip(one.ends, (-one.step, one.step), strict=True):
+                moved = place.tangent.changed(here, k, t).state
+                side = Side(
+                    end,
+                    replace(step.meshed_state, contact=moved),
+                    moved_pose(step.target, t * motion[k]),
+                    t * read + problem.system.reading_rows @ problem.upright_force(moved).ravel(),
+                    step.external_work_mJ + t * total[0, k],
+                    step.dissipation_mJ + t * total[1, k],
+                )
+                sides.append(side)
+                mu = np.full(len(force) // 2, end.model.friction.mu)
+                ends.append(End(place.first.changed(place.before, k, t).state, moved, mu))
+        return sides, ends
+
+    def one_sided(self, step: StepResult, share: float, energies: Float) -> tuple[Sides, Sides] | None:
+        """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
+        problem, contact, before = self.path.problem, step.meshed_state.contact, self.at_share(share).before
+        here = End(before.state, contact, np.full(len(contact.gap), problem.model.friction.mu))
+
+        def solved(status: Status) -> tuple[list[Side], list[End]]:
+            return self.sides(step, share, self.at_share(share, status), energies, status)
+
+        length = problem.model.largest_depth_mm
+        if not is_kink(here, length):
+            return None
+        return one_sided(here, length, solved, -1), one_sided(here, length, solved, 1)
 
     def motion(self, tangent: PathTangent, share: float) -> Float:
         """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""

@@ -6,6 +6,7 @@ derivative is ``L K^-1 (dL_c^T r - dK u) + dL u``, where dK and dL are central d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -17,21 +18,24 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solvers.condense import stiffened
+from finger3d.fem.solvers.condense import spring_forces
 from finger3d.fem.surface.traces import local_rows, restrict
-from finger3d.mechanics.discretise.build import contact_rows, mesh_part, widened
+from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
+from finger3d.mechanics.discretise.elastic_object import object_response
+from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, vertical_frame
+from finger3d.progress import QUIET
 
 _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
 
 _IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
-_CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions")
+_CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
 
 
@@ -53,6 +57,19 @@ class Side(NamedTuple):
     dissipation_mJ: float
 
 
+class FoilChange(NamedTuple):
+    """Derivatives of foils by a parameter.
+
+    Attributes
+    ----------
+    subgrid_compliance : (g + s, s), of gauges and bars under forces of the bars, that the mesh lacks
+    stiffness : (s,), of the bars, over itself
+    """
+
+    subgrid_compliance: Float
+    stiffness: Float
+
+
 @dataclass(frozen=True)
 class BodyChange:
     """Derivatives of a body by a parameter.
@@ -61,12 +78,14 @@ class BodyChange:
     ----------
     stiffness : (N, N) sparse
     contact : (c d, N) sparse, of the rows of the contact points
-    readings : (g, N) sparse, of the rows of the readings
+    readings : (g, N) sparse, of the other rows: readings, then the bars of foils
+    foils : None without
     """
 
     stiffness: Any
     contact: Any
     readings: Any
+    foils: FoilChange | None
 
     def of(self, problem: Problem, unknowns: Float, force: Float) -> tuple[Float, Float]:
         """Return the derivatives of contact displacements (c d, k) and readings (g, k) in several solutions.
@@ -76,12 +95,30 @@ class BodyChange:
         unknowns : (N, k), of the body under each of k loads
         force : (c d, k) N, contact forces that are these loads
         """
-        active, body = problem.system.active_dofs, problem.body
-        load = self.contact.T @ force - self.stiffness @ unknowns
-        moved = body.condensed.eliminated(load).displacement
+        active, condensed = problem.system.active_dofs, problem.body.condensed
+        load, springs = self.contact.T @ force, problem.inclusions.bar_stiffness
+        if self.foils is None:
+            moved = self.moved(problem, load, unknowns)
+        else:
+            loads, through = (
+                np.zeros((len(condensed.compliance), force.shape[1])),
+                condensed.compliance[:, -len(springs) :],
+            )
+            loads[: len(active)] = force[active]
+            held = spring_forces(condensed.compliance, springs, condensed.compliance @ loads)
+            moved = self.moved(problem, load + self.readings[-len(springs) :].T @ held, unknowns)
+            moved[-len(self.foils.subgrid_compliance) :] += self.foils.subgrid_compliance @ held
+            moved += through @ (self.foils.stiffness[:, None] * held)
+            moved += through @ spring_forces(condensed.compliance, springs, moved)
         displacement = np.zeros_like(force)
-        displacement[active] = moved[: len(active)] + (self.contact @ unknowns)[active]
-        return displacement, moved[len(active) :][: self.readings.shape[0]] + self.readings @ unknowns
+        displacement[active] = moved[: len(active)]
+        return displacement, moved[len(active) :][: len(problem.system.reading_rows)]
+
+    def moved(self, problem: Problem, load: Float, unknowns: Float) -> Float:
+        """Return the derivatives of the rows (r, k) under forces that change the loads (N, k) as their places move."""
+        moved = problem.body.condensed.eliminated(load - self.stiffness @ unknowns).displacement
+        rows = (self.contact @ unknowns)[problem.system.active_dofs], self.readings @ unknowns
+        return np.asarray(moved + np.concatenate(rows))
 
 
 @dataclass(frozen=True)
@@ -147,69 +184,83 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         for model, touch in zip(models, touches, strict=True)
     ]
     changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
+    change: BodyChange | ComplianceChange | None = None
+    if changed & {*_IN_BODY, "inclusions"}:
+        if own.inclusions is not None and not own.is_linear_elastic:
+            raise Finger3dError("it changes foils or the body beside them, at large deformation or with viscosity")
+        below, above = (_assembled(problem, end) for end in ends)
+        ends, change = [below.problem, above.problem], _change(problem, below, above, step)
     if own.object_compliance is not None:
-        ends = [_beside_object(problem, end, changed) for end in ends]
-    if "inclusions" in changed:
-        return Variation(ends[0], ends[1], step, _of_foils(problem, ends[0].model, ends[1].model, step))
-    if "object_compliance" in changed:
-        size = problem.surface.points.size
-        softer, stiffer = (np.asarray(end.system.object_compliance) for end in ends)
-        delassus = (stiffer - softer) / (2.0 * step)
-        none = np.zeros((len(problem.system.reading_rows), size))
-        return Variation(ends[0], ends[1], step, ComplianceChange(delassus.reshape(size, size), none))
-    if not changed & {*_IN_BODY}:
-        return Variation(ends[0], ends[1], step, None)
-    if own.inclusions is not None:
-        raise Finger3dError("it changes a body with foils")
-    below, above = (_assembled(problem, end) for end in ends)
-    change = BodyChange(
-        *((high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True))
-    )
-    return Variation(below.problem, above.problem, step, change)
+        ends = _beside_object(problem, ends, step, change)
+        if "object_compliance" in changed:
+            size = problem.surface.points.size
+            softer, stiffer = (np.asarray(end.system.object_compliance) for end in ends)
+            delassus = (stiffer - softer) / (2.0 * step)
+            none = np.zeros((len(problem.system.reading_rows), size))
+            change = ComplianceChange(delassus.reshape(size, size), none)
+    return Variation(ends[0], ends[1], step, change)
 
 
-def _beside_object(problem: Problem, end: Problem, changed: set[str]) -> Problem:
-    """Return a problem with the share of an elastic object by the moduli of its model, which alone may change it."""
-    own, model, system = problem.model, end.model, problem.system
-    assert own.object_compliance is not None
-    assert model.object_compliance is not None
+def _change(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> BodyChange:
+    """Return what changes between two bodies."""
+    matrices = [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)]
+    change = BodyChange(matrices[0], matrices[1], matrices[2], None)
+    if below.bars is None or above.bars is None:
+        return change
+    whole = [one.subgrid_compliance(np.zeros(())) for one in (below.bars, above.bars)]
+    stiff = (above.bars.bar_stiffness - below.bars.bar_stiffness) / (2.0 * step * problem.inclusions.bar_stiffness)
+    count, rows = len(stiff), len(problem.body.condensed.compliance)
+    under_bars = problem.body.condensed.unknowns(np.eye(rows, count, count - rows))
+    of_mesh = change.moved(problem, change.readings[-count:].T.toarray(), under_bars)[-len(whole[0]) :]
+    return replace(change, foils=FoilChange((whole[1] - whole[0])[:, -count:] / (2.0 * step) - of_mesh, stiff))
+
+
+def _beside_object(
+    problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | ComplianceChange | None
+) -> list[Problem]:
+    """Return problems with the compliance of an elastic object by their models, and its share by both bodies."""
+    system, face, image = problem.system, problem.surface, problem.symmetry.image_of
     assert system.object_compliance is not None
     assert system.object_share is not None
-    materials = [m.isotropic("derivatives") for m in (own.material, model.material)] if "material" in changed else []
-    finger = materials[0].E_MPa / materials[1].E_MPa if materials else 1.0
-    softer = own.object_compliance.E_MPa / model.object_compliance.E_MPa
-    same = replace(model.object_compliance, E_MPa=own.object_compliance.E_MPa) == own.object_compliance
-    if changed & {"design", "parts", "object"} or not same or len({m.nu for m in materials}) > 1:
-        raise Finger3dError("it changes the share of an elastic object in the compliance")
-    thing, image = softer * system.object_compliance, problem.symmetry.image_of
-    share = object_share(problem.surface, finger * (system.delassus - system.object_compliance), thing)
-    compliance = finger * system.points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
-    points = replace(system.points, compliance=compliance)
-    return replace(end, system=replace(end.system, object_compliance=thing, object_share=share, points=points))
+    if any((end.model.design, end.model.object) != (problem.model.design, problem.model.object) for end in ends):
+        raise Finger3dError("it changes the mesh of an elastic object")
+    pressed = np.zeros(face.points.shape)
+    pressed[:, 0] = face.area
+    yielding, slope = system.delassus - system.object_compliance, np.zeros(len(pressed))
+    soft = np.einsum("idje,je->id", yielding, pressed)[:, 0]
+    if change is not None:
+        slope = change.of(problem, problem.unknowns(pressed)[:, None], pressed.reshape(-1, 1))[0][:: problem.dim, 0]
+    out = []
+    for end, t in zip(ends, (-step, step), strict=True):
+        thing, scale = _object_compliance(problem, end), 1.0 + t * slope / soft
+        share, points = object_share(face, yielding * scale[:, None, None, None], thing), end.system.points
+        compliance = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
+        points = replace(points, compliance=compliance)
+        out.append(replace(end, system=replace(end.system, object_compliance=thing, object_share=share, points=points)))
+    return out
 
 
-def _of_foils(problem: Problem, low: Model, high: Model, step: float) -> ComplianceChange:
-    """Return what the stiffness of all foils along their length changes."""
-    own = problem.model.inclusions
+def _object_compliance(problem: Problem, end: Problem) -> Float:
+    """Return the compliance (c, d, c, d) of an elastic object, whose moduli alone may differ from those of a press."""
+    own, thing, model = problem.model.object_compliance, end.model.object_compliance, problem.model
     assert own is not None
-    assert low.inclusions is not None
-    assert high.inclusions is not None
-    stiff = [foils.E_MPa * foils.thickness_mm for foils in (own, low.inclusions, high.inclusions)]
-    same = all(replace(own, E_MPa=m.E_MPa, thickness_mm=m.thickness_mm) == m for m in (low.inclusions, high.inclusions))
-    if not same or problem.model.finite_strain:
-        raise Finger3dError("it changes the foils in their plane, or at large deformation")
-    springs, system = problem.inclusions.bar_stiffness, problem.system
-    loads = stiffened(problem.body.condensed.compliance, springs)[:, -len(springs) :]
-    change = -(stiff[2] - stiff[1]) / (2.0 * step * stiff[0]) * (loads * springs) @ loads.T
-    delassus, readings = contact_rows(change, system.active_dofs, problem.surface, len(system.reading_rows))
-    return ComplianceChange(delassus.reshape(problem.surface.points.size, -1), readings)
+    assert thing is not None
+    assert problem.system.object_compliance is not None
+    if replace(thing, E_MPa=own.E_MPa) == own:
+        return own.E_MPa / thing.E_MPa * problem.system.object_compliance
+    held = model.object.held_body(model.design, problem.dim == 3)
+    is_meshed_anew = problem.dim == 3 and held is not None and held.mesher != "swept"
+    if replace(thing, E_MPa=own.E_MPa, nu=own.nu) != own or is_meshed_anew:
+        raise Finger3dError("it changes the mesh of an elastic object")
+    return object_response(problem, thing, model.first_contact.contact_box, QUIET).compliance
 
 
 class _Assembled(NamedTuple):
-    """Problem with another body on the same cells, and its matrices as in a `BodyChange`."""
+    """Problem with another body on the same cells, its matrices as in a `BodyChange`, and the bars of its foils."""
 
     problem: Problem
     matrices: tuple[Any, Any, Any]
+    bars: EmbeddedBars | None
 
 
 def _moved(mesh: Mesh, other: Mesh) -> Mesh:
@@ -240,8 +291,11 @@ def _assembled(problem: Problem, end: Problem) -> _Assembled:
         raise Finger3dError("it switches between elements for compressible and nearly incompressible materials")
     matrix = stiffness(mesh, elastic, thickness)
     upper = matrix.upper
-    rows = [local_rows(face, vertical_frame(mesh.dim))]
-    rows += [r.rows(MeshedBody(mesh, problem.axes, matrix, thickness, moduli_of(elastic))) for r in model.readings]
+    bars = bars_of(model, mesh, problem.axes)
+    if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
+        raise Finger3dError("it changes which foils are mirror images of each other")
+    meshed = MeshedBody(mesh, problem.axes, matrix, thickness, moduli_of(elastic))
+    rows = [local_rows(face, vertical_frame(mesh.dim)), *rows_of_readings(model, meshed, bars)]
     contact, *readings = (widened(part, upper.shape[0]) for part in rows)
     read = sp.vstack(readings, format="csr") if readings else sp.csr_matrix((0, upper.shape[0]))
     points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
@@ -249,6 +303,5 @@ def _assembled(problem: Problem, end: Problem) -> _Assembled:
         points = replace(points, compliance=points.compliance / (1.0 - share[problem.symmetry.image_of]))
     system = replace(end.system, surface=face, points=points)
     changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-    return _Assembled(
-        replace(end, system=system, condensed_body=changed), ((upper + sp.triu(upper, 1).T).tocsr(), contact, read)
-    )
+    matrices = (upper + sp.triu(upper, 1).T).tocsr(), contact, read
+    return _Assembled(replace(end, system=system, condensed_body=changed), matrices, bars)

@@ -34,6 +34,7 @@ from finger3d.mechanics.small_strain.viscoelastic_body import (
     ConstantBulkModulus,
     ConstantPoissonRatio,
     RelaxationWorkspace,
+    Response,
     ViscoelasticBody,
 )
 from finger3d.objects import Move, ObjectPose
@@ -63,13 +64,14 @@ class Viscoelastic:
         """Return a workspace without a factor."""
         return RelaxationWorkspace()
 
-    def _body(self, problem: Problem) -> ViscoelasticBody:
+    def body(self, problem: Problem) -> ViscoelasticBody:
+        """Return the body of a problem."""
         return ConstantPoissonRatio(problem) if self.relaxation.bulk else ConstantBulkModulus(problem)
 
     def start(self, problem: Problem) -> State[ViscousBody]:
         """Return the state at rest, with internal variables zero."""
         self.relaxation.check_domain(problem.model.domain)
-        empty = InternalVariables.at_rest(self.relaxation.prony, self._body(problem).size)
+        empty = InternalVariables.at_rest(self.relaxation.prony, self.body(problem).size)
         return State(at_rest(problem), ViscousBody(np.zeros_like(problem.surface.points), empty))
 
     def increment(
@@ -82,10 +84,23 @@ class Viscoelastic:
     ) -> ContactSolution[State[ViscousBody]]:
         """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
         memory, step = state.body.memory, Step(self.relaxation.prony, move.duration_s)
-        body = self._body(problem).respond(step, memory, workspace)
-        condensed, springs = body.compliance, problem.inclusions.bar_stiffness
+        body, linear = self.respond(problem, memory, step, workspace)
+        before = State(state.contact, state.body.displacement, state.last)
+        solution = solve_increment(problem, before, move, linear, guess, workspace)
+        if solution.state is before:
+            return solution.with_state(state)
+        contact = problem.row_forces(problem.upright_force(solution.state.contact))
+        rows = with_spring_forces(problem, body.compliance, contact, body.moved)
+        after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
+        return solution.with_state(State(solution.state.contact, after, solution.state.last))
+
+    def respond(
+        self, problem: Problem, memory: InternalVariables, step: Step, workspace: RelaxationWorkspace
+    ) -> tuple[Response, LinearBody]:
+        """Return the response of the condensed rows over a step, and of the contact points with what else there is."""
+        body, springs = self.body(problem).respond(step, memory, workspace), problem.inclusions.bar_stiffness
+        condensed, moved = body.compliance, body.moved
         first = len(condensed) - len(springs)
-        moved = body.moved
         if len(springs):
             moved = moved + condensed[:, first:] @ spring_forces(condensed, springs, moved)
         c, d = len(problem.surface.nodes), problem.dim
@@ -96,23 +111,15 @@ class Viscoelastic:
             stiffened(problem.body.condensed.compliance, springs), problem.system.active_dofs, c, d
         )
         delassus = scatter_to_points(stiffened(condensed, springs), problem.system.active_dofs, c, d) + rest
-        before = State(state.contact, state.body.displacement, state.last)
-        solution = solve_increment(problem, before, move, LinearBody(delassus, past.reshape(c, d)), guess, workspace)
-        if solution.state is before:
-            return solution.with_state(state)
-        rows = problem.row_forces(problem.upright_force(solution.state.contact))
-        if len(springs):
-            rows[first:] = spring_forces(condensed, springs, body.moved + condensed @ rows)
-        after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
-        return solution.with_state(State(solution.state.contact, after, solution.state.last))
+        return body, LinearBody(delassus, past.reshape(c, d))
 
     def unknowns(self, problem: Problem, states: Sequence[State[ViscousBody]]) -> Iterator[Float]:
         """Yield the unknowns of each state from its internal variables."""
-        return (self._body(problem).unknowns(state.body.memory.elastic) for state in states)
+        return (self.body(problem).unknowns(state.body.memory.elastic) for state in states)
 
     def readings(self, problem: Problem, state: State[ViscousBody]) -> dict[Column, float]:
         """Return the readings from the internal variables by their rows; pressures are those of the relaxed stress."""
-        first, body, memory = len(problem.system.active_dofs), self._body(problem), state.body.memory
+        first, body, memory = len(problem.system.active_dofs), self.body(problem), state.body.memory
         rows = body.read(memory.elastic)[first:]
         values = dict(zip(problem.model.columns, map(float, rows), strict=False))
         if problem.model.taxels:
@@ -134,5 +141,12 @@ class Viscoelastic:
         """Return displacement, linear strain and relaxed stress."""
         unknowns = next(self.unknowns(problem, [state]))
         strain, _ = problem.strain_and_stress(unknowns)
-        stress = self._body(problem).stress(self.relaxation.prony, state.body.memory)
+        stress = self.body(problem).stress(self.relaxation.prony, state.body.memory)
         return displacement(problem.mesh, unknowns), strain, stress
+
+
+def with_spring_forces(problem: Problem, compliance: Float, rows: Float, moved: Float) -> Float:
+    """Return forces (r, ...) on contact rows with those of inclusions, for displacements (r, ...) without them."""
+    if len(springs := problem.inclusions.bar_stiffness):
+        rows[-len(springs) :] = spring_forces(compliance, springs, moved + compliance @ rows)
+    return rows

@@ -167,12 +167,15 @@ class ConstantBulkModulus:
         shear, lame = self._of_pressures
         return np.asarray(lame + 2.0 / 3.0 * (1.0 - alpha) * shear)
 
+    def condensed(self, step: Step, workspace: RelaxationWorkspace) -> tuple[float, Condensation]:
+        """Return alpha of a step, and the body with its shear modulus multiplied by alpha."""
+        # steps of one length differ by round-off of their ends
+        alpha, own = Step(step.prony, float(f"{step.seconds:.12g}")).alpha, self.problem.body.condensed
+        return alpha, workspace.condensation(alpha, lambda: own.again(self._stiffness(alpha, workspace)))
+
     def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
         """Return the response of the body with its shear modulus multiplied by alpha, loaded by the past."""
-        # steps of one length differ by round-off of their ends
-        alpha = Step(step.prony, float(f"{step.seconds:.12g}")).alpha
-        problem = self.problem
-        body = workspace.condensation(alpha, lambda: problem.body.condensed.again(self._stiffness(alpha, workspace)))
+        problem, (alpha, body) = self.problem, self.condensed(step, workspace)
         past, first = step.history_load(memory), len(body.compliance) - len(problem.inclusions.subgrid_compliance)
         settled = body.solve(self._shear_force(past[: self._own], workspace))
         compliance, moved = body.compliance.copy(), body.read(settled)
@@ -180,12 +183,28 @@ class ConstantBulkModulus:
         moved[first:] += problem.inclusions.subgrid_compliance @ past[self._own :] / alpha
 
         def shape(rows: Float) -> Float:
-            unknowns = settled + body.unknowns(rows)
-            if problem.body.elastic.mixed:
-                unknowns[problem.mesh.points.size :] *= problem.body.stiffness.pressure_scale / self._lame(alpha)
+            unknowns = self.shape(settled + body.unknowns(rows), alpha)
             return np.concatenate([unknowns, (rows[first:] + past[self._own :]) / alpha])
 
         return Response(compliance, moved, shape)
+
+    def shape(self, unknowns: Float, alpha: float) -> Float:
+        """Return displacements and dilatations (N, ...) of unknowns of the body with its shear modulus times alpha."""
+        return self._scaled(unknowns, alpha, -1)
+
+    def internal_forces(
+        self, step: Step, memory: InternalVariables, now: Float, workspace: RelaxationWorkspace
+    ) -> Float:
+        """Return the internal forces (N,) at the end of a step with the internal variables `now`."""
+        forces = times(self._stiffness(step.alpha, workspace).upper, self._scaled(now[: self._own], step.alpha, 1))
+        return forces - self._shear_force(step.history_load(memory)[: self._own], workspace)
+
+    def _scaled(self, values: Float, alpha: float, power: int) -> Float:
+        """Multiply pressures or dilatations (N, ...) by a power of Lame's first constant."""
+        out, n = values.copy(), self.problem.mesh.points.size
+        if self.problem.body.elastic.mixed:
+            out[n:] = (out[n:].T * (self._lame(alpha) / self.problem.body.stiffness.pressure_scale) ** power).T
+        return out
 
     def _shear_part(self, workspace: RelaxationWorkspace) -> sp.csr_matrix:
         """Return the deviatoric stiffness K_s of the displacement form; in a section, that in its plane."""
@@ -222,11 +241,7 @@ class ConstantBulkModulus:
 
     def unknowns(self, now: Float) -> Float:
         """Return the displacements, which are the shape."""
-        n = self.problem.mesh.points.size
-        out = now[: self._own].copy()
-        if self.problem.body.elastic.mixed:
-            out[n:] *= self._of_pressures[1] / self.problem.body.stiffness.pressure_scale
-        return out
+        return self._scaled(now[: self._own], 1.0, 1)
 
     def read(self, now: Float) -> Float:
         """Return the row displacements, with the compliance that the mesh lacks."""

@@ -1,0 +1,175 @@
+r"""Derivatives of the increments of a relaxing body in small strain (`finger3d.mechanics.small_strain.viscoelastic`).
+
+Within an increment the body is linear in its contact forces and its past.  The internal variables q at its end solve
+``alpha q = f + past`` if Poisson's ratio is constant, with row forces f, and else, as displacements, ::
+
+    (K_b + alpha K_s) q = B^T f + K_s past
+
+Their derivatives at fixed f are those of the other terms, central differences between presses below and above a
+parameter, which carry their own internal variables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from finger3d._types import Float
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, Linear, Part, slopes
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
+from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
+from finger3d.mechanics.small_strain.variations import BodyChange, ComplianceChange, Side, Variation
+from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody, with_spring_forces
+from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
+from finger3d.objects import Move
+
+_Past: TypeAlias = tuple[Step, InternalVariables]
+
+
+@dataclass(frozen=True)
+class _Linear(Linear):
+    """Increment of a relaxing body, linearised at its end, with the response of its rows over the step."""
+
+    step: Step
+    response: Response
+
+
+@dataclass(frozen=True)
+class _FixedForces(FixedForces):
+    """Derivatives at fixed contact forces, those of internal variables (q, p) and of rows (r, p) without springs, too.
+
+    `readings` are those of the relaxed stress.
+    """
+
+    variables: Float
+    rows: Float
+
+
+class ViscousTangents(IncrementTangents):
+    """Derivatives of a press of a relaxing body in small strain, one increment after another."""
+
+    formulation: Viscoelastic
+
+    def __init__(self, problem: Problem, variations: Sequence[Variation]) -> None:
+        super().__init__(problem, variations)
+        self._workspace = self.formulation.workspace()
+        bodies = [one.body for one in variations for _ in one.ends]
+        self._workspaces = [RelaxationWorkspace() if isinstance(b, BodyChange) else self._workspace for b in bodies]
+
+    def _linearised(self, before: State[ViscousBody], after: State[ViscousBody], move: Move) -> _Linear:
+        step = Step(self.formulation.relaxation.prony, move.duration_s)
+        response, body = self.formulation.respond(self.problem, before.body.memory, step, self._workspace)
+        problem = replace(self.problem, system=replace(self.problem.system, delassus=body.delassus))
+        active = LinearisedIncrement.of(problem, before.contact, after.contact)
+        return _Linear(active, body.delassus, step, response)
+
+    def _displaced(self, state: State[ViscousBody]) -> State[Float]:
+        return State(state.contact, state.body.displacement, state.last)
+
+    def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> _FixedForces:
+        problem, memory = self.problem, part.after.body.memory
+        body, active = self.formulation.body(problem), problem.system.active_dofs
+        force, pasts = problem.upright_force(part.after.contact), _pasts(sides, moves)
+        held = relaxed(part.linear.step.prony, memory)
+        variables = slopes([(held + step.history_load(past)) / step.alpha for step, past in pasts], steps)
+        if isinstance(body, ConstantBulkModulus):
+            now = then = self._with_constant_bulk(body, part, sides, steps, pasts, variables)
+        else:
+            elastic = np.zeros(force.size)
+            elastic[active] = memory.elastic[: len(active)]
+            now, then = self._changes(np.stack([elastic.reshape(force.shape), force]), len(steps) // 2)
+        moved = now.displacement
+        for k, one in enumerate(self._variations):
+            if isinstance(one.body, ComplianceChange):  # of an elastic object, which does not relax
+                moved[:, k] = one.body.compliance @ force.ravel()
+        rows, compliance = body.read(variables), part.linear.response.compliance
+        rows[: len(active)] += moved[active]
+        rows[len(active) :][: len(now.readings)] += now.readings
+        springs = with_spring_forces(problem, compliance, np.zeros_like(rows), rows)
+        displacement = np.zeros_like(moved)
+        displacement[active] = (rows + compliance @ springs)[: len(active)]
+        return _FixedForces(displacement, then.readings, variables, rows)
+
+    def _with_constant_bulk(
+        self,
+        body: ConstantBulkModulus,
+        part: Part,
+        sides: Sequence[Side],
+        steps: Float,
+        pasts: Sequence[_Past],
+        variables: Float,
+    ) -> FixedForces:
+        """Enter the derivatives of displacements and dilatations (N, p); return what the rows change at fixed ones."""
+        now, force = part.after.body.memory.elastic, self.problem.upright_force(part.after.contact).ravel()
+        workspaces = [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]
+        bodies = [ConstantBulkModulus(side.problem) for side in sides]
+        internal = [
+            one.internal_forces(*past, now, workspace)
+            for one, past, workspace in zip(bodies, pasts, workspaces, strict=True)
+        ]
+        load = -slopes(internal, steps)
+        rows = FixedForces(np.zeros((len(force), len(steps) // 2)), np.zeros((len(self._columns), len(steps) // 2)))
+        for k, one in enumerate(self._variations):
+            if isinstance(one.body, BodyChange):
+                load[:, k] += one.body.contact.T @ force
+                rows.displacement[:, k] = one.body.contact @ now[: len(load)]
+                rows.readings[:, k] = one.body.readings @ now[: len(load)]
+        alpha, condensed = body.condensed(part.linear.step, self._workspace)
+        variables[: len(load)] = body.shape(condensed.solve(load), alpha)
+        return rows
+
+    def _reached(
+        self,
+        part: Part,
+        fixed: FixedForces,
+        states: Sequence[State[Float]],
+        sides: Sequence[Side],
+        steps: Float,
+        moves: Sequence[Move],
+    ) -> list[tuple[State[Any], Float]]:
+        assert isinstance(fixed, _FixedForces)
+        problem, response, memory = self.problem, part.linear.response, part.after.body.memory
+        body, first = self.formulation.body(problem), len(problem.system.active_dofs)
+        rows = slopes([problem.row_forces(problem.upright_force(state.contact)) for state in states], steps)
+        rows = with_spring_forces(problem, response.compliance, rows, fixed.rows)
+        free = response.shape(np.zeros(len(rows)))
+        variables = fixed.variables + np.stack([response.shape(row) - free for row in rows.T], axis=-1)
+        read = (fixed.rows + response.compliance @ rows)[first:][: len(self._columns)]
+        is_pressure = np.array([column.kind == "taxel" for column in self._columns], dtype=bool)
+        if is_pressure.any() and not isinstance(body, ConstantBulkModulus):  # of the relaxed stress
+            read[is_pressure] = (body.read(rows)[first:][: len(read)] + fixed.readings)[is_pressure]
+        here, found = self._read(problem, part.after), list[tuple[State[Any], Float]]()
+        for k, (state, side, (step, past), t) in enumerate(
+            zip(states, sides, _pasts(sides, moves), steps, strict=True)
+        ):
+            viscous = ViscousBody(state.body, step.after(past, memory.elastic + t * variables[:, k // 2]))
+            after, readings = State(state.contact, viscous, state.last), here + t * read[:, k // 2]
+            if isinstance(body, ConstantBulkModulus) and is_pressure.any():
+                readings[is_pressure] = self._read(side.problem, after)[is_pressure]
+            found.append((after, readings))
+        return found
+
+    @property
+    def _columns(self) -> tuple[Column, ...]:
+        return self.problem.model.columns
+
+    def _read(self, problem: Problem, state: State[ViscousBody]) -> Float:
+        found = formulation_of(problem.model).readings(problem, state)
+        return np.array([found[column] for column in self._columns])
+
+
+def _pasts(sides: Sequence[Side], moves: Sequence[Move]) -> list[_Past]:
+    """Return the steps of all sides, and their internal variables before."""
+    series = [side.problem.model.relaxation for side in sides]
+    return [
+        (Step(one.prony, move.duration_s), side.state.body.memory)
+        for one, side, move in zip(series, sides, moves, strict=True)
+        if one is not None
+    ]
