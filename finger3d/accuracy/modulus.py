@@ -128,9 +128,7 @@ def _stiffer_by_scaling(
     return {name: (ratio if name.endswith(_STRESS_UNITS) else 1.0) * x for name, x in softer.items()}
 
 
-def _on_coarser_mesh(
-    problem: Problem, increments: int, part: tuple[str, float], numbers: Measure
-) -> dict[str, float]:
+def _on_coarser_mesh(problem: Problem, increments: int, part: tuple[str, float], numbers: Measure) -> dict[str, float]:
     """Return the numbers, by name, on a coarser mesh, with Young's modulus of one part times a ratio.
 
     `part` is its label, empty for the main body, and the ratio.
