@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -188,17 +188,19 @@ def estimate_with_grid(
     own = grid.readings(problem, steps[-1])
     if applies(problem.model):
         found = estimate(problem, steps, report, press_numbers, runs)
-        beside = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, runs)
-        missing = "" if beside.discretisation else f"; marker grid: {beside.method}"
-        return replace(found, method=found.method + missing), beside.totals()
+        markers = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, runs)
+        missing = "" if markers.discretisation else f"; marker grid: {markers.method}"
+        return replace(found, method=found.method + missing), markers.totals()
     read = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)]
     found = estimate(problem, read, report, both, runs)
     totals, of_grid = found.totals(), by_key(own)
-    parts = {
-        part: {name: error for name, error in getattr(found, part).items() if name not in of_grid}
-        for part in ("discretisation", "steps", "companion_numbers")
-    }
-    return replace(found, **parts), {name: error for name, error in totals.items() if name in of_grid}
+
+    def of_press(errors: Mapping[str, float]) -> dict[str, float]:
+        return {name: error for name, error in errors.items() if name not in of_grid}
+
+    mesh, increments, beside = map(of_press, (found.discretisation, found.steps, found.companion_numbers))
+    found = replace(found, discretisation=mesh, steps=increments, companion_numbers=beside)
+    return found, {name: error for name, error in totals.items() if name in of_grid}
 
 
 def _of_increments(
