@@ -13,7 +13,7 @@ import pyvista
 
 from finger3d._cost import Budget
 from finger3d.accuracy.companions import companion
-from finger3d.accuracy.estimate import estimate, main_numbers, press_numbers, reading_error
+from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.cli import main
@@ -23,7 +23,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.readings.columns import RESULTANTS
+from finger3d.mechanics.readings.columns import RESULTANTS, by_key
+from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 from finger3d.scene import load
@@ -147,6 +148,36 @@ def test_under_a_force_the_depth_has_the_bar() -> None:
     fine, last = pressed(0.05)
     assert abs(told["depth_mm"] - press_numbers(fine, last[-1])["depth_mm"]) <= 2.0 * found.discretisation["depth_mm"]
     assert found.discretisation["depth_mm"] <= 0.02 * told["depth_mm"]
+
+
+@pytest.mark.parametrize("force", [None, 1.5], ids=["depth", "force"])
+def test_displacements_of_a_marker_grid_have_bars_of_their_own(force: float | None) -> None:
+    def pressed(size: float) -> tuple[Problem, list[StepResult]]:
+        return run(replace(half_cylinder(size), legs=(Leg(1.0, steps=5, force_N=force),)))
+
+    problem, frames = pressed(0.4)
+    grid = MarkerGrid.of(problem, 1.0)
+    found, errors = estimate_with_grid(problem, frames, grid)
+    told = by_key(grid.readings(problem, frames[-1]))
+    assert set(errors) == set(told)
+    assert found.discretisation == estimate(problem, frames, numbers=press_numbers).discretisation
+    fine, last = pressed(0.05)
+    truth = by_key(MarkerGrid.at(fine, grid.places).readings(fine, last[-1]))
+    within = [abs(value - truth[name]) <= 2.0 * errors[name] for name, value in told.items()]
+    assert np.mean(within) >= 0.9
+    assert max(errors.values()) <= 0.03  # of a depth of 1 mm
+
+
+def test_a_grid_whose_companion_fails_has_no_bars_and_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> Problem:
+        raise Finger3dError("no other mesh")
+
+    problem, frames = run(half_cylinder(0.4))
+    monkeypatch.setattr("finger3d.accuracy.estimate.companion", none)
+    found, errors = estimate_with_grid(problem, frames, MarkerGrid.of(problem, 1.0))
+    assert not errors
+    assert found.discretisation
+    assert "marker grid: mesh: no estimate: no other mesh" in found.method
 
 
 def test_error_bars_do_not_depend_on_how_long_the_press_takes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +38,7 @@ def model_at(E_MPa: float, leg: Leg) -> Model:
 @pytest.mark.parametrize("leg", [Leg(1.0, steps=8), Leg(1.0, steps=8, force_N=1.5)], ids=["depth", "force"])
 def test_they_are_the_changes_of_a_press_with_a_modulus_one_deviation_higher(leg: Leg) -> None:
     problem, steps = run(model_at(1.0, leg))
-    told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, SPREAD, press_numbers)[0]
+    told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, {"": SPREAD}, press_numbers)[0]
     stiff = press_numbers(*_last(run(model_at(1.0 + SPREAD, leg))))
     scale = 1.0 if leg.force_N is None else 1.0 + SPREAD
     # zones grow from point to point, and the dissipation depends on the increments
@@ -57,13 +58,13 @@ def _last(pressed: tuple) -> tuple:
 def test_there_are_none_where_the_modulus_is_given_or_the_press_has_ended_early() -> None:
     model = model_at(1.0, Leg(1.0, steps=2))
     problem, steps = run(model)
-    assert modulus_errors(problem, steps, None, press_numbers) == ({}, "")
-    assert modulus_errors(problem, [], SPREAD, press_numbers) == ({}, "")
+    assert modulus_errors(problem, steps, {}, press_numbers) == ({}, "")
+    assert modulus_errors(problem, [], {"": SPREAD}, press_numbers) == ({}, "")
     rigid = replace(problem, model=replace(model, parts=(("core", Isotropic(RIGID_RATIO, 0.3)),)))
-    assert modulus_errors(rigid, steps, SPREAD, press_numbers)[0]
+    assert modulus_errors(rigid, steps, {"": SPREAD}, press_numbers)[0]
     slid = replace(model, legs=(Leg(1.0, slide_x_mm=0.1, steps=2, force_N=1.0),))
     for other in (slid, LargeDeformation().apply(slid), ElasticObject(10.0, 0.3).apply(model)):
-        found, reason = modulus_errors(replace(problem, model=other), steps[:1], SPREAD, press_numbers)
+        found, reason = modulus_errors(replace(problem, model=other), steps[:1], {"": SPREAD}, press_numbers)
         assert not found
         assert "end of the path" in reason
 
@@ -94,7 +95,8 @@ def test_elsewhere_they_are_changes_on_a_coarser_mesh(changed_model: Callable[[M
     # with the edges of the tests above, of 0.4 mm, a mesh twice as coarse has three points in contact
     models = (replace(model_at(E_MPa, path), mesh=MeshOptions(0.2, 0.8, "swept")) for E_MPa in (1.0, 1.0 + SPREAD))
     (problem, steps), stiff = (run(changed_model(model)) for model in models)
-    (found, reason), told = modulus_errors(problem, steps, SPREAD, press_numbers), press_numbers(problem, steps[-1])
+    found, reason = modulus_errors(problem, steps, {"": SPREAD}, press_numbers)
+    told = press_numbers(problem, steps[-1])
     assert not reason
     changes = {name: abs(x - told[name]) for name, x in press_numbers(*_last(stiff)).items()}
     assert changes
@@ -102,6 +104,27 @@ def test_elsewhere_they_are_changes_on_a_coarser_mesh(changed_model: Callable[[M
         # the change is not linear in E, by up to the spread; edges of 0.4 mm leave errors of some 5 % of it, and more
         # where it is small, as that of a strain at a given depth
         assert found.get(name, 0.0) == pytest.approx(changes[name], rel=SPREAD + 0.05, abs=0.02 * abs(told[name])), name
+
+
+def test_spreads_of_several_moduli_add_as_squares_and_each_counts_alone() -> None:
+    tip = designs()["fingertip"](radius_mm=5.0, half_length_mm=4.0, edge_height_mm=3.0, width_mm=2.0, skin_mm=0.8)
+
+    def at(skin: float) -> Model:
+        model = replace(model_at(1.0, Leg(1.0, steps=4)), design=tip, mesh=MeshOptions(0.2, 0.8, "swept"))
+        return replace(model, parts=(("skin", Isotropic(skin, 0.4)),))
+
+    (problem, steps), stiff = run(at(3.0)), run(at(3.0 * (1.0 + SPREAD)))
+    alone = {
+        label: modulus_errors(problem, steps, {label: SPREAD}, press_numbers)[0]["normal_force_N"]
+        for label in ("", "skin")
+    }
+    told, more = (press_numbers(*_last(one))["normal_force_N"] for one in ((problem, steps), stiff))
+    # the change is not linear in E, by up to the spread
+    assert alone["skin"] == pytest.approx(more - told, rel=SPREAD + 0.05)
+    both = modulus_errors(problem, steps, {"": SPREAD, "skin": SPREAD}, press_numbers)[0]["normal_force_N"]
+    assert both == pytest.approx(math.hypot(*alone.values()), rel=1e-9)
+    # the force is proportional to both moduli together
+    assert sum(alone.values()) == pytest.approx(SPREAD * told, rel=0.1)
 
 
 @pytest.mark.parametrize("viscous", [False, True])
@@ -115,7 +138,7 @@ def test_on_a_path_of_forces_they_are_the_changes_by_a_higher_modulus(viscous: b
         models = [replace(model_at(E_MPa, path[0]), legs=path) for E_MPa in (1.0, 1.0 + SPREAD)]
         effect = Viscosity(((0.4, 1.0),))
         (problem, steps), stiff = (run(effect.apply(model) if viscous else model) for model in models)
-        told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, SPREAD, press_numbers)[0]
+        told, found = press_numbers(problem, steps[-1]), modulus_errors(problem, steps, {"": SPREAD}, press_numbers)[0]
         changes = {name: x - told[name] for name, x in press_numbers(*_last(stiff)).items()}
         for name, change in changes.items():
             assert found.get(name, 0.0) == pytest.approx((1.0 + SPREAD) * abs(change), rel=1e-6, abs=1e-8), name

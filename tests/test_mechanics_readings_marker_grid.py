@@ -32,11 +32,21 @@ def test_markers_cover_the_face_of_the_whole_finger_and_follow_a_field(symmetry:
 def test_the_table_has_every_marker_after_every_increment() -> None:
     problem = build(block(mesh=COARSE, markers=(Marker("m", 1.0, 3.0, -1.0),)))
     steps = list(march(problem))
-    table = marker_table(problem, steps, 2.0)
+    table = marker_table(problem, steps, MarkerGrid.of(problem, 2.0), {"marker_m_x_mm": 0.1, "marker_grid_1_y_mm": 0.2})
     count = 1 + 5 * 3
     assert [len(column) for column in table.values()] == [count * len(steps)] * len(table)
     assert list(table["marker"][:2]) == ["m", "grid_1"]
     assert table["depth_mm"][-1] == steps[-1].target.depth_mm
     # the marker of the scene is read by its own rows
     assert table["displacement_y_mm"][-count] == pytest.approx(steps[-1].markers["m"][1])
+    # errors are known after the last increment only
+    told = {name: np.flatnonzero(np.isfinite(table[f"error_{name}_mm"])).tolist() for name in "xyz"}
+    assert told == {"x": [count * (len(steps) - 1)], "y": [count * (len(steps) - 1) + 1], "z": []}
     assert marker_table(problem, steps, None)["marker"] == ["m"] * len(steps)
+
+
+def test_places_beside_the_contact_face_have_no_displacement() -> None:
+    problem = build(block(mesh=COARSE))
+    there = MarkerGrid.at(problem, np.array([[-3.0, 0.0, 1.0], [5.0, 0.0, 0.0]])).displacements(problem.mesh.points)
+    assert there[0] == pytest.approx([-3.0, 3.0, 1.0], abs=1e-12)
+    assert np.isnan(there[1]).all()

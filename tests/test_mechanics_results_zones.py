@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
@@ -15,7 +16,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.zones import Zone, zone_area, zone_ends, zones
+from finger3d.mechanics.results.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
 from finger3d.objects import Cylinder, Sphere
 
 MODULUS = 2.0
@@ -112,3 +113,37 @@ def test_the_area_of_a_zone_is_linear_in_where_its_border_cuts_the_facets() -> N
     zone = Zone(x == 0.0, lambda last, beyond: np.full(len(last), 0.3))
     assert zone_area(facets, area, zone) == pytest.approx(0.3, abs=1e-12)
     assert zone_area(np.array([[0, 1]]), np.array([2.0]), zone) == pytest.approx(0.6, abs=1e-12)
+
+
+def test_a_drawn_border_keeps_a_line_and_loses_the_teeth_of_an_unstructured_mesh() -> None:
+    random = np.random.default_rng(1)
+    at = random.uniform(-2.0, 2.0, (900, 2))
+    places, facets = np.pad(at, ((0, 0), (0, 1))), Delaunay(at).simplices
+
+    def border_of(level: np.ndarray, noise: float) -> np.ndarray:
+        """Places of the border of the zone in which `level` is negative."""
+        status = np.where(level < 0.0, STICK, OPEN)
+
+        def share(last: np.ndarray, beyond: np.ndarray) -> np.ndarray:
+            right = level[last] / (level[last] - level[beyond])
+            return np.clip(right + noise * np.sin(17.0 * last + 5.0 * beyond), 0.02, 0.98)
+
+        both = (Zone(status != OPEN, share), Zone(status == STICK, share))
+        shares = facet_borders(facets, status, both, places)
+        start, end = (places[facets[:, FACET_SIDES[:, k]]] for k in range(2))
+        cut = status[facets[:, FACET_SIDES[:, 0]]] != status[facets[:, FACET_SIDES[:, 1]]]
+        # a side has one border, whichever facet it is seen from
+        sides = np.sort(facets[:, FACET_SIDES][cut], axis=1)
+        border = (start + shares[..., None] * (end - start))[cut]
+        _, first, of = np.unique(sides, axis=0, return_index=True, return_inverse=True)
+        assert border == pytest.approx(border[first][of], abs=1e-12)
+        return border
+
+    line = border_of(at[:, 0] - 0.3, 0.0)
+    near = (line[:, 1] > -1.0) & (line[:, 1] < 1.0)
+    # shares are bounded by 0.02 and 0.98 of edges of some 0.15 mm
+    assert line[near, 0] == pytest.approx(0.3, abs=0.01)
+    radius = np.linalg.norm(border_of(np.linalg.norm(at, axis=1) - 1.0, 0.3), axis=1)
+    assert radius.mean() == pytest.approx(1.0, abs=0.01)
+    # independent errors of neighbours fall to sqrt(3/8) of their size in a round
+    assert radius.std() < 0.6 * 0.3 / math.sqrt(2.0) * 0.15

@@ -10,10 +10,10 @@ import pytest
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
 from finger3d.materials.elastic import elastic_constants
-from finger3d.materials.modulus import modulus_of_shore_A
+from finger3d.materials.modulus import SPREAD_A, modulus_of_shore_A
 from finger3d.mechanics.model import Leg
 from finger3d.scene import load, parse
-from finger3d.scene.derived import check_parts, largest_spread, moduli, parts_of
+from finger3d.scene.derived import check_parts, largest_spread, moduli, parts_of, spreads
 from finger3d.scene.tables import SceneTable
 from tests.designs import GOOD
 from tests.scene_tables import SMALL
@@ -78,7 +78,10 @@ def test_a_part_is_of_a_silicone_or_of_a_hardness() -> None:
     assert found["skin"] == Isotropic(elastic_constants({"silicone": "Ecoflex 00-30"}).E_MPa, 0.49)
     assert found["core"] == Isotropic(modulus_of_shore_A(60.0), 0.4)
     assert largest_spread(both) == 0.6
+    skin = elastic_constants({"silicone": "Ecoflex 00-30"}).spread
+    assert spreads(both) == {"skin": skin, "core": SPREAD_A}
     assert largest_spread(tables(core={"rigid": True})) is None
+    assert spreads(tables(core={"rigid": True})) == {}
     words = moduli(tables(skin={"silicone": "ecoflex 00-30"}, core={"rigid": True}))
     assert words["modulus"] == "1 MPa, given"
     assert "Ecoflex 00-30" in words["modulus of skin"]

@@ -7,6 +7,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from finger3d.cli import main
@@ -102,6 +103,12 @@ def test_a_press_writes_every_reading(tmp_path: Path, domain: str) -> None:
                  and abs(float(r["z_mm"])) < 1.0)  # fmt: skip
     # the marker under the lowest point of the ball goes down with it, but for the ball's sag over an edge of 0.8 mm
     assert float(under["displacement_y_mm"]) == pytest.approx(-0.3, abs=0.8**2 / (2.0 * 4.0))
+    # the bar of the scene's marker is that of the summary, and the grid has its own
+    bars = [float(r["error_y_mm"]) for r in rows]
+    parts = [summary["error_estimate"][part]["marker_m1_y_mm"] for part in ("discretisation", "steps")]
+    assert bars[len(rows) // 2] == pytest.approx(sum(parts), rel=1e-12)
+    assert np.isnan(bars[: len(rows) // 2]).all()
+    assert min(bars[len(rows) // 2 :]) > 0.0
     assert (tmp_path / "out" / "markers.png").stat().st_size > 10_000
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "taxel t1" in page

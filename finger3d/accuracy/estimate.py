@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -36,6 +36,7 @@ from finger3d.mechanics.march.step_halving import (
     with_increments_of,
 )
 from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, Column, by_key, in_space
+from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.meshing.given.given import GivenMesh
@@ -157,6 +158,49 @@ def estimate(
         increment_errors = {name: error for name, error in increment_errors.items() if name not in GIVEN_BY_FORCE}
     method, seconds = f"{found.method}; steps: {by}", time.perf_counter() - start
     return replace(found, steps=increment_errors, method=method, seconds=seconds)
+
+
+def estimate_with_grid(
+    problem: Problem,
+    steps: Sequence[StepResult],
+    grid: MarkerGrid,
+    report: Progress = QUIET,
+    runs: Sequence[Run] = (),
+) -> tuple[ErrorEstimate, dict[str, float]]:
+    """Estimate the errors of a press, and those of the displacements of a grid of markers.
+
+    Those of the grid come from a companion mesh in any case: an adjoint for every marker would cost more.
+
+    Returns
+    -------
+    press : the errors of `press_numbers`, as `estimate` returns them
+    markers : sums of the errors of mesh and increments by the keys of the columns, mm; empty without an estimate
+    """
+
+    def moved(p: Problem, step: StepResult) -> dict[str, float]:
+        return by_key(MarkerGrid.at(p, grid.places).readings(p, step))
+
+    def both(p: Problem, step: StepResult) -> dict[str, float]:
+        return press_numbers(p, step) | moved(p, step)
+
+    if not steps or not steps[-1].outcome.ok:
+        return estimate(problem, steps, report, press_numbers, runs), {}
+    own = grid.readings(problem, steps[-1])
+    if applies(problem.model):
+        found = estimate(problem, steps, report, press_numbers, runs)
+        markers = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, runs)
+        missing = "" if markers.discretisation else f"; marker grid: {markers.method}"
+        return replace(found, method=found.method + missing), markers.totals()
+    read = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)]
+    found = estimate(problem, read, report, both, runs)
+    totals, of_grid = found.totals(), by_key(own)
+
+    def of_press(errors: Mapping[str, float]) -> dict[str, float]:
+        return {name: error for name, error in errors.items() if name not in of_grid}
+
+    mesh, increments, beside = map(of_press, (found.discretisation, found.steps, found.companion_numbers))
+    found = replace(found, discretisation=mesh, steps=increments, companion_numbers=beside)
+    return found, {name: error for name, error in totals.items() if name in of_grid}
 
 
 def _of_increments(

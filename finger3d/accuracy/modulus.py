@@ -8,8 +8,8 @@ alone, and a force, energy or pressure on E and F / E ::
     J(F; (1 + s) E) = J(F / (1 + s); E),    J(F; (1 + s) E) = (1 + s) J(F / (1 + s); E)
 
 On a single leg straight down this follows from the increments at smaller forces, on other paths in small strain from a
-press with all forces divided by 1 + s, which has the same condensation.  In all other models the scene is pressed twice
-on a coarser mesh, with E times r = 1 + s and divided by it ::
+press with all forces divided by 1 + s, which has the same condensation.  In all other models, and for the modulus of a
+part, the scene is pressed twice on a coarser mesh, with E times r = 1 + s and divided by it ::
 
     error of J = s |J(r E) - J(E / r)| / (2 log r)
 """
@@ -17,7 +17,7 @@ on a coarser mesh, with E times r = 1 + s and divided by it ::
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from finger3d.accuracy.changes import affordable_factor
 from finger3d.accuracy.companions import built_like, coarser
 from finger3d.accuracy.cost import forecast
 from finger3d.errors import Finger3dError
+from finger3d.fem.solids.material import Material
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.path import stations
@@ -35,6 +36,8 @@ from finger3d.mechanics.march.step_halving import last_step, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import QUANTITIES
 from finger3d.mechanics.results.history import StepResult
+
+Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 _STRESS_UNITS = ("_N", "_Nmm", "_mJ", "_MPa")
 """Ends of the names of numbers that are proportional to the stresses."""
@@ -49,17 +52,19 @@ _MOST_STEPS = 5
 def modulus_errors(
     problem: Problem,
     steps: Sequence[StepResult],
-    spread: float | None,
-    numbers: Callable[[Problem, StepResult], dict[str, float]],
+    spreads: Mapping[str, float],
+    numbers: Measure,
     workspace: Workspace | None = None,
 ) -> tuple[dict[str, float], str]:
-    """Return the errors of the last increment due to the spread of Young's modulus of the main body, by name.
+    """Return the errors of the last increment due to the spreads of Young's moduli of the finger, by name.
+
+    Those of several moduli, which are independent, add as squares.
 
     Parameters
     ----------
     steps : all increments, converged
-    spread : relative standard deviation of Young's modulus; None if it is given
-    numbers : the numbers of an increment by name; of those that depend on the modulus, the errors are returned
+    spreads : relative standard deviation of Young's modulus by the label of the part, that of the main body by ""
+    numbers : the numbers of an increment by name; of those that depend on the moduli, the errors are returned
     workspace : of the press
 
     Returns
@@ -67,32 +72,47 @@ def modulus_errors(
     errors : in the units of the numbers; empty without a spread or an estimate
     reason : why there is no estimate, in words; empty if there is one, or nothing to estimate
     """
-    if not spread or not steps:
+    if not spreads or not steps:
         return {}, ""
+    try:
+        found = [_of_part(problem, steps, part, numbers, workspace) for part in spreads.items()]
+    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
+        return {}, str(error) or type(error).__name__
+    names = dict.fromkeys(name for errors in found for name in errors)
+    return {name: math.hypot(*(errors.get(name, 0.0) for errors in found)) for name in names}, ""
+
+
+def _of_part(
+    problem: Problem,
+    steps: Sequence[StepResult],
+    part: tuple[str, float],
+    numbers: Measure,
+    workspace: Workspace | None,
+) -> dict[str, float]:
+    """Return the errors due to the spread of one modulus, by name; `part` is its label and this spread."""
+    label, spread = part
     others = {column.key for column in steps[-1].readings if column.kind not in QUANTITIES}
     told = {name: x for name, x in numbers(problem, steps[-1]).items() if name not in others}
     model = problem.model
-    if model.forces_scale_with_modulus:
-        return {name: spread * abs(x) for name, x in told.items() if name.endswith(_STRESS_UNITS)}, ""
+    if not label and model.forces_scale_with_modulus:
+        return {name: spread * abs(x) for name, x in told.items() if name.endswith(_STRESS_UNITS)}
     ratio = 1.0 + spread
-    try:
-        if not model.stresses_scale_with_modulus or (model.finite_strain and not _is_press_to_force(model)):
-            soft, stiff = (_on_coarser_mesh(problem, len(steps), e, numbers) for e in (1.0 / ratio, ratio))
-            share = 0.5 * spread / math.log(ratio)
-        else:
-            soft, share = told, ratio
-            stiff = _stiffer_by_scaling(problem, steps, ratio, numbers, workspace)
-    except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-        return {}, str(error) or type(error).__name__
+    scales = not label and model.stresses_scale_with_modulus
+    if not scales or (model.finite_strain and not _is_press_to_force(model)):
+        soft, stiff = (_on_coarser_mesh(problem, len(steps), (label, e), numbers) for e in (1.0 / ratio, ratio))
+        share = 0.5 * spread / math.log(ratio)
+    else:
+        soft, share = told, ratio
+        stiff = _stiffer_by_scaling(problem, steps, ratio, numbers, workspace)
     errors = {name: share * abs(stiff[name] - soft[name]) for name in told}
-    return {name: error for name, error in errors.items() if error > _ROUND_OFF * abs(told[name])}, ""
+    return {name: error for name, error in errors.items() if error > _ROUND_OFF * abs(told[name])}
 
 
 def _stiffer_by_scaling(
     problem: Problem,
     steps: Sequence[StepResult],
     ratio: float,
-    numbers: Callable[[Problem, StepResult], dict[str, float]],
+    numbers: Measure,
     workspace: Workspace | None,
 ) -> dict[str, float]:
     """Return the numbers, by name, with Young's modulus times a ratio, from a press to forces divided by it."""
@@ -108,19 +128,30 @@ def _stiffer_by_scaling(
     return {name: (ratio if name.endswith(_STRESS_UNITS) else 1.0) * x for name, x in softer.items()}
 
 
-def _on_coarser_mesh(
-    problem: Problem, increments: int, ratio: float, numbers: Callable[[Problem, StepResult], dict[str, float]]
-) -> dict[str, float]:
-    """Return the numbers, by name, on a coarser mesh, with Young's modulus of the main body times a ratio."""
-    model = problem.model
-    material = model.material.isotropic("the spread of E_MPa")
+def _on_coarser_mesh(problem: Problem, increments: int, part: tuple[str, float], numbers: Measure) -> dict[str, float]:
+    """Return the numbers, by name, on a coarser mesh, with Young's modulus of one part times a ratio.
+
+    `part` is its label, empty for the main body, and the ratio.
+    """
+    model, (label, ratio) = problem.model, part
     legs = _finished_legs(model, increments)
     few = tuple(replace(leg, steps=min(int(leg.steps), _MOST_STEPS)) for leg in legs)
-    changed = replace(model, material=replace(material, E_MPa=ratio * material.E_MPa), legs=few)
+    changed = replace(
+        model,
+        material=_times(model.material, 1.0 if label else ratio),
+        parts=tuple((name, _times(one, ratio if name == label else 1.0)) for name, one in model.parts),
+        legs=few,
+    )
     seconds = CHANGES.seconds(forecast(replace(model, legs=legs))["total_s"])
     factor = affordable_factor(lambda factor: coarser(changed, factor), seconds)
     beside = built_like(problem, coarser(changed, factor))
     return numbers(beside, last_step(beside))
+
+
+def _times(material: Material, ratio: float) -> Material:
+    """Return a material with its Young's modulus times a ratio."""
+    own = material.isotropic("the spread of E_MPa")
+    return replace(own, E_MPa=ratio * own.E_MPa)
 
 
 def _last_of_press_to_less(problem: Problem, increments: int, ratio: float, workspace: Workspace | None) -> StepResult:

@@ -99,6 +99,7 @@ def run_press(
     if error:
         _estimate_errors(record, report)
         writer.error_shares(record)
+        writer.markers(record)
         _estimate_changes(record, report)
         summary = writer.summary(record, record.outcome())
     if figures:
@@ -251,15 +252,21 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 
 def _estimate_errors(record: PressRecord, report: Progress) -> None:
     """Estimate the errors by mesh and increments."""
-    from finger3d.accuracy.estimate import estimate, press_numbers
+    from finger3d.accuracy.estimate import estimate, estimate_with_grid, press_numbers
     from finger3d.accuracy.modulus import modulus_errors
     from finger3d.accuracy.price import price_of_a_third
+    from finger3d.scene.derived import spreads
 
     report.stage("estimating the error")
     runs = record.step_estimate.runs if record.step_estimate else ()
-    found = estimate(record.problem, record.steps, report, press_numbers, runs)
-    spread = record.scene.tables.material.constants.spread
-    by_modulus, why = modulus_errors(record.problem, record.converged_steps, spread, press_numbers, record.workspace)
+    grid, of_grid = record.marker_grid, dict[str, float]()
+    if grid is None:
+        found = estimate(record.problem, record.steps, report, press_numbers, runs)
+    else:
+        found, of_grid = estimate_with_grid(record.problem, record.steps, grid, report, runs)
+    record.marker_errors = found.totals() | of_grid
+    known = spreads(record.scene.tables)
+    by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers, record.workspace)
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
     third = ""
     if found.discretisation:

@@ -141,6 +141,11 @@ class ResultWriter:
             at_rest = {"displacement": np.zeros_like(mesh.points)}
             write_vtu(self.folder / "error_shares.vtu", mesh, at_rest, dict(estimate.body.shares))
 
+    def markers(self, record: PressRecord) -> None:
+        """Write markers.csv, if there are markers, with their errors as far as they are known."""
+        if markers := _markers(record):
+            write_csv(self.folder / "markers.csv", markers)
+
     def fields(self, record: PressRecord, fields: Fields) -> None:
         """Write fields.vtu, fields after the last converged increment, and steps.npz, states of chosen increments."""
         good = record.converged_steps
@@ -148,8 +153,7 @@ class ResultWriter:
         surface = _on_surface(mesh, record.problem.points, step)
         states = states_of(record.problem, good, mesh, fields.image_of, fields.mirror_sign, fields.displacement)
         write_states(self.folder / "steps.npz", states)
-        if markers := _markers(record):
-            write_csv(self.folder / "markers.csv", markers)
+        self.markers(record)
         write_vtu(
             self.folder / "fields.vtu",
             mesh,
@@ -200,10 +204,10 @@ class ResultWriter:
 
 def _markers(record: PressRecord) -> Tree | None:
     """Return the columns of markers.csv; None without markers."""
-    grid, good = record.scene.tables.marker_grid, record.converged_steps
+    good, grid = record.converged_steps, record.marker_grid
     if not good or not (record.problem.model.markers or grid):
         return None
-    return marker_table(record.problem, good, grid.spacing_mm if grid else None)
+    return marker_table(record.problem, good, grid, record.marker_errors)
 
 
 def history_table(points: ContactPoints, steps: Sequence[StepResult]) -> dict[str, ArrayLike]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate
+    from finger3d.mechanics.readings.marker_grid import MarkerGrid
     from finger3d.mechanics.results.penetration import SurfaceCheck
     from finger3d.scene import Scene
 
@@ -54,6 +55,7 @@ class PressRecord:
     surface_checks : the finger's free surface after each converged increment, once all are solved
     step_estimate : how automatic increments were chosen
     error_estimate : errors by mesh and increments
+    marker_errors : of the displacements of markers, those of the grid among them, by the keys of their columns, mm
     largest_strain : principal strain at the end, without singular corners
     need : which effects are on because the scene calls for them, if it leaves that open
     model_error : what the effects that are off would change, by name
@@ -71,6 +73,7 @@ class PressRecord:
     surface_checks: list[SurfaceCheck] = field(default_factory=list)
     step_estimate: StepEstimate | None = None
     error_estimate: ErrorEstimate | None = None
+    marker_errors: Mapping[str, float] = field(default_factory=dict)
     largest_strain: float = 0.0
     need: Need | None = None
     model_error: Mapping[str, ChangeEstimate] = field(default_factory=dict)
@@ -99,6 +102,14 @@ class PressRecord:
     def history(self) -> History:
         """The increments with the contact points they belong to."""
         return History(self.problem.points, tuple(self.steps))
+
+    @property
+    def marker_grid(self) -> MarkerGrid | None:
+        """The grid of markers, if the scene has one."""
+        from finger3d.mechanics.readings.marker_grid import MarkerGrid
+
+        table = self.scene.tables.marker_grid
+        return MarkerGrid.of(self.problem, table.spacing_mm) if table else None
 
     @property
     def converged_steps(self) -> list[StepResult]:

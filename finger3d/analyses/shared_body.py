@@ -28,7 +28,7 @@ from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.marker_grid import grid_readings
+from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.results.penetration import check_surface
 from finger3d.progress import QUIET, Progress
@@ -252,10 +252,10 @@ class _Run:
         numbers = table_row(self.problem.points, replace(last, readings={}))
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
-        readings = in_space(last.readings)
+        readings = last.readings
         if grid_mm is not None:
-            readings |= grid_readings(self.problem, last, grid_mm)
-        return VariantResult(str(Outcome.CONVERGED), residual, numbers, readings, self.seconds)
+            readings = readings | MarkerGrid.of(self.problem, grid_mm).readings(self.problem, last)
+        return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), self.seconds)
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

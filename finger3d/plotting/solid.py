@@ -13,7 +13,7 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
-from finger3d.mechanics.results.zones import Zone, border_shares
+from finger3d.mechanics.results.zones import FACET_SIDES, Zone, facet_borders
 from finger3d.plotting.renderer import (
     AXES,
     WINDOW,
@@ -186,9 +186,11 @@ def _coloured(
     corner[known], statuses[known] = pressure[at[known]], status[at[known]]
     place = np.zeros((len(facets), len(_RING) + 1, 3))  # of the corners, of a point of each side, of their centre
     place[:, :3] = np.eye(3)
-    for side, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
-        share = border_shares(at[:, [i, j]], status, zones)
-        place[:, 3 + side, i], place[:, 3 + side, j] = 1.0 - share, share
+    of_point = np.zeros((len(status), 3))
+    of_point[point[point >= 0]] = moved[point >= 0]
+    shares = facet_borders(at, status, zones, of_point)
+    for side, (i, j) in enumerate(FACET_SIDES):
+        place[:, 3 + side, i], place[:, 3 + side, j] = 1.0 - shares[:, side], shares[:, side]
     place[:, 6] = place[:, 3:6].mean(axis=1)
     shapes = np.concatenate([place * (2.0 * place - 1.0), 4.0 * place * np.roll(place, -1, axis=2)], axis=2)
     return (

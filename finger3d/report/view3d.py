@@ -11,12 +11,10 @@ import numpy as np
 from finger3d._types import Array
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.zones import border_shares
+from finger3d.mechanics.results.zones import facet_borders
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
 from finger3d.results.states import States, chosen, label
-
-_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 _MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 1.8 MB
 
@@ -126,10 +124,10 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
             out[own] = states.on_points(name, k, int(face))[corners[own]]
         return out
 
-    sides = states.contact_facets[:, _SIDES].reshape(-1, 2)
+    places = states.points[states.nodes].astype(float)
 
     def borders(k: int) -> Array:
-        return border_shares(sides, states.status[k], states.zones(k)).reshape(-1, 3)
+        return facet_borders(states.contact_facets, states.status[k], states.zones(k), places)
 
     return View3D(
         rest=rest,

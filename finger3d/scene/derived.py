@@ -33,10 +33,18 @@ def _isotropic(constants: ElasticConstants) -> Isotropic:
     return Isotropic(constants.E_MPa, constants.nu)
 
 
+def spreads(tables: SceneTable) -> dict[str, float]:
+    """Return the relative standard deviations of the Young's moduli of the finger that are not given.
+
+    They stand by the label of the part, that of the main body by "".
+    """
+    elastic = {"": tables.material, **{label: part for label, part in tables.parts.items() if not part.rigid}}
+    return {label: s for label, table in elastic.items() if (s := table.constants.spread) is not None}
+
+
 def largest_spread(tables: SceneTable) -> float | None:
     """Return the largest relative standard deviation of a Young's modulus of the finger; None if all are given."""
-    elastic = (tables.material, *(part for part in tables.parts.values() if not part.rigid))
-    return max((s for table in elastic if (s := table.constants.spread) is not None), default=None)
+    return max(spreads(tables).values(), default=None)
 
 
 def moduli(tables: SceneTable) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +39,7 @@ class MarkerGrid:
     places : (k, d) mm, at rest
     rows : (k, n) sparse
         Interpolation from the nodes of the meshed part.
-    sign : (k, d) factor of the components of a displacement, -1 in a mirror image
+    sign : (k, d) factor of the components of a displacement, -1 in a mirror image, NaN beside the contact face
     """
 
     places: Float
@@ -49,37 +49,53 @@ class MarkerGrid:
     @classmethod
     def of(cls, problem: Problem, spacing_mm: float) -> MarkerGrid:
         """Return markers every `spacing_mm` along x and z, with one in the middle, as far as the contact face goes."""
-        mesh, design, d = problem.mesh, problem.model.design, problem.dim
+        design, d = problem.model.design, problem.dim
         x, z = (np.arange(-(half // spacing_mm), half // spacing_mm + 1.0) * spacing_mm
                 for half in (design.half_length_mm, design.width_mm / 2.0))  # fmt: skip
         z = z if d == 3 else np.zeros(1)
-        below = np.zeros((len(x) * len(z), d))
-        below[:, 0] = x.repeat(len(z))
-        below[:, 2:] = np.tile(z, len(x))[:, None]
-        below[:, 1] = mesh.points[:, 1].min() - 1.0
-        sign = np.ones_like(below)
+        places = np.zeros((len(x) * len(z), d))
+        places[:, 0] = x.repeat(len(z))
+        places[:, 2:] = np.tile(z, len(x))[:, None]
+        grid = cls.at(problem, places)
+        there = ~np.isnan(grid.sign[:, 0])
+        return cls(grid.places[there], grid.rows[there], grid.sign[there])
+
+    @classmethod
+    def at(cls, problem: Problem, places: Float) -> MarkerGrid:
+        """Return markers at the x and z of places (k, d) on any mesh of the finger."""
+        mesh, sign = problem.mesh, np.ones_like(places)
         for k in axis_numbers(problem.axes):
-            sign[below[:, k] < 0.0, k] = -1.0
-        rows, there = values_over(mesh, "contact", below * sign, lowest=False)
-        places = below[there]
-        places[:, 1] = (rows @ mesh.points[:, 1])[there]
-        return cls(places, rows[there], sign[there])
+            sign[places[:, k] < 0.0, k] = -1.0
+        below = places * sign
+        below[:, 1] = mesh.points[:, 1].min() - 1.0
+        rows, there = values_over(mesh, "contact", below, lowest=False)
+        at = places.copy()
+        at[:, 1] = rows @ mesh.points[:, 1]
+        return cls(at, rows, np.where(there[:, None], sign, np.nan))
 
     def displacements(self, u: Float) -> Float:
         """Return the displacements (k, d) of the markers from those (n, d) of the part's nodes."""
         return np.asarray(self.sign * (self.rows @ u))
 
+    def readings(self, problem: Problem, step: StepResult) -> dict[Column, float]:
+        """Return the displacements after an increment of a problem, as those of other markers."""
+        (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
+        moved = self.displacements(displacement(problem.mesh, unknowns))
+        columns = (column for k in range(len(moved)) for column in displacement_columns(f"grid_{k + 1}", problem.dim))
+        return dict(zip(columns, map(float, moved.ravel()), strict=True))
 
-def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: float | None) -> Tree:
+
+def marker_table(
+    problem: Problem, steps: Sequence[StepResult], grid: MarkerGrid | None, errors: Mapping[str, float] | None = None
+) -> Tree:
     """Return the columns of markers.csv: every marker of the scene and of its grid, after every increment.
 
     Parameters
     ----------
     steps : converged increments
-    spacing_mm : of the grid; None without one
+    errors : of the displacements after the last increment, by the keys of their columns, mm
     """
     named = problem.model.markers
-    grid = MarkerGrid.of(problem, spacing_mm) if spacing_mm else None
     positions = [m.place[: problem.dim] for m in named] + ([] if grid is None else list(grid.places))
     count = len(positions) - len(named)
     moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
@@ -94,16 +110,11 @@ def marker_table(problem: Problem, steps: Sequence[StepResult], spacing_mm: floa
     }
     places, displacements = np.tile(_in_space(np.array(positions)), (len(steps), 1)), _in_space(np.vstack(moved))
     columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
-    return columns | {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
-
-
-def grid_readings(problem: Problem, step: StepResult, spacing_mm: float) -> dict[Column, float]:
-    """Return the displacements of the markers of a grid after an increment, as those of other markers."""
-    grid = MarkerGrid.of(problem, spacing_mm)
-    (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
-    moved = _in_space(grid.displacements(displacement(problem.mesh, unknowns)))
-    columns = (column for k in range(len(moved)) for column in displacement_columns(f"grid_{k + 1}"))
-    return dict(zip(columns, map(float, moved.ravel()), strict=True))
+    columns |= {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
+    known = np.full((len(steps), len(positions), 3), np.nan)
+    last, errors = columns["marker"][: len(positions)], errors or {}
+    known[-1] = [[errors.get(c.key, np.nan) for c in displacement_columns(name)] for name in last]
+    return columns | {f"error_{axis}_mm": known[..., k].ravel() for k, axis in enumerate("xyz")}
 
 
 def _in_space(vectors: Float) -> Float:

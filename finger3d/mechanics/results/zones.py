@@ -43,6 +43,15 @@ _SMALL_SLOPE = 1e-2
 _SHARES = 0.02, 0.98
 """Least and largest share of a side at which a border is drawn: no part of a facet is without area."""
 
+_STEEP = 0.01
+"""Square of the sine of the angle between a side and such a chord, below which the border is left where it is."""
+
+FACET_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+"""Corners at the ends of each side of a triangle."""
+
+_ROUNDS = 2
+"""Times that a drawn border is smoothed: two take off the teeth of unstructured meshes, and keep corners of zones."""
+
 
 @dataclass(frozen=True)
 class Zone:
@@ -204,3 +213,45 @@ def border_shares(pairs: Int, status: Int, zones: tuple[Zone, Zone] | None) -> F
             share = np.clip(zone.share(pairs[on, inner], pairs[on, outer]), *_SHARES)
             shares[on] = share if inner == 0 else 1.0 - share
     return shares
+
+
+def facet_borders(facets: Int, status: Int, zones: tuple[Zone, Zone] | None, places: Float) -> Float:
+    """Return where the status changes on each side of the facets of a surface, (f, 3) shares, for drawing.
+
+    The border on a side is moved, by half of the way, to the chord between its neighbours, the borders on the two sides
+    that it is joined to across the facets beside it.
+
+    Parameters
+    ----------
+    facets : (f, 3) contact points at the corners; -1: none
+    zones : of contact and of stick; None: midway
+    places : (m, 3) mm, of the contact points
+    """
+    ends = facets[:, FACET_SIDES].reshape(-1, 2)
+    shares = border_shares(ends, status, zones)
+    if zones is None:
+        return shares.reshape(-1, 3)
+    sides, number = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    turned = ends[:, 0] > ends[:, 1]
+    at = np.zeros(len(sides))
+    at[number] = np.where(turned, 1.0 - shares, shares)
+    whole, state = (facets >= 0).all(axis=1), status[facets]
+    cut = np.logical_and(whole[:, None], np.not_equal(state, np.roll(state, -1, axis=1)))
+    on_two = cut.sum(axis=1) == 2
+    pairs = number.reshape(-1, 3)[on_two][cut[on_two]].reshape(-1, 2)
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    between = np.bincount(one, minlength=len(sides)) == 2
+    order = np.argsort(one, kind="stable")
+    before, after = other[order][between[one[order]]].reshape(-1, 2).T
+    start, along = places[sides[:, 0]], places[sides[:, 1]] - places[sides[:, 0]]
+    for _ in range(_ROUNDS):
+        border = start + at[:, None] * along
+        chord = border[after] - border[before]
+        chord /= np.maximum(np.linalg.norm(chord, axis=1), np.finfo(float).tiny)[:, None]
+        arms = np.stack([along[between], border[before] - start[between]])
+        across, reach = arms - np.einsum("ask,sk->as", arms, chord)[..., None] * chord
+        square, long = (np.einsum("sk,sk->s", v, v) for v in (across, along[between]))
+        met = np.einsum("sk,sk->s", across, reach) / np.where(square > _STEEP * long, square, np.inf)
+        met = np.where(square > _STEEP * long, met, at[between])
+        at[between] = np.clip(0.5 * (at[between] + met), *_SHARES)
+    return np.where(turned, 1.0 - at[number], at[number]).reshape(-1, 3)
