@@ -20,6 +20,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import (
     automatic,
+    errors_of_runs,
     increment_error,
     limits,
     march_automatic,
@@ -127,6 +128,12 @@ def test_a_failure_before_the_automatic_legs_is_not_repeated() -> None:
 def test_the_error_is_exact_at_first_order(ratio: float) -> None:
     value, other = (3.0 + 1.0 / n for n in (20.0, 20.0 * ratio))
     assert increment_error(value, other, ratio) == pytest.approx(1.0 / 20.0, rel=1e-9)
+
+
+def test_two_runs_that_agree_by_chance_do_not_hide_the_error_of_those_before() -> None:
+    runs = [(10, {"x": 1.4, "y": 1.0}), (20, {"x": 1.0, "y": 1.3}), (40, {"x": 1.0, "y": 1.0})]
+    assert errors_of_runs(runs) == pytest.approx({"x": 0.2, "y": 0.3})
+    assert errors_of_runs(runs[1:]) == pytest.approx({"x": 0.0, "y": 0.3})
 
 
 @pytest.mark.parametrize("domain", ["solid", "plane-strain"])

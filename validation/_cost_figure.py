@@ -109,6 +109,7 @@ def _condensation(axes: Any, runs: Sequence[Line]) -> None:
     axes.set(
         title="What does one condensation save?", xlabel="unknowns", ylabel="processor time, mesh to last increment (s)"
     )
+    axes.set_ylim(top=20.0 * axes.get_ylim()[1])  # room for the legend
 
 
 def _large(axes: Any, runs: Sequence[Line]) -> None:

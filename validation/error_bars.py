@@ -48,7 +48,7 @@ CLAIM = "claim of finger3d for its error bars"
 COLUMNS = "scene part dofs mu depth_mm number value estimate true_error"
 NARROW = 2.5
 """Median of bar over true error that is aimed at: a wide bar asks for meshes that nobody needs."""
-ROUND_OFF = 1e-9  # of the normal force: a number that is zero by symmetry
+ROUND_OFF = 1e-9  # of the normal force or the work: a number that is zero, by symmetry or where nothing slips
 SEED = 2026
 """Of the quick form, whose scenes stay."""
 
@@ -57,6 +57,13 @@ LEAST = 20
 
 ROUND = 1e-4  # of a number: a point that changes its state only in the truth
 STEPS, TRUE_STEPS = (5, 10, 20, 40, 80), 1280
+SOLID_STEPS = 20
+"""Increments of drawn solids: the error of fewer, which is another on each mesh, would count as one of the mesh."""
+
+SECTIONS, SOLIDS = 64, 64
+"""Drawn scenes of a full run.  Of 16 on two meshes each, a share that is .95 in the long run is below .9 in one of ten
+runs or more, and there are some twenty such shares; of 64, in one of a hundred."""
+
 STEP_KINDS = ("normal_force_N", "friction_sum_N", "stick_half_length_mm", "gauge", "external_work_mJ", "dissipation_mJ")
 MET = {
     "normal_force_N": TOLERANCE, "friction_sum_N": TOLERANCE, "gauge": TOLERANCE,
@@ -134,7 +141,8 @@ def _by_drawn_mesh(seed: int, sections: int, solids: int) -> tuple[list[Judged],
     """Numbers of drawn sections and of drawn solids on two meshes; presses that do not converge are left out."""
     found: tuple[list[Judged], list[Judged]] = ([], [])
     scenes = [(0, *scene, (1.5, 0.8), 0.2) for scene in drawn(sections, seed)]
-    scenes += [(1, *scene, (1.0, 0.7), 0.4) for scene in drawn_solids(solids, seed)]
+    in_solids = ((name, _in_increments(model, SOLID_STEPS)) for name, model in drawn_solids(solids, seed))
+    scenes += [(1, *scene, (1.0, 0.7), 0.4) for scene in in_solids]
     for kind, name, model, factors, finest in scenes:
         model = with_readings(model)
         truth, last = _pressed(build(_in_edges(model, finest)))
@@ -144,6 +152,11 @@ def _by_drawn_mesh(seed: int, sections: int, solids: int) -> tuple[list[Judged],
                 depth, right = model.legs[0].depth_mm, press_numbers(truth, last[-1])
                 found[kind].extend(_judged(f"seed {seed}, {name}", press, frames, model.friction.mu, depth, right))
     return found
+
+
+def _in_increments(model: Model, count: int) -> Model:
+    """The model with a number of increments in every leg."""
+    return replace(model, legs=tuple(replace(leg, steps=count) for leg in model.legs))
 
 
 def _in_edges(model: Model, factor: float) -> Model:
@@ -168,7 +181,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
     ends: dict[int, list[StepResult]] = {}
 
     def in_steps(count: int) -> Problem:
-        return replace(problem, model=replace(model, legs=tuple(replace(leg, steps=count) for leg in model.legs)))
+        return replace(problem, model=_in_increments(model, count))
 
     for n in (*counts, true_count):
         ends[n] = list(march(in_steps(n)))
@@ -185,10 +198,10 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
         kind = "automatic, met" if chosen.met else "automatic, not met"
         bars = estimate(free, found, numbers=press_numbers, runs=chosen.runs).steps
         runs.append((kind, press_numbers(problem, found[-1]), bars))
-        exact["floor"] = 1e-4 * exact["external_work_mJ"]
+    least = (1e-4 if chosen else ROUND_OFF) * exact["external_work_mJ"]  # else it is round-off, where nothing slips
     for part, numbers, bars in runs:
         for k, value in numbers.items():
-            if k == "dissipation_mJ" and exact[k] < exact.get("floor", 0.0):
+            if k == "dissipation_mJ" and exact[k] < least:
                 continue
             dofs = problem.body.stiffness.upper.shape[0]
             depth = model.legs[0].depth_mm
@@ -208,8 +221,8 @@ def run(quick: bool, seed: int | None = None) -> Result:
         seed = SEED if quick else secrets.randbits(31)
     chosen = cases(quick)
     found = [j for case in chosen for j in _by_mesh(case)]
-    sections, counts, true_count = (8, STEPS[:3:2], 320) if quick else (64, STEPS, TRUE_STEPS)
-    anew = _by_drawn_mesh(seed, *((8, 2) if quick else (64, 16)))
+    sections, counts, true_count = (8, STEPS[:3:2], 320) if quick else (SECTIONS, STEPS, TRUE_STEPS)
+    anew = _by_drawn_mesh(seed, *((8, 2) if quick else (SECTIONS, SOLIDS)))
     steps = [j for name, model in drawn(sections, seed) for j in _by_steps(name, model, counts, true_count)]
     rows = [row for kind in KINDS for row in _rows(kind, found, "by mesh")]
     rows += _narrow(found, "by mesh")

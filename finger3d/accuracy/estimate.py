@@ -30,7 +30,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
     Run,
-    errors_between,
+    errors_of_runs,
     last_step,
     step_error,
     with_increments_of,
@@ -221,9 +221,8 @@ def _of_increments(
     if has_exact_path(own.model):
         return dict.fromkeys(numbers(own, steps[-1]), 0.0), "exact"
     if runs:
-        (few, coarse), (many, fine) = runs[-2:]
-        errors = errors_between(numbers(own, fine[-1]), numbers(own, coarse[-1]), few / many)
-        return errors, f"{few} and {many}, order 1"
+        errors = errors_of_runs([(count, numbers(own, results[-1])) for count, results in runs])
+        return errors, f"{', '.join(str(count) for count, _ in runs[:-1])} and {runs[-1][0]}, order 1"
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
     own_s = _marching_cost(own)

@@ -50,8 +50,8 @@ class _Places:
 _PLACES = {
     (2, False): _Places(0.036, (0.35, 0.15, 0.25), (0.35, 0.15)),
     (2, True): _Places(0.04, (0.35, 0.3, 0.3), (0.35, 0.3)),
-    (3, False): _Places(0.022, (0.15, 0.35, 0.35), (0.2, 0.2)),
-    (3, True): _Places(0.022, (0.15, 0.35, 0.35), (0.2, 0.2)),
+    (3, False): _Places(0.022, (0.15, 0.35, 0.35), (0.35, 0.2)),
+    (3, True): _Places(0.022, (0.15, 0.35, 0.35), (0.35, 0.2)),
 }
 """By dimension, in small strain and at large deformation."""
 

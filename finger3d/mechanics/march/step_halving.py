@@ -6,8 +6,8 @@ of five errors that count are within twice their estimate (second order: two of 
 
     error of x(2 N) = |x(2 N) - x(N)|
 
-``validation/error_bars.py`` measures how often the true
-error is within twice this estimate.
+Two runs may agree by chance, so that the error bars of a press count earlier runs, too.  ``validation/error_bars.py``
+measures how often the true error is within twice this estimate.
 """
 
 from __future__ import annotations
@@ -293,6 +293,27 @@ def errors_between(quantities: Mapping[str, float], others: Mapping[str, float],
     """Error by name of quantities, from those in `ratio` times as many increments; see `increment_error`."""
     errors = {name: increment_error(value, others[name], ratio) for name, value in quantities.items()}
     return {name: float(error) for name, error in errors.items() if math.isfinite(error)}
+
+
+def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str, float]:
+    """Return the errors by name of the quantities of the last run, the largest that any two successive runs give.
+
+    The error that earlier runs give falls in proportion to the number of increments.
+
+    Parameters
+    ----------
+    runs : number of increments in an automatic leg, and quantities by name, of two runs or more
+
+    Examples
+    --------
+    >>> round(errors_of_runs([(10, {"x": 1.2}), (20, {"x": 1.1}), (40, {"x": 1.1})])["x"], 12)  # the last two agree
+    0.05
+    """
+    largest: dict[str, float] = {}
+    for (few, coarse), (many, fine) in itertools.pairwise(runs):
+        for name, error in errors_between(fine, coarse, few / many).items():
+            largest[name] = max(largest.get(name, 0.0), error * many / runs[-1][0])
+    return largest
 
 
 def last_step(problem: Problem) -> StepResult:
