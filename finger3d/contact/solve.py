@@ -46,7 +46,7 @@ _QUICK_ROWS = 700
 """Rows of the tableau up to which Lemke's method comes before the friction continuation in two dimensions, where its
 polygon is exact: where forces jump, the continuation mostly fails, after hundreds of Newton iterations."""
 
-_FRICTION_CAPS = (1e4, 1e3, 1e2)
+_FRICTION_CAPS = (1e4, np.inf, 1e3, 1e2)
 """Bounds of mu tried with Lemke's method: with mu = 1e6 round-off can spoil its pivots, and a smaller mu gives the
 same active set."""
 
@@ -137,9 +137,8 @@ def _attempts(
 def _lemke_start(problem: ContactProblem, start: Float, rows: int) -> NewtonResult:
     """Apply Newton's method from the active set of Lemke's method; points that then penetrate join, and it repeats."""
     spent = 0
-    for cap in _FRICTION_CAPS:
-        if cap < _FRICTION_CAPS[0] and problem.friction.max(initial=0.0) <= cap:
-            continue
+    largest = float(problem.friction.max(initial=0.0))
+    for cap in dict.fromkeys(min(cap, largest) for cap in _FRICTION_CAPS):
         capped = replace(problem, friction=np.minimum(problem.friction, cap))
         candidates = (problem.free_motion[:, 0] < 0.0) | (start[:, 0] > 0.0)
         for _ in range(5):
