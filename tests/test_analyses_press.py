@@ -26,11 +26,10 @@ def test_steps_auto_reports_its_estimate(tmp_path: Path) -> None:
     assert len(summary["steps"]) == estimate["steps"] >= 20
     assert max(estimate[k] for k in ("normal_force", "friction_sum", "gauges")) <= estimate["tolerance"] == 0.01
     assert estimate["dissipation"] <= estimate["dissipation_tolerance"] == 0.05
-    # the runs that chose them are the error bar, no other is made
-    bars = summary["error_estimate"]["steps"]
-    assert bars["friction_sum_N"] == pytest.approx(
-        estimate["friction_sum"] * summary["steps"][-1]["friction_sum_N"], rel=1e-9
-    )
+    # the runs that chose them are the error bar, no other is made; earlier runs count, too
+    bars, of_last_two = summary["error_estimate"]["steps"], estimate["friction_sum"]
+    least = of_last_two * summary["steps"][-1]["friction_sum_N"]
+    assert least * (1.0 - 1e-9) <= bars["friction_sum_N"] < 10.0 * least
     assert {"external_work_mJ", "dissipation_mJ"} <= set(bars)
 
 
