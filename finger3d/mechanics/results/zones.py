@@ -235,7 +235,7 @@ def facet_borders(facets: Int, status: Int, zones: tuple[Zone, Zone] | None, pla
     turned = ends[:, 0] > ends[:, 1]
     at = np.zeros(len(sides))
     at[number] = np.where(turned, 1.0 - shares, shares)
-    whole, state = (facets >= 0).all(axis=1), status[facets]
+    whole, state = np.asarray(facets.min(axis=1) >= 0), status[facets]
     cut = np.logical_and(whole[:, None], np.not_equal(state, np.roll(state, -1, axis=1)))
     on_two = cut.sum(axis=1) == 2
     pairs = number.reshape(-1, 3)[on_two][cut[on_two]].reshape(-1, 2)
