@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -62,14 +62,6 @@ class Loads(NamedTuple):
     def work_from(self, before: Loads) -> float:
         """Work (mJ) since other loads of the same points, by the trapezoidal rule."""
         return float(np.sum(0.5 * (before.force + self.force) * (self.displacement - before.displacement)))
-
-
-class EndAtForce(NamedTuple):
-    """Expected end of an increment to a normal force: the depth, the state, and the rate of the force, N/mm."""
-
-    depth_mm: float
-    state: State[Any]
-    rate: float
 
 
 class Formulation(Protocol[B, W]):

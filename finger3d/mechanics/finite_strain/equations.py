@@ -218,17 +218,11 @@ class IncrementEquations:
         return linearisation
 
     def contact(
-        self,
-        now: Configuration,
-        force: Float,
-        linearisation: Linearisation,
-        displacement: Float,
-        lowered: float = 0.0,
+        self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
     ) -> tuple[ContactSolution[ContactState], Float]:
         """Solve contact of the linearised body; returns the solution and the changes (r,) of the forces on its rows.
 
-        `displacement` (r,) mm is that of the rows under the forces out of balance alone; the object is `lowered` mm
-        below its pose.
+        `displacement` (r,) mm is that of the rows under the forces out of balance alone.
         """
         problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
@@ -242,7 +236,6 @@ class IncrementEquations:
         free_displacement += self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
-        free_displacement += self.active((lowered * bases[:, :, 1]).ravel())
         contact = ContactProblem.of(
             start,
             free_displacement,

@@ -21,9 +21,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, contact_of
-from finger3d.mechanics.finite_strain.to_force import end_at_force
 from finger3d.mechanics.finite_strain.together import solve_together
-from finger3d.mechanics.formulation import EndAtForce, Loads
+from finger3d.mechanics.formulation import Loads
 from finger3d.mechanics.march.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.readings.columns import Column, of_kind
 from finger3d.mechanics.results.state import State
@@ -93,18 +92,6 @@ class FiniteStrain:
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
         increment = self._increment(problem, state, move, workspace)
         return self._kept_outside(increment, self._remembered(increment, increment.solve(guess)))
-
-    def end_at_force(
-        self,
-        problem: Problem,
-        start: tuple[State[DeformedBody], Float | None],
-        move: Move,
-        wanted: float,
-        workspace: FiniteStrainWorkspace,
-    ) -> EndAtForce | None:
-        """Return the expected end of an increment to a normal force; see `finger3d.mechanics.formulations`."""
-        state, guess = start
-        return end_at_force(self._increment(problem, state, move, workspace), wanted, guess)
 
     def increments(
         self,

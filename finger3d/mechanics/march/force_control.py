@@ -76,11 +76,6 @@ class Trial:
     solution: ContactSolution[State[Any]]
     force: float
 
-    @classmethod
-    def of(cls, depth: float, state: State[Any], force: float) -> Trial:
-        """Return a state with its force as a trial that has converged."""
-        return cls(depth, ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none"), force)
-
     @property
     def ok(self) -> bool:
         """Whether the increment converged."""
@@ -117,7 +112,6 @@ class DepthSearch:
     begin : state before the increment as a trial, where only the depth changes, from which forces are interpolated too
     most : largest depth, mm; a turn or a slide may lift the object above first touch by as much, to negative depths
     target : relative error of the force
-    rate : expected rate of the force by the depth, N/mm; NaN: not known
     """
 
     increment: Callable[[float, Sequence[Trial]], Trial]
@@ -126,7 +120,6 @@ class DepthSearch:
     most: float
     begin: Trial | None = None
     target: float = TARGET
-    rate: float = math.nan
     good: list[Trial] = field(default_factory=list, init=False)
     failed: list[Trial] = field(default_factory=list, init=False)
 
@@ -232,10 +225,8 @@ class DepthSearch:
     def _interpolated(self) -> float:
         """Return the depth of the force by inverse quadratic interpolation of the last trials; NaN if they do not rise.
 
-        A single trial has the expected rate, or counts as one of a force proportional to the depth.
+        A single trial counts as one of a force proportional to the depth.
         """
-        if len(self.good) == 1 and self.rate > 0.0:
-            return self.good[0].depth + (self.wanted - self.good[0].force) / self.rate
         rest = Trial(0.0, self.good[-1].solution, 0.0)
         begin = [self.begin] if self.begin and all(t.depth != self.begin.depth for t in self.good) else []
         last = [*begin, *self.good][-3:]

@@ -16,7 +16,7 @@ from finger3d.contact.state import SNAPPED, ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.formulations import end_at_force, formulation_of
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
 from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting
@@ -274,15 +274,15 @@ class Press:
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
-        begin = Trial.of(start_mm, state, force) if only_deeper else None
+        rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
+        begin = Trial(start_mm, rest, force) if only_deeper else None
 
         def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
             self._end_if_cancelled()
             there = Move(move.start, replace(move.end, depth_mm=depth))
             start, guess = state, self.expected_force(there.end)
-            known = [*near, *good]
-            if known:
-                one, other = known[-1], known[-2] if len(known) > 1 else begin
+            if good:
+                one, other = good[-1], good[-2] if len(good) > 1 else begin
                 share = (depth - one.depth) / (one.depth - other.depth) if other and one.depth != other.depth else 0.0
                 share = share if abs(share) < 1.0 else 0.0
                 ends = one.solution.state, other.solution.state if other else one.solution.state
@@ -295,13 +295,9 @@ class Press:
             return Trial(depth, found, reached)
 
         target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
+        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
-        first = first_trial(start_mm, stride, wanted, begin)
-        whole = Move(move.start, replace(move.end, depth_mm=first))
-        found = end_at_force(problem, (state, self.expected_force(whole.end)), whole, wanted, self.workspace)
-        near = [Trial.of(found.depth_mm, found.state, wanted)] if found else []
-        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target, found.rate if found else np.nan)
-        last = search.run(near[0].depth if near else first)
+        last = search.run(first_trial(start_mm, stride, wanted, begin))
         spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
         if not last.ok:
             return Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
