@@ -28,6 +28,7 @@ def refined(model: Model, factor: float) -> tuple[Problem, Problem, Log]:
     return problem, with_refined_borders(problem, said), said
 
 
+@pytest.mark.slow
 def test_the_area_of_a_thin_stick_zone_becomes_known() -> None:
     model = replace(swept_fig9(2.0, mu=0.25, nu=0.49), legs=(Leg(10.0, steps=20),))
     before, after, said = refined(model, 3.0)

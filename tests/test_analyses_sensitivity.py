@@ -24,6 +24,7 @@ HOLD = {
 """A viscous finger that is held at the end, as points that slipped rest at their friction limit."""
 
 
+@pytest.mark.slow
 def test_derivatives_of_scene_keys_are_those_of_presses() -> None:
     given = scene(**SECTION)
     slopes = finger3d.sensitivity(given, ["gauge_g36"]).derivatives["gauge_g36"]

@@ -59,7 +59,7 @@ def numbers(problem: Problem, count: int) -> np.ndarray:
     return np.array([measured[name] for name in NAMES])
 
 
-SLOW = ("at large deformation", "that slides", "that is released")
+SLOW = ("at large deformation", "that slides", "that is released", "with viscosity", "solid on a ball")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PRESSES])

@@ -36,7 +36,7 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
         ({"size_mm": 3.0, "base_size_mm": 2.0}, "mesh.base_size_mm = 2 .*size_mm"),
         ({"size_mm": 0.0}, "mesh.size_mm = 0.0 "),
         ({"base_size_mm": math.nan}, "mesh.base_size_mm = nan "),
-        ({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* GB"),
+        pytest.param({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* GB", marks=pytest.mark.slow),
     ],
 )
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
