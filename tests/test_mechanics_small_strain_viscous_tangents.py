@@ -45,14 +45,7 @@ CASES = {
     "solid": replace(SOLID, legs=SLIDE, friction=Coulomb(0.3)),
     "solid with constant bulk modulus": replace(SOLID, legs=HOLD, relaxation=BULK_CONSTANT),
 }  # fmt: skip
-SLOW = (
-    "section with constant bulk modulus",
-    "nearly incompressible",
-    "bar",
-    "force",
-    "solid",
-    "solid with constant bulk modulus",
-)
+QUICK = ("section",)
 
 
 @pytest.mark.parametrize("case", [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in CASES])
