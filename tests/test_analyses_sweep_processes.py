@@ -229,7 +229,11 @@ AT_ONCE = "import finger3d.mechanics.march.parallel as s; s._ROWS_FOR_THREADS = 
 AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
 
 
-@pytest.mark.parametrize("bodies", [1, 2, pytest.param(0, marks=pytest.mark.slow)], ids=["here", "workers", "threads"])
+@pytest.mark.parametrize(
+    "bodies",
+    [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(0, marks=pytest.mark.slow)],
+    ids=["here", "workers", "threads"],
+)
 def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) -> None:
     out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
     command = sweeping(paper_scene, out, 120 // bodies, bodies, "--workers", str(bodies), *SLOW)
