@@ -160,3 +160,14 @@ def test_an_increment_from_whose_end_the_path_does_not_go_on_is_repeated_in_halv
     np.testing.assert_allclose(second.state.force, last.state.force, rtol=1e-9, atol=1e-12)
     assert second.external_work_mJ == pytest.approx(last.external_work_mJ, rel=1e-9)
     assert second.dissipation_mJ == pytest.approx(last.dissipation_mJ, rel=1e-9)
+
+
+def test_the_papers_rule_goes_on_from_a_state_in_which_friction_helps_slip() -> None:
+    legs = (Leg(10.0, steps=1), Leg(10.0, slide_x_mm=0.5, steps=1))
+    mesh, rule = MeshOptions(4.0, 6.0), "paper"
+    model = fig9(domain="plane-strain", mesh=mesh, friction=Coulomb(1e-6), legs=legs, rule=rule)
+    pressed, slid = march(build(replace(model, material=Isotropic(1.0, 0.3))))
+    assert pressed.outcome is Outcome.WRONG_WAY
+    assert pressed.state.force[:, 0].sum() > 1.0
+    assert slid.outcome is Outcome.CONVERGED  # with all points slipping the same way
+    assert slid.state.force[:, 0].sum() == pytest.approx(pressed.state.force[:, 0].sum(), rel=1e-6)

@@ -218,7 +218,7 @@ class Press:
             one, more = self._increment(now, move, cuts, guess if move is moves[-1] else None)
             found, parts, now = [*found, one], parts + more, one.state
             if not one.outcome.ok:
-                now = state
+                now = one.state if one.outcome.is_cycle else state
                 break
         return replace(
             found[-1],
