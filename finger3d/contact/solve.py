@@ -30,21 +30,21 @@ class _Limits(NamedTuple):
     ----------
     lemke_rows : int
         Largest number of rows of the tableau of Lemke's method: 500 take 1 s, 2000 some 40 s.
+    quick_lemke_rows : int
+        Rows up to which it comes before the friction continuation in two dimensions, where its polygon is exact: where
+        forces jump, the continuation mostly fails, after hundreds of Newton iterations.
     sweeps : tuple of int
         Gauss-Seidel sweeps before each of the last Newton attempts.
     """
 
     lemke_rows: int
+    quick_lemke_rows: int
     sweeps: tuple[int, ...]
 
 
-_SMALL_STRAIN = _Limits(2000, (20, 50, 100, 200, 400, 800))
-_FINITE_STRAIN = _Limits(500, (20, 100))
+_SMALL_STRAIN = _Limits(2000, 700, (20, 50, 100, 200, 400, 800))
+_FINITE_STRAIN = _Limits(500, 0, (20, 100))
 """At finite strain another linearisation, or half the increment, is cheaper than a long attempt."""
-
-_QUICK_ROWS = 700
-"""Rows of the tableau up to which Lemke's method comes before the friction continuation in two dimensions, where its
-polygon is exact: where forces jump, the continuation mostly fails, after hundreds of Newton iterations."""
 
 _FRICTION_CAPS = (1e4, np.inf, 1e3, 1e2)
 """Bounds of mu tried with Lemke's method: with mu = 1e6 round-off can spoil its pivots, and a smaller mu gives the
@@ -123,10 +123,12 @@ def _attempts(
     else:
         yield "newton", accelerated_newton(problem, start, 30, damped=False)
         yield "damped", newton(problem, start, 60, damped=True)
-    if problem.free_motion.shape[1] == 2:  # a polygon of two directions is exact
-        yield "pivots", _lemke_start(problem, start, _QUICK_ROWS)
+    pivots_first = problem.free_motion.shape[1] == 2 and 4 * len(start) <= limits.quick_lemke_rows
+    if pivots_first:
+        yield "pivots", _lemke_start(problem, start, limits.lemke_rows)
     yield "ramp", _friction_continuation(problem, start)
-    yield "pivots", _lemke_start(problem, start, limits.lemke_rows)
+    if not pivots_first:
+        yield "pivots", _lemke_start(problem, start, limits.lemke_rows)
     force = start
     for count in limits.sweeps:
         force = block_gauss_seidel(problem, force, count)
