@@ -20,7 +20,7 @@ from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held, numbers, pressed
 from tests.models import block, marched
-from validation import cattaneo_mindlin
+from validation import cattaneo_mindlin, held_weights
 
 
 @pytest.mark.parametrize("shape", [Plane(), Sphere(radius_mm=4.0)], ids=["plane", "ball"])
@@ -50,6 +50,20 @@ def test_a_flat_contact_slips_as_a_whole_at_mu_times_the_normal_force(domain: st
     assert [step.outcome.ok for step in steps] == [True, True, True, False]
     assert steps[-1].outcome is Outcome.SLIPS
     assert steps[-1].detail == f"{asked:.6g} N asked; the contact holds at most {MU * N:.9g} N, 100 % of it"
+
+
+@pytest.mark.parametrize(
+    ("mu", "load", "above"),
+    [(0.54787, 1.87586820, 1e-4), (0.54787, 1.87586820, 5e-4), (0.83208941713423, 2.113585171, 2.10350688514e-5)],
+)
+def test_a_finger_holds_what_is_just_below_the_largest_force(mu: float, load: float, above: float) -> None:
+    """Close to it the last point that sticks decides, and beyond it forces no longer tell the slide."""
+    problem = held_weights.held("plane-strain", 2.0)
+    steps = held_weights.pressed(problem, mu, held_weights.lifting((1.0 + above) * load / mu, load))
+    assert [step.outcome.ok for step in steps] == [True] * 8
+    assert measure(problem.points, steps[-1])["force_x_N"] == pytest.approx(-load, rel=1e-9)
+    below = held_weights.pressed(problem, mu, held_weights.lifting((1.0 - above) * load / mu, load))
+    assert below[-1].outcome is Outcome.SLIPS
 
 
 def test_a_cylinder_held_by_forces_sticks_as_one_that_is_slid() -> None:
@@ -124,6 +138,7 @@ def test_a_held_force_does_not_creep(domain: str) -> None:
     found = numbers(block(object=Plane(), domain=domain, legs=(PRESS, held(0.03), held(0.03, steps=100))))
     slides = np.array([step["slide_x_mm"] for step in found[3:]])
     assert np.abs(slides - slides[0]).max() <= 1e-12
+    assert [step["iterations"] for step in found[5:]] == [0] * (len(found) - 5)
 
 
 def test_a_slide_after_a_force_begins_where_the_force_led() -> None:

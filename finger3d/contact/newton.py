@@ -321,6 +321,8 @@ def newton(
         Function that assembles the matrix of an active set.
     """
     current = Iterate.of(problem, start)
+    if current.at_roundoff(problem) and current.satisfies(problem, current.status):  # a hold: nothing changes
+        return NewtonResult(current.force, current.displacement, current.status, True, 0)
     seen: dict[bytes, float] = {}
     iteration = 0
     for iteration in range(1, limit + 1):

@@ -14,8 +14,11 @@ from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.results.state import State
 
-_ITERATIONS, _HALVINGS, _REFUSED = 1000, 6, 12
-"""Most iterations of the contact, halvings of a step that does not lower the error, and such steps."""
+_ITERATIONS, _HALVINGS, _REFUSED = 1000, 12, 12
+"""Most iterations of the contact, shorter trials of a step that does not lower the error, and such steps."""
+
+_LESS = 1.0 - 1e-3
+"""Ratio of successive errors below which the error has fallen."""
 
 _LAST_DIGITS = 100.0
 """Largest error that is accepted where round-off keeps it above the target, over the target."""
@@ -142,13 +145,30 @@ class PoseSearch:
         return np.stack(columns, axis=1)
 
     def _step(self, best: PoseTrial, step: Float) -> PoseTrial:
-        """Return the trial after a step, which is halved until the error falls."""
+        """Return the trial after a step, which is shortened until the error falls.
+
+        Where the largest missing force changes its sign, or the whole contact slips, the step went beyond a kink, and a
+        bisection finds what lies before it.  Where the whole contact slips, forces no longer tell the pose, so that
+        such a trial is taken only if there is no other.
+        """
+        k = int(np.argmax(np.abs(self.wanted - best.forces)))
+        before, beyond, share, slipping = 0.0, 0.0, 1.0, None
         for _ in range(_HALVINGS):
-            trial = self._tried(best.place + step, best)
-            if trial.ok and (self._error(trial) < self._error(best) or self._cannot_hold(trial)):
-                break
-            step = 0.5 * step
-        return trial
+            trial = self._tried(best.place + share * step, best)
+            if self._cannot_hold(trial):
+                return trial
+            starts_to_slip = trial.slips and not best.slips
+            if trial.ok and self._error(trial) < _LESS * self._error(best):
+                if not starts_to_slip:
+                    return trial
+                slipping = slipping or trial
+            changes_sign = (self.wanted - trial.forces)[k] * (self.wanted - best.forces)[k] < 0.0
+            if not beyond or not trial.ok or starts_to_slip or changes_sign:
+                beyond = share
+            else:
+                before = share
+            share = 0.5 * (before + beyond)
+        return slipping or trial
 
     def _updated(self, stiffness: Float, best: PoseTrial, trial: PoseTrial) -> Float:
         step, change = trial.place - best.place, trial.forces - best.forces
