@@ -256,12 +256,13 @@ def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
                 values = [np.quantile(v, quantile) if len(v) else np.nan for v in legs]
                 axes.semilogy(names, values, mark + style, label=f"{dim}D, {name} of the legs")
     left.axhline(10, color="k", lw=0.8, ls=":")
-    left.set(xlabel="mu", ylabel="median iterations per part")
-    middle.set(xlabel="mu", ylabel="largest iterations per part")
+    below = 0.03  # room for the legend
+    left.set(xlabel="mu", ylabel="median iterations per part", ylim=(below, None))
+    middle.set(xlabel="mu", ylabel="largest iterations per part", ylim=(below, None))
     for key, label in (("settled", "finger3d"), ("paper_settled", "the paper's rule")):
         share = [100 * t[key][t["mu"] == m].sum() / t["increments"][t["mu"] == m].sum() for m in mus]
         right.plot(names, share, "o-", label=label)
     right.set(xlabel="mu", ylabel="settled increments, %", ylim=(0, 105))
     for axes in (left, middle, right):
         axes.tick_params(axis="x", rotation=45)
-        axes.legend(fontsize=7)
+        axes.legend(fontsize=7, loc="lower center")
