@@ -68,7 +68,8 @@ def rotated_delassus(delassus: Float, rotations: Float, points: Int | None = Non
     """
     k, d = rotations.shape[:2]
     if points is not None:
-        delassus = delassus[points[:, None, None, None], np.arange(d)[:, None, None], points[:, None], np.arange(d)]
+        rows, dofs = len(delassus) * d, (points[:, None] * d + np.arange(d)).ravel()
+        delassus = delassus.reshape(rows, rows)[np.ix_(dofs, dofs)].reshape(k, d, k, d)
     if np.allclose(rotations, np.eye(d), rtol=0.0, atol=_ROUND_OFF):  # as on a plane
         return delassus
     half = (rotations @ delassus.reshape(k, d, k * d)).reshape(k * d, k, d)
