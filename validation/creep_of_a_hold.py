@@ -193,10 +193,12 @@ def _label(line: tuple[Any, ...]) -> str:
 
 
 def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
-    """Creep of every model on a logarithmic axis, on which finger3d's round-off is seen too."""
+    """Creep of every model on a logarithmic axis, on which a bar begins at 1e-16."""
     axes = figure.subplots()
     lines = list(zip(*table.values(), strict=True))[::-1]
-    creep = np.maximum(np.abs([line[COLUMNS.split().index("creep_mm_per_min")] for line in lines]), 1e-16)
-    bars = axes.barh([_label(line) for line in lines], creep, left=0.0, color=["C1"] * (len(lines) - 1) + ["C0"])
+    creep = np.abs([line[COLUMNS.split().index("creep_mm_per_min")] for line in lines])
+    bars = axes.barh(
+        [_label(line) for line in lines], np.maximum(creep, 1e-16), left=0.0, color=["C1"] * (len(lines) - 1) + ["C0"]
+    )
     axes.bar_label(bars, [f" {value:.0f}" if value >= 10.0 else f" {value:.2g}" for value in creep], fontsize=8)
     axes.set(xscale="log", xlim=(1e-16, 1e5), xlabel="creep in a minute (mm): 45 g held with 12 N, mu = 1")

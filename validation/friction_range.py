@@ -167,4 +167,4 @@ def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) ->
 
 
 def _told(mm: float) -> str:
-    return "0 (round-off)" if mm < 1e-12 else f"{mm:.2g}"
+    return "0 (round-off)" if 0.0 < mm < 1e-12 else f"{mm:.2g}"
