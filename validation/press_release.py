@@ -138,7 +138,7 @@ def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], show
         ]
         excess = [100 * abs(columns["work_over_lost"][k] - 1.0) for k in which]
         middle.loglog([columns["increments"][k] for k in which], excess, "o-", label=f"cylinder, nu = {nu:g}")
-    counts = sorted(set(columns["increments"]))
+    counts = sorted({columns["increments"][k] for k in which})
     middle.set(xlabel="increments each way", ylabel="|work/work lost - 1|, %", title="energy balance")
     middle.set_xticks(counts, [f"{int(n)}" for n in counts])
     middle.set_xticks([], minor=True)
