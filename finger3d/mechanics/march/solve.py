@@ -299,7 +299,7 @@ class Press:
         target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
         search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
-        first = first_trial(start_mm, stride, wanted, begin)
+        first = first_trial(start_mm, stride, force, wanted)
         there = Move(move.start, replace(move.end, depth_mm=first))
         touching = force > 0.0 and to_force(state, there, self.expected_force(there.end), [])
         last = touching or search.run(first)
