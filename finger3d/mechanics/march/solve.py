@@ -286,7 +286,7 @@ class Press:
             change = abs(end.depth - depth)
             error = change * min(change / last_change, 1.0) if last_change else change
             adapted = not before or error <= _SAME * abs(depth) or len(good) >= _REPEATED
-            return end if adapted else trial_at(end.depth, [*good, trial], change)
+            return end if adapted else trial_at(end.depth, [*good, end], change)
 
         def to_force(start: State[Any], there: Move, guess: Float | None, before: list[Substep]) -> Trial | None:
             found = increment_to_force(problem, (start, guess), there, wanted, self.workspace)
