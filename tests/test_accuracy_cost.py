@@ -168,6 +168,23 @@ def test_a_mesh_that_needs_no_mesher_is_counted_exactly(domain: Domain) -> None:
     assert expected["dofs"] == problem.body.stiffness.upper.shape[0]
 
 
+def test_points_at_the_border_of_stick_are_foretold() -> None:
+    from finger3d.analyses.pressed_body import PressedBody
+
+    plain = replace(baseline("solid"), gauges=(), mesh=MeshOptions(4.0, 10.0, "swept"))
+    model = replace(plain, mesh=replace(plain.mesh, stick_refinement=3.5))
+    body = PressedBody(model)
+    body.refine_borders()
+    expected, without = forecast(model), forecast(plain)
+    # seven solids had 0.75 to 1.21 times the contact points and 0.81 to 1.19 times the unknowns
+    assert 0.67 < body.problem.size.contact_points / expected["contact_points"] < 1.5
+    assert 0.67 < body.problem.size.dofs / expected["dofs"] < 1.5
+    assert expected["contact_points"] > 1.5 * without["contact_points"]
+    assert expected["total_s"] > without["total_s"]
+    smooth = replace(model, friction=Coulomb(0.0))  # nothing sticks
+    assert forecast(smooth)["contact_points"] == without["contact_points"]
+
+
 def test_a_cost_is_told_with_its_reason() -> None:
     text = str(AddedCost(seconds=12.345, memory_mb=678.9, reason="a mesh of its own"))
     assert "12 s" in text

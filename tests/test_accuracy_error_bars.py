@@ -40,4 +40,8 @@ def test_a_number_and_its_error_end_at_the_second_digit_of_the_error(
 
 def test_digits_and_sign_are_chosen() -> None:
     assert with_error(0.034024128, digits=3) == "0.034"
+    # where all sticks, an error may be a millionth of a millionth of a number above 1
+    assert with_error(5.0, 1e-8) == "5.000000000 ± 0.000000010"
+    assert with_error(0.5, 1e-9) == "(5.000000000 ± 0.000000010) 1e-1"
+    assert with_error(2.0, 1e-300) == "2 ± 0"
     assert with_error(2.0, 0.5, sign="+-") == "2.00 +- 0.50"

@@ -17,11 +17,12 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings, snap_warnings
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
-from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from tests.models import large_fig9
+from finger3d.objects import Move, ObjectPose
+from tests.models import large_fig9, run, small_section
 
 
 @pytest.mark.parametrize("nu", [0.45, 0.5])
@@ -106,3 +107,28 @@ def test_a_body_whose_equilibrium_ends_snaps_to_another_one_and_says_so() -> Non
     base = internal[problem.body.fixed_dofs]
     down = base[problem.body.fixed_dofs % 2 == 1].sum() * 2 ** len(problem.axes)
     assert down == pytest.approx(force[-1], rel=1e-7)
+
+
+def test_an_increment_to_a_force_ends_at_the_depth_that_has_it() -> None:
+    problem, frames = run(large_fig9(0.45, 4.0, legs=(Leg(4.0, steps=1), Leg(6.0, steps=1))))
+    wanted = measure(problem.points, frames[1])["normal_force_N"]
+    workspace = formulation_of(problem.model).workspace()
+    # the iteration begins half a millimetre off
+    move = Move(ObjectPose(4.0), ObjectPose(6.5))
+    found = increment_to_force(problem, (frames[0].meshed_state, None), move, wanted, workspace)
+    assert found is not None
+    end, solution = found
+    # residuals of 5e-9 of both presses
+    assert end.end.depth_mm == pytest.approx(6.0, rel=1e-7)
+    assert solution.state.body.unknowns == pytest.approx(frames[1].meshed_state.body.unknowns, abs=1e-6)
+    assert -problem.world_force(solution.state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-8)
+
+
+def test_there_is_no_increment_to_a_force_out_of_reach_nor_in_small_strain() -> None:
+    problem = build(large_fig9(0.45, 4.0))
+    formulation, move = formulation_of(problem.model), Move(ObjectPose(0.0), ObjectPose(1.0))
+    start = formulation.start(problem), None
+    assert increment_to_force(problem, start, move, 1e5, formulation.workspace()) is None
+    small = build(small_section())
+    formulation = formulation_of(small.model)
+    assert increment_to_force(small, (formulation.start(small), None), move, 1.0, formulation.workspace()) is None

@@ -9,6 +9,9 @@ from typing import Self
 
 from finger3d._types import Tree, TreeView
 
+_ROUND_OFF = 1e-15
+"""Relative round-off of a number."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBars:
@@ -76,7 +79,7 @@ def with_error(value: float, error: float | None = None, digits: int = 5, sign: 
     Parameters
     ----------
     error : in the unit of the value; None or not finite: unknown
-    digits : significant digits of a number whose error is unknown or zero
+    digits : significant digits of a number whose error is unknown or below its round-off
     sign : what stands before the error
 
     Examples
@@ -90,11 +93,11 @@ def with_error(value: float, error: float | None = None, digits: int = 5, sign: 
     """
     if error is None or not (math.isfinite(error) and math.isfinite(value)):
         return f"{value:.{digits}g}"
-    if error <= 0.0:
+    if error <= _ROUND_OFF * abs(value):
         return f"{value:.{digits}g} {sign} 0"
     places = 1 - math.floor(math.log10(error))
-    if places > 6:
-        power = math.floor(math.log10(max(abs(value), error)))
+    power = math.floor(math.log10(max(abs(value), error)))
+    if places > 6 and power < 0:
         scale = 10.0**power
         return f"({with_error(value / scale, error / scale, digits, sign)}) 1e{power}"
     value, error = round(value, places) + 0.0, round(error, places)  # no negative zero

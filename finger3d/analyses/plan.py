@@ -79,7 +79,7 @@ def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
     """
     scene = scene_of(scene, overrides)
     model = scene.with_effects(scene.effects).model()  # with effects.auto at the most
-    expected, warnings = forecast(model), warnings_before_meshing(model, symmetry(model))
+    expected, warnings = forecast(model, bars=True), warnings_before_meshing(model, symmetry(model))
     expected = {"finger": extent(model.design)} | expected
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from finger3d._types import Float
+from finger3d.contact.state import ContactSolution
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.objects import Move
 
 
 def formulation_of(model: Model) -> Formulation[Any, Any]:
@@ -20,3 +25,27 @@ def formulation_of(model: Model) -> Formulation[Any, Any]:
 
         return Viscoelastic(model.relaxation)
     return SmallStrain()
+
+
+def increment_to_force(
+    problem: Problem, start: tuple[State[Any], Float | None], move: Move, wanted: float, workspace: Any
+) -> tuple[Move, ContactSolution[State[Any]]] | None:
+    """Advance a state to a normal force, with the depth as an unknown of the iteration.
+
+    Parameters
+    ----------
+    start : state before the increment, and (c, d) contact forces where the iteration begins, N
+    move : to a depth where the iteration begins
+    wanted : N
+
+    Returns
+    -------
+    Motion to the depth of the force, and the solution; None where the iteration does not converge, and in small strain,
+    where trial depths are cheap.
+    """
+    if problem.model.hyperelastic_law is None:
+        return None
+    from finger3d.mechanics.finite_strain.formulation import FiniteStrain
+
+    formulation = FiniteStrain(problem.model.hyperelastic_law, problem.model.relaxation)
+    return formulation.increment_to_force(problem, start, move, wanted, workspace)

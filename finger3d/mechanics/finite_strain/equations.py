@@ -100,12 +100,16 @@ class IncrementEquations:
         self, now: Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
     ) -> ContactSolution[State[DeformedBody]]:
         """Return the initial state and the reason of the failure; later increments begin with a new tangent."""
-        last = self.workspace.linearisations.get(self._has_inclusions)
-        if last is not None:
-            self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
+        self.forget()
         unstable = self.body.instability(now.x)
         outcome = Outcome.UNSTABLE if unstable else outcome
         return ContactSolution(self.start, outcome, error, spent, "none", unstable or detail)
+
+    def forget(self) -> None:
+        """Keep no linearisation for later iterations but its sparsity pattern."""
+        last = self.workspace.linearisations.get(self._has_inclusions)
+        if last is not None:
+            self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
 
     def last_linearisation(self) -> Linearisation | None:
         """Return the linearisation that an earlier increment left; None if it must not be reused."""
@@ -224,6 +228,19 @@ class IncrementEquations:
 
         `displacement` (r,) mm is that of the rows under the forces out of balance alone.
         """
+        problem = self.contact_problem(now, force, linearisation, displacement)
+        solution = RULES[self.problem.model.rule](problem, force)
+        return solution, self.change(now, solution.state.force - force, linearisation)
+
+    def change(self, now: Configuration, change: Float, linearisation: Linearisation) -> Float:
+        """Return changes of forces (c, d) as those (r,) on the rows of the linearised body."""
+        rotation = linearisation.rotation(now.contact.bases)
+        return np.asarray(np.einsum("cij,ci->cj", rotation, change).ravel()[self.problem.system.active_dofs])
+
+    def contact_problem(
+        self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
+    ) -> ContactProblem:
+        """Return the contact problem of the linearised body; for `displacement` see `contact`."""
         problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
         delassus = rotated_delassus(linearisation.delassus, rotation)
@@ -236,7 +253,7 @@ class IncrementEquations:
         free_displacement += self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
-        contact = ContactProblem.of(
+        return ContactProblem.of(
             start,
             free_displacement,
             delassus,
@@ -245,9 +262,6 @@ class IncrementEquations:
             self._augmentation,
             problem.surface.area,
         )
-        solution = RULES[problem.model.rule](contact, force)
-        change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
-        return solution, change.ravel()[active]
 
     def out_of_balance(self, now: Configuration, force: Float) -> Float:
         """Return internal less contact forces (N,)."""

@@ -19,7 +19,7 @@ from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.fem.tensors import determinant
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
-from finger3d.mechanics.finite_strain.increment import FiniteIncrement
+from finger3d.mechanics.finite_strain.increment import FiniteIncrement, IncrementToForce
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_strain.together import solve_together
 from finger3d.mechanics.formulation import Loads
@@ -92,6 +92,23 @@ class FiniteStrain:
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
         increment = self._increment(problem, state, move, workspace)
         return self._kept_outside(increment, self._remembered(increment, increment.solve(guess)))
+
+    def increment_to_force(
+        self,
+        problem: Problem,
+        start: tuple[State[DeformedBody], Float | None],
+        move: Move,
+        wanted: float,
+        workspace: FiniteStrainWorkspace,
+    ) -> tuple[Move, ContactSolution[State[DeformedBody]]] | None:
+        """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
+        plain = self._increment(problem, start[0], move, workspace)
+        increment = IncrementToForce(problem, plain.body, plain.start, move, workspace, wanted)
+        move, solution = increment.solve_to_force(start[1])
+        if not solution.outcome.ok or _moves_too_far(problem, start[0], move):
+            return None
+        solution = self._kept_outside(replace(plain, move=move), self._remembered(plain, solution))
+        return (move, solution) if solution.outcome.ok else None
 
     def increments(
         self,

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.rules import RULES
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
@@ -20,6 +23,7 @@ from finger3d.mechanics.finite_strain.equations import Configuration, IncrementE
 from finger3d.mechanics.finite_strain.failure import cause_of_failure
 from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
+from finger3d.objects import Move
 
 _ITERATIONS, _FACTORS = 60, 15
 """Largest number of iterations and of new factors in an increment."""
@@ -29,6 +33,12 @@ _SLOW = 0.35
 
 _ASTRAY, _DIVERGED = 0.1, 1.0
 """Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
+
+_SOLUTIONS = 4
+"""Largest number of contact solutions in an iteration to a prescribed force."""
+
+_INEXACT, _EXACT = 1e-2, 1e-10
+"""Error of that force, over that at the start of the iteration and over the force, at which the iteration goes on."""
 
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations; twice as many where the body may snap."""
@@ -55,9 +65,11 @@ change and value), and share below which none is added."""
 class FiniteIncrement(IncrementEquations):
     """An increment solved by itself."""
 
+    most_factors: ClassVar[int] = _FACTORS
+
     def solve(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
-        solution = self._iterate(guess)
+        _, solution = self._iterate(guess)
         if solution.outcome.ok or solution.detail:
             return solution
         damped = self._iterate_damped()
@@ -66,36 +78,37 @@ class FiniteIncrement(IncrementEquations):
             detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
         return replace(damped, iterations=solution.iterations + damped.iterations, detail=detail)
 
-    def _iterate(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
+    def _iterate(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
         """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
 
         If it does not converge with the tangent of an earlier increment, the iteration starts again with a new one.
+        The increment that is returned has the motion that was found, if that is unknown.
         """
-        first = now, force = self.initial(guess)
+        first = increment, now, force = self, *self.initial(guess)
         linearisation, factors, spent, error = self.last_linearisation(), 0, 0, math.inf
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors == _FACTORS:
+                if factors == self.most_factors:
                     break
-                linearisation, factors = self.linearise(now, force), factors + 1
-            solution, after = self._advance(now, force, linearisation)
+                linearisation, factors = increment.linearise(now, force), factors + 1
+            solution, after = increment._advance(now, force, linearisation)
             spent += solution.iterations
             if after is None:
                 if factors:
                     break
-                linearisation, (now, force), error = None, first, math.inf
+                linearisation, (increment, now, force), error = None, first, math.inf
                 continue
-            now, force = after, solution.state.force
-            last_error, error = error, self._error(now, solution.state)
+            (increment, now), force = after, solution.state.force
+            last_error, error = error, increment._error(now, solution.state)
             if converged(error, last_error):
-                return self.finished(now, solution, error, spent)
+                return increment, increment.finished(now, solution, error, spent)
             if factors and error > _DIVERGED:
                 break
             if error > _SLOW * last_error:
                 linearisation = None
                 if not factors and error > _ASTRAY:
-                    (now, force), error = first, math.inf
-        return self.failed(now, Outcome.NEWTON, error, spent)
+                    (increment, now, force), error = first, math.inf
+        return increment, increment.failed(now, Outcome.NEWTON, error, spent)
 
     def _iterate_damped(self) -> ContactSolution[State[DeformedBody]]:
         """Iterate from the first state with a multiple of the linear stiffness added to the tangent.
@@ -109,11 +122,11 @@ class FiniteIncrement(IncrementEquations):
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
             spent += solution.iterations
-            next_error = math.inf if after is None else self._error(after, solution.state)
+            next_error = math.inf if after is None else self._error(after[1], solution.state)
             if after is None or next_error > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
-            now, force, last_error, error = after, solution.state.force, error, next_error
+            now, force, last_error, error = after[1], solution.state.force, error, next_error
             if converged(error, last_error):
                 solution = replace(solution, method=SNAPPED) if snapped else solution
                 return self.finished(now, solution, error, spent)
@@ -131,14 +144,86 @@ class FiniteIncrement(IncrementEquations):
 
     def _advance(
         self, now: Configuration, force: Float, linearisation: Linearisation
-    ) -> tuple[ContactSolution[ContactState], Configuration | None]:
+    ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
         """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
         eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
-        solution, change = self.contact(now, force, linearisation, eliminated.displacement)
-        step = eliminated.unknowns(change)
+        problem = self.contact_problem(now, force, linearisation, eliminated.displacement)
+        increment, solution = self._balanced(now, force, problem)
+        step = eliminated.unknowns(self.change(now, solution.state.force - force, linearisation))
         if not solution.outcome.ok or not np.isfinite(step).all():
             return solution, None
         try:
-            return solution, self.moved(now, step)
+            return solution, (increment, increment.moved(now, step))
         except InvertedError:
             return solution, None
+
+    def _balanced(
+        self, now: Configuration, force: Float, problem: ContactProblem
+    ) -> tuple[Self, ContactSolution[ContactState]]:
+        """Return the contact solution of the linearised body, and the increment with the motion that it is for."""
+        return self, RULES[self.problem.model.rule](problem, force)
+
+
+@dataclass(frozen=True)
+class IncrementToForce(FiniteIncrement):
+    """An increment to a prescribed normal force, with the depth at its end as one more unknown of the iteration.
+
+    In every iteration the object moves further down by the distance at which the contact forces f of the linearised
+    body add up to the force F ::
+
+        contact conditions of f and of the gaps and slips with the object lowered,    sum of f_y = F
+
+    Attributes
+    ----------
+    wanted : F on the whole finger, N
+    depths : mm, between which the depth is looked for
+    rate : of the force by the depth in the last iteration, N/mm
+    """
+
+    most_factors: ClassVar[int] = 4
+
+    wanted: float
+    depths: tuple[float, float] = (-math.inf, math.inf)
+    rate: float = math.nan
+
+    def solve_to_force(self, guess: Float | None) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
+        """Return the motion to the depth that is found near the expected one, and the solution at its end.
+
+        The state of the solution is without internal variables.
+        """
+        (start, end), far = (pose.depth_mm for pose in (self.move.start, self.move.end)), self._largest_step
+        rise = self.wanted + float(self.problem.world_force(self.start.contact)[:, 1].sum())
+        rate = rise / (end - start) if rise * (end - start) > 0.0 else self.wanted / self.length_scale
+        increment, solution = replace(self, rate=rate, depths=(end - far, end + far))._iterate(guess)
+        return increment.move, solution
+
+    def _error(self, now: Configuration, state: ContactState) -> float:
+        return max(super()._error(now, state), abs(self._force(now, state.force) / self.wanted - 1.0))
+
+    def _force(self, now: Configuration, force: Float) -> float:
+        """Return the normal force (N) on the whole finger of contact forces (c, d) in the present directions."""
+        state = replace(self.start.contact, force=force, bases=now.contact.bases)
+        return -float(self.problem.world_force(state)[:, 1].sum())
+
+    def _balanced(
+        self, now: Configuration, force: Float, problem: ContactProblem
+    ) -> tuple[Self, ContactSolution[ContactState]]:
+        """Lower the object by the secant method until the linearised body has the force."""
+        down, rate, depth = self.active(now.contact.bases[:, :, 1].ravel()), self.rate, self.move.end.depth_mm
+        lowered, last, allowed = 0.0, (0.0, 0.0), _EXACT * self.wanted
+        for number in range(_SOLUTIONS):
+            at_depth = replace(problem, free_motion=problem.free_motion + lowered * down)
+            solution = RULES[self.problem.model.rule](at_depth, force)
+            if not solution.outcome.ok:
+                return self, solution
+            force = solution.state.force
+            reached = self._force(now, force)
+            if number and (reached - last[1]) * (lowered - last[0]) > 0.0:
+                rate = (reached - last[1]) / (lowered - last[0])
+            allowed = allowed if number else max(allowed, _INEXACT * abs(reached - self.wanted))
+            last, further = (lowered, reached), (self.wanted - reached) / rate
+            if abs(reached - self.wanted) <= allowed:
+                break
+            lowered = min(max(depth + lowered + further, self.depths[0]), self.depths[1]) - depth
+        move = Move(self.move.start, replace(self.move.end, depth_mm=depth + last[0]))
+        return replace(self, move=move, rate=rate), solution

@@ -82,19 +82,20 @@ class Trial:
         return self.solution.outcome.ok
 
 
-def first_trial(start: float, stride: float, wanted: float, begin: Trial | None) -> float:
+def first_trial(start: float, stride: float, force: float, wanted: float) -> float:
     """Return the depth (mm) of the first trial: one stride on, but no deeper than Hertz's law for a ball has it.
+
+    It is that of this law where the force is held or falls after an increment that went deeper.
 
     Parameters
     ----------
     start, stride : mm, depth before the increment, and how much deeper it may go
-    wanted : force, N
-    begin : state before the increment as a trial, where only the depth changes
+    force, wanted : before the increment, and prescribed, N
     """
-    guess = start + stride
-    if begin and wanted > begin.force > 0.0 and start > 0.0:
-        guess = min(guess, start * (wanted / begin.force) ** _LEAST_POWER)
-    return guess
+    if not (start > 0.0 and force > 0.0):
+        return start + stride
+    by_hertz = float(start * (wanted / force) ** _LEAST_POWER)
+    return min(start + stride, by_hertz) if wanted > force or stride > 0.0 else start + stride
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Converged parts of an increment, their energies, and the state that a trial of an increment expects at its end."""
+"""Increments in parts, which are cut where they do not converge, their energies, and the state expected at the end."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.friction import SLIP
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
@@ -37,6 +39,51 @@ class Advanced:
     parts: list[Substep]
     pose: ObjectPose
     energies: tuple[float, float] | None = None
+
+
+def solved_in_turn(
+    problem: Problem,
+    workspace: Workspace,
+    state: State[Any],
+    moves: Sequence[Move],
+    cuts: int,
+    guess: Float | None = None,
+    near: Sequence[Substep] = (),
+) -> tuple[ContactSolution[State[Any]], list[Substep]]:
+    """Solve the parts of an increment one after another; the guess (c, d), N, of the forces is that of the last.
+
+    A part that does not converge is halved and repeated from the same state, at most `cuts` times.  If as many parts of
+    a similar increment at finite strain are given, `near`, each begins its iteration at the end of its like.
+    """
+    found, parts, now = list[ContactSolution[State[Any]]](), list[Substep](), state
+    for number, move in enumerate(moves):
+        start = guess if move is moves[-1] else None
+        if len(near) == len(moves):
+            end = near[number].after
+            now, start = expecting(now, move, (end, end), 0.0), end.contact.force
+        one, more = _solved(problem, workspace, now, move, cuts, start)
+        found, parts, now = [*found, one], parts + more, one.state
+        if not one.outcome.ok:
+            now = one.state if one.outcome.is_cycle else state
+            break
+    return replace(
+        found[-1],
+        state=now,
+        residual=max(one.residual for one in found),
+        iterations=sum(one.iterations for one in found),
+        method=SNAPPED if any(one.method == SNAPPED for one in found) else found[-1].method,
+    ), parts
+
+
+def _solved(
+    problem: Problem, workspace: Workspace, state: State[Any], move: Move, cuts: int, guess: Float | None
+) -> tuple[ContactSolution[State[Any]], list[Substep]]:
+    whole = formulation_of(problem.model).increment(problem, state, move, guess, workspace)
+    if whole.outcome.ok or cuts == 0:
+        return whole, [Substep(state, whole.state, move)]
+    halves, parts = solved_in_turn(problem, workspace, state, move.cut(0.5), cuts - 1)
+    method = SNAPPED if halves.method == SNAPPED else "cut back"
+    return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts
 
 
 def energies(problem: Problem, parts: Sequence[Substep]) -> tuple[float, float]:

@@ -12,14 +12,14 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
-from finger3d.contact.state import SNAPPED, ContactSolution
+from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
-from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting
+from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting, solved_in_turn
 from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
@@ -35,6 +35,10 @@ _CUTS = 6
 _FIRST_PARTS = 1.0 / 16.0, 0.25
 """Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
 ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
+
+_NEAR, _SIMILAR, _SAME, _REPEATED = 0.2, 0.15, 1e-7, 8
+"""Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins; change of the
+depth up to which increments are similar, and error up to which parts are not adapted, both relative; most trials."""
 
 
 def march(
@@ -170,7 +174,7 @@ class Press:
         if self._before is None or self._previous is None or not self._cuts:
             return False
         (state, work, dissipation), whole = self._before, self._previous[0]
-        found, parts = self._in_turn(state, whole.cut(0.5), self._cuts - 1)
+        found, parts = solved_in_turn(self.problem, self.workspace, state, whole.cut(0.5), self._cuts - 1)
         if not found.outcome.ok:
             return False
         self.state, self._work, self._dissipation = found.state, work, dissipation
@@ -192,41 +196,12 @@ class Press:
         return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
-        return Advanced(*self._in_turn(self.state, self.moves_to(pose), self._cuts, guess), pose)
+        moves = self.moves_to(pose)
+        return Advanced(*solved_in_turn(self.problem, self.workspace, self.state, moves, self._cuts, guess), pose)
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
             raise CancelledError
-
-    def _increment(
-        self, state: State[Any], move: Move, cuts: int, guess: Float | None = None
-    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
-        """Solve an increment; one that does not converge is halved and repeated from the same state."""
-        whole = self.formulation.increment(self.problem, state, move, guess, self.workspace)
-        if whole.outcome.ok or cuts == 0:
-            return whole, [Substep(state, whole.state, move)]
-        halves, parts = self._in_turn(state, move.cut(0.5), cuts - 1)
-        method = SNAPPED if halves.method == SNAPPED else "cut back"
-        return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts
-
-    def _in_turn(
-        self, state: State[Any], moves: Sequence[Move], cuts: int, guess: Float | None = None
-    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
-        """Solve the parts of an increment one after another; the guess is that of the last."""
-        found, parts, now = list[ContactSolution[State[Any]]](), list[Substep](), state
-        for move in moves:
-            one, more = self._increment(now, move, cuts, guess if move is moves[-1] else None)
-            found, parts, now = [*found, one], parts + more, one.state
-            if not one.outcome.ok:
-                now = one.state if one.outcome.is_cycle else state
-                break
-        return replace(
-            found[-1],
-            state=now,
-            residual=max(one.residual for one in found),
-            iterations=sum(one.iterations for one in found),
-            method=SNAPPED if any(one.method == SNAPPED for one in found) else found[-1].method,
-        ), parts
 
     def _pose_at(self, station: Station) -> ObjectPose:
         """Return the pose at a station; a slide that forces have determined is taken back in proportion to the leg."""
@@ -267,17 +242,25 @@ class Press:
     def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one.
 
-        Every trial begins at the end expected from those before it.  If the force is not reached, the solution says
-        why, and state and pose are those at the beginning.
+        Every trial begins at the end expected from those before it.  At finite strain the depth is an unknown of the
+        iteration, from a trial with a force of that size.  If the force is not reached, the solution says why, and
+        state and pose are those at the beginning.
         """
         problem, state, parts = self.problem, self.state, dict[float, list[Substep]]()
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
         start_mm, start_s = move.start.depth_mm, move.start.time_s
         only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
-        rest = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none")
+        rest, trials = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none"), list[Trial]()
         begin = Trial(start_mm, rest, force) if only_deeper else None
 
-        def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
+        def noted(trial: Trial, its_parts: list[Substep]) -> Trial:
+            trials.append(trial)
+            parts[trial.depth] = its_parts
+            text = f"{trial.force:.5g} N" if trial.ok else "no solution"
+            self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {trial.depth:.4g} mm")
+            return trial
+
+        def trial_at(depth: float, good: Sequence[Trial], last_change: float = 0.0) -> Trial:
             self._end_if_cancelled()
             there = Move(move.start, replace(move.end, depth_mm=depth))
             start, guess = state, self.expected_force(there.end)
@@ -288,20 +271,41 @@ class Press:
                 ends = one.solution.state, other.solution.state if other else one.solution.state
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
                 start = expecting(state, there, ends, share) if problem.model.finite_strain else state
-            found, parts[depth] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
+            is_similar = problem.model.finite_strain and good and abs(depth - good[-1].depth) < _SIMILAR * abs(depth)
+            moves, near = self.moves_to(there.end), parts[good[-1].depth] if is_similar else []
+            found, its_parts = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess, near)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
-            text = f"{reached:.5g} N" if found.outcome.ok else "no solution"
-            self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
-            return Trial(depth, found, reached)
+            trial = noted(Trial(depth, found, reached), its_parts)
+            if not (problem.model.finite_strain and _NEAR * wanted < reached < wanted / _NEAR):
+                return trial
+            *before, last = its_parts
+            ends = last.after, last.after
+            end = to_force(expecting(last.before, last.move, ends, 0.0), last.move, last.after.contact.force, before)
+            if end is None:
+                return trial
+            change = abs(end.depth - depth)
+            error = change * min(change / last_change, 1.0) if last_change else change
+            adapted = not before or error <= _SAME * abs(depth) or len(good) >= _REPEATED
+            return end if adapted else trial_at(end.depth, [*good, end], change)
+
+        def to_force(start: State[Any], there: Move, guess: Float | None, before: list[Substep]) -> Trial | None:
+            found = increment_to_force(problem, (start, guess), there, wanted, self.workspace)
+            if found is None or found[0].end.depth_mm > self._deepest:
+                return None
+            there, solution = found
+            trial = Trial(there.end.depth_mm, solution, self._normal_force(solution.state))
+            return noted(trial, [*before, Substep(start, solution.state, there)])
 
         target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
         search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
-        last = search.run(first_trial(start_mm, stride, wanted, begin))
-        spent = sum(tried.solution.iterations for tried in (*search.good, *search.failed))
+        first = first_trial(start_mm, stride, force, wanted)
+        there = Move(move.start, replace(move.end, depth_mm=first))
+        touching = force > 0.0 and to_force(state, there, self.expected_force(there.end), [])
+        last = touching or search.run(first)
+        solution = replace(last.solution, iterations=sum(trial.solution.iterations for trial in trials))
         if not last.ok:
-            return Advanced(replace(last.solution, state=state, iterations=spent), [], move.start)
-        solution = replace(last.solution, iterations=spent)
+            return Advanced(replace(solution, state=state), [], move.start)
         return Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
 
     def _to_forces(self, move: Move, load: Load) -> Advanced:
@@ -327,7 +331,8 @@ class Press:
                 guess = near.solution.state.contact.force
                 if problem.model.finite_strain:
                     start = expecting(state, there, (near.solution.state, near.solution.state), 0.0)
-            found, parts[place.tobytes()] = self._in_turn(start, self.moves_to(there.end), self._cuts, guess)
+            moves = self.moves_to(there.end)
+            found, parts[place.tobytes()] = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess)
             reached = self._forces(found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
             return PoseTrial(place, found, reached)
 
