@@ -27,9 +27,9 @@ import finger3d
 from finger3d._types import Tree
 from finger3d.accuracy.changes import changing_numbers
 from finger3d.accuracy.error_bars import ErrorBars
+from finger3d.accuracy.model_error import LARGE_DEFORMATION
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of, relative_error
-from finger3d.analyses.effects_by_need import LARGE_DEFORMATION
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
@@ -52,6 +52,12 @@ NEAR = 0.2
 RIGHT, COVERED, COST = 0.95, 0.9, 1.5
 GOAL = "goal of finger3d for effects.auto"
 COLUMNS = "scene effect used needed either number true_change judged_number judged_change"
+NEUTRAL: Mapping[str, Tree] = {
+    "kinetic_friction": {"ratio": 1.0 - 1e-9},
+    "elastic_object": {"E_MPa": 1e9},
+    "embedded_gauge": {"E_MPa": 1e-9},
+}
+"""Settings by which effects are left out that come with a discretisation of their own."""
 LABELS = {
     "large_deformation": "large deformation", "kinetic_friction": "kinetic friction", "viscosity": "viscosity",
     "elastic_object": "elastic object", "embedded_gauge": "stiff gauges",
@@ -176,13 +182,16 @@ def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
 
 
 def _without(scene: Scene, names: tuple[str, ...], effect: str) -> Model:
-    """Return the model with all effects but one, in the same increments.
+    """Return the model with all effects but one, in the same increments, gaps and gauges.
 
-    Increments are as they are given under kinetic friction only: it is left out by coefficients that are equal.
+    Increments are as they are given under kinetic friction only, gaps are read along the common normals of both bodies
+    beside an elastic object only, and gauges along the bars of their foils only.  So these effects are left out by
+    equal coefficients, a stiff object and soft foils.
     """
-    if effect != "kinetic_friction":
+    if effect not in NEUTRAL:
         return scene.with_effects(name for name in names if name != effect).model()
-    effects = {**scene.given["effects"], LARGE_DEFORMATION: {}, effect: {"ratio": 1.0 - 1e-9}}
+    given = scene.given["effects"]
+    effects = {**given, LARGE_DEFORMATION: {}, effect: {**given[effect], **NEUTRAL[effect]}}
     return parse({**scene.given, "effects": {name: effects[name] for name in names}}).model()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -87,19 +87,20 @@ class ChangeEstimate:
         return {name: {"change": c.change, "low": c.low, "high": c.high} for name, c in self.changes.items()}
 
 
-def affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> float:
+def affordable_factor(coarse: Callable[[float], Model], budget_s: float, first: Sequence[float] = ()) -> float:
     """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget.
 
     Parameters
     ----------
     coarse : function of this factor that returns the model of the coarse press
+    first : factors to be tried before those of a coarse mesh
 
     Raises
     ------
     Finger3dError
         If all coarse presses cost more.
     """
-    for factor in _FACTORS:
+    for factor in (*first, *_FACTORS):
         if without_output_s(forecast(coarse(factor))) <= budget_s:
             return factor
     raise Finger3dError(f"it would take more than {budget_s:.2g} s")

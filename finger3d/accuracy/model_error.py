@@ -16,8 +16,10 @@ scenes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
 from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
@@ -26,10 +28,18 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.build import build, with_elastic_object
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.build import (
+    MARGIN,
+    build,
+    candidate_points,
+    with_elastic_object,
+    with_object_compliance,
+)
+from finger3d.mechanics.discretise.problem import Problem, free_surface
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import last_step
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import ElasticObject, Model
 from finger3d.mechanics.results.history import StepResult
 
 _STEPS = (5, 3)
@@ -37,6 +47,12 @@ _STEPS = (5, 3)
 
 _SAFETY, LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
+
+_TARGET_RESIDUAL = 1e-5
+"""Residual at which increments at finite strain end: changes are known to some per cent."""
+
+LARGE_DEFORMATION = "large_deformation"
+"""The effect that every scene has the data for."""
 
 Enriched = Callable[[Model], Model]
 """Function that returns a model with more effects on."""
@@ -66,7 +82,8 @@ class CoarsePresses:
     model: Model
     factor: float
     still: float = 2.0
-    _bodies: dict[tuple[bool, ...], Problem] = field(default_factory=dict)
+    _bodies: dict[tuple[bool, bool, bool, ElasticObject | None], Problem] = field(default_factory=dict)
+    _workspaces: dict[int, Workspace] = field(default_factory=dict)
     _known: dict[tuple[bool, tuple[str, ...]], Numbers] = field(default_factory=dict)
 
     def check(self, effects: Mapping[str, Enriched]) -> None:
@@ -96,7 +113,7 @@ class CoarsePresses:
         key = still, tuple(sorted(effects))
         if key not in self._known:
             problem = self._problem(effects, still)
-            last = last_step(problem)
+            last = last_step(problem, self._workspace(problem))
             self._known[key] = changing_numbers(problem, last), PointResolution.of(problem, last).zone_bars
         return self._known[key]
 
@@ -105,18 +122,43 @@ class CoarsePresses:
         # the strain without foils is that of a press of its own, and no other press has it
         return replace(self._body(enriched(coarse, effects), still), without_inclusions=None)
 
+    def _workspace(self, problem: Problem) -> Workspace | None:
+        """Return what presses of a body at finite strain leave for each other; they end at a larger residual."""
+        if not problem.model.finite_strain:
+            return None
+        body = id(problem.inclusions)
+        if body not in self._workspaces:
+            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=_TARGET_RESIDUAL)
+        return self._workspaces[body]
+
     def _body(self, model: Model, still: bool) -> Problem:
-        """Return a condensed model; an elastic object is added to the body without it, foils are taken from it."""
-        key = still, model.finite_strain, model.inclusions is not None, model.object_compliance is not None
-        with_foils = self._bodies.get((*key[:2], True, key[3]))
-        if key not in self._bodies and with_foils and with_foils.without_inclusions:
-            self._bodies[key] = with_foils.without_inclusions
-        elif key not in self._bodies and model.object_compliance:
-            alone = self._body(replace(model, object_compliance=None), still)
-            self._bodies[key] = with_elastic_object(_with_model(alone, model))
-        elif key not in self._bodies:
-            self._bodies[key] = build(model)
+        """Return a condensed model, from the bodies that are known if it differs in foils, object or strain only."""
+        thing = model.object_compliance
+        key = still, model.finite_strain, model.inclusions is not None, thing
+        if key not in self._bodies:
+            self._bodies[key] = self._from_others(model, *key) or build(model)
         return _with_model(self._bodies[key], model)
+
+    def _from_others(
+        self, model: Model, still: bool, finite: bool, foils: bool, thing: ElasticObject | None
+    ) -> Problem | None:
+        """Return a body made of those that are known; None if there are none, or other points may touch."""
+        with_foils = self._bodies.get((still, finite, True, thing))
+        if with_foils and with_foils.without_inclusions:
+            return _softened(with_foils) if finite else with_foils.without_inclusions
+        small = self._bodies.get((still, False, foils, thing))
+        if finite and small and _has_points_of(small, model):
+            return small
+        if thing is None:
+            return None
+        alone = _with_model(self._body(replace(model, object_compliance=None), still), model)
+        from finger3d.mechanics.discretise.elastic_object import ObjectResponse  # a press imports what its scene names
+
+        for (*others, other), body in self._bodies.items():
+            known = body.system.object_compliance
+            if others == [still, finite, foils] and other and known is not None:  # its compliance is as 1/E
+                return with_object_compliance(alone, ObjectResponse(other.E_MPa / thing.E_MPa * known, 0, {}))
+        return with_elastic_object(alone)
 
     def changes(
         self,
@@ -142,9 +184,11 @@ class CoarsePresses:
         names = [name for name in values if name in after and name in before]
         change = {name: after[name] - before[name] for name in names}
         errors = {name: max(LEAST_ERROR * abs(change[name]), abs(before[name] - values[name])) for name in names}
-        if with_error:
-            start, end = (self.numbers(chosen, True)[0] for chosen in (others, effects))
-            errors = {name: max(errors[name], _SAFETY * abs(change[name] - end[name] + start[name])) for name in names}
+        if with_error:  # of what changes beside large deformation, in small strain
+            both = [_in_strain_of(added, some) for some in (others, effects)]
+            (a, b), (c, d) = ([self.numbers(some, still)[0] for some in both] for still in (False, True))
+            apart = {name: abs(b[name] - a[name] - d[name] + c[name]) for name in names}
+            errors = {name: max(errors[name], _SAFETY * apart[name]) for name in names}
         mesh = coarser(self.model, self.factor).mesh
         return ChangeEstimate(
             changes=judged({name: values[name] for name in names}, change, errors, kinds_of(self.model.columns)),
@@ -153,6 +197,27 @@ class CoarsePresses:
             ", and from how far the coarse press without it is from the press",
             resolution={name: bar + more_zones.get(name, 0.0) for name, bar in zones.items()},
         )
+
+
+def _in_strain_of(added: str, effects: Mapping[str, Enriched]) -> dict[str, Enriched]:
+    """Return effects without large deformation, unless that is the one in question."""
+    return {name: effect for name, effect in effects.items() if name == added or name != LARGE_DEFORMATION}
+
+
+def _has_points_of(small: Problem, model: Model) -> bool:
+    """Return whether the points that may touch at finite strain are those of a body in small strain."""
+    rigid = replace(model, object_compliance=None)
+    free = free_surface(rigid, small.mesh, small.body.thickness)
+    found = candidate_points(rigid, free, small.system.first_contact_mm, MARGIN)
+    return np.array_equal(found.nodes, small.surface.nodes)
+
+
+def _softened(problem: Problem) -> Problem:
+    """Return a problem whose foils have no stiffness: gauges read the same places of the mesh as with it."""
+    inclusions = problem.inclusions
+    assert inclusions.bars is not None
+    bars = replace(inclusions.bars, stiffness=1e-9 * inclusions.bars.stiffness)
+    return replace(problem, inclusions=replace(inclusions, bars=bars))
 
 
 def _with_model(problem: Problem, model: Model) -> Problem:
@@ -168,11 +233,11 @@ def large_deformation(problem: Problem, last: StepResult, increments: int) -> Ch
     factor = cheap_factor(lambda _: problem.model, problem.size.press_s(increments))
     presses = CoarsePresses(problem.model, factor)
     presses.check({})
-    on = {"large_deformation": at_large_deformation}
-    return presses.changes(on, "large_deformation", changing_numbers(problem, last))
+    on = {LARGE_DEFORMATION: at_large_deformation}
+    return presses.changes(on, LARGE_DEFORMATION, changing_numbers(problem, last))
 
 
-def cheap_factor(model: Callable[[float], Model], press_s: float) -> float:
+def cheap_factor(model: Callable[[float], Model], press_s: float, first: Sequence[float] = ()) -> float:
     """Return the edge lengths of the coarse mesh over those of a press that takes some seconds.
 
     The modelled cost is that of the press at large deformation on this mesh, at least half of the estimate.
@@ -180,9 +245,10 @@ def cheap_factor(model: Callable[[float], Model], press_s: float) -> float:
     Parameters
     ----------
     model : function of this factor that returns the model whose edges are to be multiplied
+    first : factors to be tried before those of a coarse mesh
     """
     budget = min(CHANGES.seconds(press_s), LARGE_DEFORMATION_S)
-    return affordable_factor(lambda f: at_large_deformation(coarse_model(model(f), f, _STEPS[0])), budget)
+    return affordable_factor(lambda f: at_large_deformation(coarse_model(model(f), f, _STEPS[0])), budget, first)
 
 
 def coarse_model(model: Model, factor: float, steps: int) -> Model:
@@ -198,4 +264,4 @@ def at_large_deformation(model: Model) -> Model:
     # imported here: without this estimate, a press in small strain does not need them
     from finger3d.fem.laws import NeoHooke
 
-    return fill(model, "hyperelastic_law", NeoHooke(1.0), "large_deformation")
+    return fill(model, "hyperelastic_law", NeoHooke(1.0), LARGE_DEFORMATION)

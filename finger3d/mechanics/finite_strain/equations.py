@@ -43,9 +43,6 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_object, motion_until_touch, transported
 from finger3d.objects import Move, vertical_frame
 
-_TARGET_RESIDUAL = 5e-9
-"""Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
-
 _NEGLIGIBLE = 1e-6
 """Force, over the shear modulus times the square of the depth, below which contact is negligible."""
 
@@ -65,11 +62,6 @@ class Configuration:
     contact: DeformedContact
 
 
-def converged(error: float, last_error: float) -> bool:
-    """Whether an iteration ends at a residual, after another one."""
-    return error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE
-
-
 @dataclass(frozen=True)
 class IncrementEquations:
     """Equations of an increment from a state, as the object moves.
@@ -86,6 +78,10 @@ class IncrementEquations:
     start: State[DeformedBody]
     move: Move
     workspace: FiniteStrainWorkspace
+
+    def has_converged(self, error: float, last_error: float) -> bool:
+        """Whether an iteration ends at a residual, after another one."""
+        return error <= self.workspace.target or 0.3 * last_error < error <= TOLERANCE
 
     def finished(
         self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int
