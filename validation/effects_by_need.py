@@ -14,10 +14,12 @@ the interval of every effect that is left out.  Its time is compared with that w
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterable, Mapping
 from concurrent.futures import CancelledError
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from threading import Event, Timer
 from typing import Any
 
@@ -32,6 +34,7 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of, relative_error
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
+from finger3d.io import atomic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
@@ -40,7 +43,9 @@ from finger3d.scene import Scene, parse
 from ._effect_scenes import scenes
 from ._paper import columns
 from ._rows import Result, Row
+from ._runner import studies
 
+OUT = Path(__file__).resolve().parent.parent / "out"
 SEED = 20261126
 SECTIONS, SOLIDS = 69, 15
 FINER = {"solid": 0.75, "section": 0.7}
@@ -237,19 +242,35 @@ def _flat(step: Tree) -> dict[str, float]:
 
 def run(quick: bool) -> Result:
     """All scenes; quick: two sections."""
-    found, failed = list[Compared](), 0
-    drawn = scenes(2, 0, SEED, 3.0) if quick else scenes(SECTIONS, SOLIDS, SEED)
-    for number, (name, scene) in enumerate(drawn):
-        try:
-            found.append(compare(name, scene, number % 3 == 0))
-        except Finger3dError:
-            failed += 1
+    ended = _ended(2, 0, 3.0) if quick else _ended(SECTIONS, SOLIDS)
+    found = [one for one in ended if one]
+    failed = len(ended) - len(found)
     verdicts = [verdict for one in found for verdict in one.verdicts]
     lines = [
         (v.scene, v.effect, v.used, v.needed, v.either, v.number, v.change, v.judged_number, v.judged_change)
         for v in verdicts
     ]
     return Result(tuple(_rows(found, failed)), columns(COLUMNS, lines), lambda figure: _draw(figure, verdicts))
+
+
+def _ended(sections: int, solids: int, *longer: float) -> list[Compared | None]:
+    """Compare scenes; None where a press fails.  Each is kept in out/, so that a run that is cut off can be resumed."""
+    stamp = studies()[Path(__file__).stem].stamp()
+    kept, found = OUT / f"effects_by_need_{stamp}_{sections}.json", dict[str, Tree | None]()
+    if kept.is_file():
+        found = json.loads(kept.read_text(encoding="utf-8"))
+    for number, (name, scene) in enumerate(scenes(sections, solids, SEED, *longer)):
+        if name not in found:
+            try:
+                found[name] = asdict(compare(name, scene, number % 3 == 0))
+            except Finger3dError:
+                found[name] = None
+            with atomic(kept) as temporary:
+                temporary.write_text(json.dumps(found), encoding="utf-8")
+    return [
+        one and Compared(**{**one, "verdicts": tuple(Verdict(**verdict) for verdict in one["verdicts"])})
+        for one in found.values()
+    ]
 
 
 def _rows(found: list[Compared], failed: int) -> Iterable[Row]:

@@ -47,9 +47,9 @@ _NEUTRAL: Mapping[str, Tree] = {
 second order or exact: few increments would make a difference of their own.  So would gaps that are read along common
 normals of two elastic bodies: in one of 69 sections they change friction by 3 %, however stiff the object is."""
 
-_RAISED, _LOWERED = 4.0, 1.25
-"""Factors by which large deformation is taken to raise the change by another effect at most, and to lower it where that
-is not one of friction or stick."""
+_RAISED, _ALTERED = 4.0, 1.25
+"""Factors by which large deformation is taken to raise the change of friction or stick by another effect at most, and
+to raise or lower that of another number; a change below the tolerance over the first needs no second mesh."""
 
 _FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
 
@@ -153,9 +153,14 @@ def judge(scene: Scene, report: Progress) -> Need:
     largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
     used = {name for name, (_, change) in largest.items() if abs(change) > least}
     added_s = _added_seconds(plain, {name: on[name] for name in found}, used)
-    estimates = {name: ChangeEstimate() if name in used else _with_error(one) for name, one in found.items()}
+    matters = scene.auto / _RAISED
+    estimates = {
+        name: _with_error(one, abs(largest[name][1]) > matters) for name, one in found.items() if name not in used
+    }
     judged = {
-        name: Judged(name in used, estimates[name], *largest[name], added_s[name]) for name in on if name in found
+        name: Judged(name in used, estimates.get(name, ChangeEstimate()), *largest[name], added_s[name])
+        for name in on
+        if name in found
     }
     unjudged = {name: why for name, why in _NEEDS.items() if name not in on and name in effect_names()}
     return Need(scene.auto, judged, failed | unjudged, time.perf_counter() - start)
@@ -173,7 +178,7 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
 
 
 def _presses(model: Model, effects: Mapping[str, Enriched]) -> CoarsePresses:
-    """Return the coarse presses of a scene, on its own mesh in few increments where coarser ones do not resolve it.
+    """Return the presses by which the effects of a scene are judged, in few increments.
 
     All edges are those of the press, or else those at the contact, unless that is too costly: on them depends what an
     effect changes in friction.
@@ -188,10 +193,10 @@ def _presses(model: Model, effects: Mapping[str, Enriched]) -> CoarsePresses:
         presses = CoarsePresses(as_fine_at_contact(factor), factor)
     except Finger3dError:  # too costly
         presses = CoarsePresses(model, cheap_factor(lambda _: model, press_s))
-    for tried in (presses, CoarsePresses(model, 1.0, 1.0)):
+    for tried in (presses, CoarsePresses(model, 1.0)):
         for chosen in (effects, {}):  # bodies with the effects are needed later
             try:
-                tried.check(chosen)
+                tried.check(chosen, both=False)
             except Finger3dError as error:
                 why = error
             else:
@@ -239,36 +244,36 @@ def _beside_each_other(
     judge_beside(LARGE_DEFORMATION, together | large, large)
     if LARGE_DEFORMATION in found and abs(_largest(found[LARGE_DEFORMATION](with_error=False))[1]) > least:
         for name in together:
-            estimate = found[name](with_error=False)
-            if abs(_largest(estimate)[1]) * _RAISED > least > abs(_largest(estimate, firm=True)[1]) / _LOWERED:
+            fickle, firm = (abs(_largest(found[name](with_error=False), some)[1]) for some in (True, False))
+            if firm < _ALTERED * least and max(fickle * _RAISED, firm * _ALTERED) > least:
                 judge_beside(name, together | large)
     return found, {name: why for name, why in failed.items() if name not in found}
 
 
-def _largest(estimate: ChangeEstimate, firm: bool = False) -> tuple[str, float]:
+def _largest(estimate: ChangeEstimate, fickle: bool | None = None) -> tuple[str, float]:
     """Return the number that changes most relative to its scale, and its change.
 
     A length or an area, which changes by whole contact points, counts if it changes by more than they resolve.
 
     Parameters
     ----------
-    firm : whether friction and stick do not count, which other effects may alter altogether
+    fickle : True for the numbers of friction and stick, which other effects may alter altogether, False for the others
     """
     known = {
         name: change.relative
         for name, change in estimate.changes.items()
         if abs(change.change) >= estimate.resolution.get(name, 0.0)
-        and not (firm and name.startswith(("friction", "stick")))
+        and fickle in (None, name.startswith(("friction", "stick")))
     }
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
 
-def _with_error(estimate: Callable[..., ChangeEstimate]) -> ChangeEstimate:
-    """Return the estimate with its error, without changes if the press on the coarser mesh fails."""
+def _with_error(estimate: Callable[..., ChangeEstimate], matters: bool) -> ChangeEstimate:
+    """Return the estimate with its error, which is as large as a change that hardly matters, or has no coarser mesh."""
     try:
-        return estimate()
-    except _FAILURES as error:
-        return ChangeEstimate(method=f"no estimate: {error}")
+        return estimate(with_error=matters)
+    except _FAILURES:
+        return estimate(with_error=False)
 
 
 def _added_seconds(model: Model, on: Mapping[str, Enriched], used: Set[str]) -> dict[str, float]:
