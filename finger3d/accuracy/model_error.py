@@ -16,13 +16,14 @@ scenes.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
-from finger3d.accuracy.changes import ChangeEstimate, affordable_factor, attempted, changing_numbers, check_kind, judged
+from finger3d.accuracy.changes import FAILURES, ChangeEstimate, affordable_factor, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of
@@ -51,9 +52,6 @@ _STILL = 2.0
 _SAFETY, LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
 
-_TARGET_RESIDUAL = 1e-4
-"""Residual at which increments at finite strain end: friction, which is the most sensitive, is known to 0.02 %."""
-
 LARGE_DEFORMATION = "large_deformation"
 """The effect that every scene has the data for."""
 
@@ -79,10 +77,12 @@ class CoarsePresses:
     ----------
     model : without them
     factor : edge lengths of the finer of both meshes over those of the model
+    residual : at which increments at finite strain end, with what others leave for them; None: those of a press
     """
 
     model: Model
     factor: float
+    residual: float | None = None
     _bodies: dict[tuple[bool, bool, bool, ElasticObject | None], Problem] = field(default_factory=dict)
     _workspaces: dict[int, Workspace] = field(default_factory=dict)
     _known: dict[tuple[bool, tuple[str, ...]], Numbers] = field(default_factory=dict)
@@ -124,12 +124,12 @@ class CoarsePresses:
         return replace(self._body(enriched(coarse, effects), still), without_inclusions=None)
 
     def _workspace(self, problem: Problem) -> Workspace | None:
-        """Return what presses of a body at finite strain leave for each other; they end at a larger residual."""
-        if not problem.model.finite_strain:
+        """Return what presses of a body at finite strain leave for each other."""
+        if self.residual is None or not problem.model.finite_strain:
             return None
         body = id(problem.inclusions)
         if body not in self._workspaces:
-            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=_TARGET_RESIDUAL)
+            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=self.residual)
         return self._workspaces[body]
 
     def _body(self, model: Model, still: bool) -> Problem:
@@ -189,7 +189,7 @@ class CoarsePresses:
             least, how = 1.0, "as large as the change"
         errors = {name: max(least * abs(change[name]), abs(before[name] - values[name])) for name in names}
         if with_error:  # of what changes beside large deformation, in small strain
-            both = [_in_strain_of(added, some) for some in (others, effects)]
+            both = [{n: some[n] for n in some if n == added or n != LARGE_DEFORMATION} for some in (others, effects)]
             self.check(both[1])
             (a, b), (c, d) = ([self.numbers(some, still)[0] for some in both] for still in (False, True))
             apart = {name: abs(b[name] - a[name] - d[name] + c[name]) for name in names}
@@ -202,11 +202,6 @@ class CoarsePresses:
             ", and from how far the coarse press without it is from the press",
             resolution={name: bar + more_zones.get(name, 0.0) for name, bar in zones.items()},
         )
-
-
-def _in_strain_of(added: str, effects: Mapping[str, Enriched]) -> dict[str, Enriched]:
-    """Return effects without large deformation, unless that is the one in question."""
-    return {name: effect for name, effect in effects.items() if name == added or name != LARGE_DEFORMATION}
 
 
 def _has_points_of(small: Problem, model: Model) -> bool:
@@ -231,15 +226,21 @@ def _with_model(problem: Problem, model: Model) -> Problem:
     return replace(problem, model=model, without_inclusions=body and replace(body, model=model))
 
 
-@attempted
 def large_deformation(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-    """Estimate what large deformation would change in the last increment of a press in small strain."""
-    check_kind(problem.model)
-    factor = cheap_factor(lambda _: problem.model, problem.size.press_s(increments))
-    presses = CoarsePresses(problem.model, factor)
-    presses.check({})
-    on = {LARGE_DEFORMATION: at_large_deformation}
-    return presses.changes(on, LARGE_DEFORMATION, changing_numbers(problem, last))
+    """Estimate what large deformation would change in the last increment of a press in small strain.
+
+    Where that fails, the estimate is without changes and states why.
+    """
+    start, on = time.perf_counter(), {LARGE_DEFORMATION: at_large_deformation}
+    try:
+        check_kind(problem.model)
+        factor = cheap_factor(lambda _: problem.model, problem.size.press_s(increments))
+        presses = CoarsePresses(problem.model, factor)
+        presses.check({})
+        found = presses.changes(on, LARGE_DEFORMATION, changing_numbers(problem, last))
+    except FAILURES as error:
+        found = ChangeEstimate(method=f"no estimate: {error}")
+    return replace(found, seconds=time.perf_counter() - start)
 
 
 def cheap_factor(model: Callable[[float], Model], press_s: float, first: Sequence[float] = ()) -> float:

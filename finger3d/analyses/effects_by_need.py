@@ -11,10 +11,8 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
 from finger3d._types import Tree
-from finger3d.accuracy.changes import ChangeEstimate, two_digits
+from finger3d.accuracy.changes import FAILURES, ChangeEstimate, two_digits
 from finger3d.accuracy.cost import added_cost, forecast, press_cost, without_output_s
 from finger3d.accuracy.model_error import (
     LARGE_DEFORMATION,
@@ -51,7 +49,8 @@ _RAISED, _ALTERED = 4.0, 1.25
 """Factors by which large deformation is taken to raise the change of friction or stick by another effect at most, and
 to raise or lower that of another number; a change below the tolerance over the first needs no second mesh."""
 
-_FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
+_RESIDUAL = 1e-4
+"""Residual at which increments at finite strain end: friction, which is the most sensitive, is known to 0.02 %."""
 
 
 @dataclass(frozen=True)
@@ -190,10 +189,10 @@ def _presses(model: Model, effects: Mapping[str, Enriched]) -> CoarsePresses:
 
     try:
         factor = cheap_factor(as_fine_at_contact, press_s, first=(1.0,))
-        presses = CoarsePresses(as_fine_at_contact(factor), factor)
+        presses = CoarsePresses(as_fine_at_contact(factor), factor, _RESIDUAL)
     except Finger3dError:  # too costly
-        presses = CoarsePresses(model, cheap_factor(lambda _: model, press_s))
-    for tried in (presses, CoarsePresses(model, 1.0)):
+        presses = CoarsePresses(model, cheap_factor(lambda _: model, press_s), _RESIDUAL)
+    for tried in (presses, CoarsePresses(model, 1.0, _RESIDUAL)):
         for chosen in (effects, {}):  # bodies with the effects are needed later
             try:
                 tried.check(chosen, both=False)
@@ -228,7 +227,7 @@ def _beside_each_other(
             estimate = partial(presses.changes, group, name, neutral=off.get(name))
             try:
                 estimate(with_error=False)
-            except _FAILURES as error:
+            except FAILURES as error:
                 failed.setdefault(name, str(error) or type(error).__name__)
             else:
                 found[name] = estimate
@@ -272,7 +271,7 @@ def _with_error(estimate: Callable[..., ChangeEstimate], matters: bool) -> Chang
     """Return the estimate with its error, which is as large as a change that hardly matters, or has no coarser mesh."""
     try:
         return estimate(with_error=matters)
-    except _FAILURES:
+    except FAILURES:
         return estimate(with_error=False)
 
 
