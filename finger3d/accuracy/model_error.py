@@ -6,12 +6,12 @@ increments, and from how far the coarse number n is from the number N of the pre
 
     error of d = max(1.5 |d - d'|, 0.15 |d|, |n - N|)
 
-d and d' may agree by chance while neither mesh resolves the number: a friction sum of opposite slips, or the strain of
-a gauge within an edge length of the contact.  Both factors were chosen for large deformation, on the 60 sections of
-``validation/_drawn.py`` with the seed 2026.  In 41 other scenes on coarse meshes, 88 changes would be reported without
-the last term, of whose intervals 89 % hold and the worst is 4.6 half-widths off; with it 73, 97 % and 1.6.
-``validation/advice_against_truth.py`` compares the changes with those of the same press at large deformation, in other
-scenes.
+Of what an effect changes beside large deformation, d - d' is that in small strain.  d and d' may agree by chance while
+neither mesh resolves the number: a friction sum of opposite slips, or the strain of a gauge within an edge length of
+the contact.  Both factors were chosen for large deformation, on the 60 sections of ``validation/_drawn.py`` with the
+seed 2026.  In 41 other scenes on coarse meshes, 88 changes would be reported without the last term, of whose intervals
+89 % hold and the worst is 4.6 half-widths off; with it 73, 97 % and 1.6.  ``validation/advice_against_truth.py``
+compares the changes with those of the same press at large deformation, in other scenes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Which effects a scene calls for: those that change a number of its press by more than a tolerance.
 
-Every effect that the scene names, and large deformation in any case, is judged by coarse presses with all effects and
-without it, since one effect may matter or not because of another.  What is left out is a part of the model's error.
+Every effect that the scene names, and large deformation in any case, is judged by presses with all effects and without
+it, since one effect may matter or not because of another.  What is left out is a part of the model's error.
 """
 
 from __future__ import annotations
