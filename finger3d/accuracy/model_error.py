@@ -129,7 +129,7 @@ class CoarsePresses:
             return None
         body = id(problem.inclusions)
         if body not in self._workspaces:
-            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=self.residual)
+            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=self.residual, ends={})
         return self._workspaces[body]
 
     def _body(self, model: Model, still: bool) -> Problem:

@@ -90,6 +90,8 @@ class IncrementEquations:
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
         state, error = self.reached(now, solution.state), max(solution.residual, error)
+        if self.workspace.ends is not None:
+            self.workspace.ends[self.move] = self.start.body.unknowns, now.x
         return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(
@@ -160,6 +162,9 @@ class IncrementEquations:
         """Yield expected unknowns (N,) and contact forces (c, d)."""
         start = self.start
         unknowns = start.body.unknowns
+        if self.workspace.ends and self.move in self.workspace.ends:
+            first, last = self.workspace.ends[self.move]
+            yield unknowns + last - first, start.contact.force if guess is None else guess
         if start.body.previous is not None:
             before, x = start.body.previous
             ratio = self.move.length_ratio(before)

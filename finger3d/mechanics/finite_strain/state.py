@@ -74,9 +74,11 @@ class FiniteStrainWorkspace(Workspace):
     Attributes
     ----------
     target : residual at which the iteration of an increment ends
+    ends : unknowns before and after each motion of the last press, near which a similar press begins; None: not kept
     """
 
     target: float = TARGET_RESIDUAL
+    ends: dict[Move, tuple[Float, Float]] | None = None
     bodies: dict[bool, FiniteBody] = field(default_factory=dict)
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
 
