@@ -13,7 +13,7 @@ from functools import partial
 
 from finger3d._types import Tree
 from finger3d.accuracy.changes import FAILURES, ChangeEstimate, two_digits
-from finger3d.accuracy.cost import added_cost, forecast, press_cost, without_output_s
+from finger3d.accuracy.cost import PressCost, added_cost, press_cost
 from finger3d.accuracy.model_error import (
     LARGE_DEFORMATION,
     LEAST_ERROR,
@@ -146,12 +146,13 @@ def judge(scene: Scene, report: Progress) -> Need:
         name: {f"no {name}": replace(effects[name], **_NEUTRAL[name]).apply} for name in on.keys() & _NEUTRAL.keys()
     }
     report.stage("judging which effects the scene calls for")
-    presses = _presses(plain, {name: on[name] for name in scene.effects})
+    cost = press_cost(plain)
+    presses = _presses(plain, cost, {name: on[name] for name in scene.effects})
     least = scene.auto / (1.0 + LEAST_ERROR)  # such a change may be the tolerance
     found, failed = _beside_each_other(presses, on, off, least, report)
     largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
     used = {name for name, (_, change) in largest.items() if abs(change) > least}
-    added_s = _added_seconds(plain, {name: on[name] for name in found}, used)
+    added_s = _added_seconds(plain, cost, {name: on[name] for name in found}, used)
     matters = scene.auto / _RAISED
     estimates = {
         name: _with_error(one, abs(largest[name][1]) > matters) for name, one in found.items() if name not in used
@@ -176,13 +177,13 @@ def of_press(need: Need, numbers: Mapping[str, float]) -> dict[str, ChangeEstima
     }
 
 
-def _presses(model: Model, effects: Mapping[str, Enriched]) -> CoarsePresses:
+def _presses(model: Model, cost: PressCost, effects: Mapping[str, Enriched]) -> CoarsePresses:
     """Return the presses by which the effects of a scene are judged, in few increments.
 
     All edges are those of the press, or else those at the contact, unless that is too costly: on them depends what an
     effect changes in friction.
     """
-    mesh, press_s = model.mesh, without_output_s(forecast(model))
+    mesh, press_s = model.mesh, sum(s for stage, s in cost.seconds.items() if stage not in ("start", "output"))
 
     def as_fine_at_contact(factor: float) -> Model:
         return replace(model, mesh=replace(mesh, size_mm=mesh.size_mm / factor))
@@ -275,9 +276,9 @@ def _with_error(estimate: Callable[..., ChangeEstimate], matters: bool) -> Chang
         return estimate(with_error=False)
 
 
-def _added_seconds(model: Model, on: Mapping[str, Enriched], used: Set[str]) -> dict[str, float]:
+def _added_seconds(model: Model, press: PressCost, on: Mapping[str, Enriched], used: Set[str]) -> dict[str, float]:
     """Return the seconds by name that each effect adds to a press with those that are used, by the forecast."""
-    press, added = press_cost(model), dict[str, float]()
+    added = dict[str, float]()
     for name in on:
         beside = enriched(model, {other: on[other] for other in used | {name}})
         slots = [slot for slot, filled_by in beside.filled if filled_by == name]

@@ -47,11 +47,9 @@ def cells_at(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
 
     Several cells hold a point of a shared facet, none a point outside the mesh.
     """
-    corners = mesh.points[mesh.cells]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    slack = 0.05 * (high - low).max(axis=1, keepdims=True)
-    near = np.flatnonzero(np.all((low - slack <= point) & (point <= high + slack), axis=1))
-    bary = inverse_map(mesh.element, corners[near], np.broadcast_to(point, (len(near), mesh.dim)))
+    low, high = mesh.boxes
+    near = np.flatnonzero(np.all((low <= point) & (point <= high), axis=1))
+    bary = inverse_map(mesh.element, mesh.points[mesh.cells[near]], np.broadcast_to(point, (len(near), mesh.dim)))
     inside = bary.min(axis=1) >= _INSIDE
     return [(int(cell), b) for cell, b in zip(near[inside], bary[inside], strict=True)]
 
