@@ -258,8 +258,7 @@ class Model:
     @cached_property
     def first_contact(self) -> InitialContact:
         """Where the rigid object touches first, and the box over which it would overlap the finger at rest."""
-        path = tuple(replace(leg, steps=1) for leg in self.legs)
-        return _first_contact(self.design, self.object, path, self.domain, self.object_compliance is None)
+        return first_contact(self.design, self.object, self.legs, self.domain, self.object_compliance is None)
 
     @property
     def contact_path(self) -> ContactPath:
@@ -267,11 +266,17 @@ class Model:
         return contact_path(self.design, self.object, self.legs, self.domain, self.object_compliance is None)
 
 
+def first_contact(
+    design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool = True
+) -> InitialContact:
+    """Return the first touch on a path, which models on other meshes and with other effects have in common."""
+    return _first_contact(design, obj, tuple(replace(leg, steps=1, duration_s=None) for leg in legs), domain, rigid)
+
+
 @lru_cache(maxsize=16)
 def _first_contact(
     design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool
 ) -> InitialContact:
-    """Return the first touch on a path, which models on other meshes and with other effects have in common."""
     return initial_contact(contact_path(design, obj, legs, domain, rigid))
 
 
