@@ -23,6 +23,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
+from finger3d._types import Float
 from finger3d.accuracy.changes import FAILURES, ChangeEstimate, affordable_factor, changing_numbers, check_kind, judged
 from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
 from finger3d.accuracy.point_resolution import PointResolution
@@ -42,6 +43,7 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Model
 from finger3d.mechanics.results.history import StepResult
+from finger3d.objects import Move
 
 _STEPS = (5, 3)
 """Most increments in each leg, on the coarse mesh and on the one that is coarser still."""
@@ -85,6 +87,7 @@ class CoarsePresses:
     residual: float | None = None
     _bodies: dict[tuple[bool, bool, bool, ElasticObject | None], Problem] = field(default_factory=dict)
     _workspaces: dict[int, Workspace] = field(default_factory=dict)
+    _ends: dict[int, dict[Move, tuple[Float, Float]]] = field(default_factory=dict)
     _known: dict[tuple[bool, tuple[str, ...]], Numbers] = field(default_factory=dict)
 
     def check(self, effects: Mapping[str, Enriched], both: bool = True) -> None:
@@ -127,9 +130,10 @@ class CoarsePresses:
         """Return what presses of a body at finite strain leave for each other."""
         if self.residual is None or not problem.model.finite_strain:
             return None
-        body = id(problem.inclusions)
+        body, mesh = id(problem.inclusions), id(problem.mesh)
         if body not in self._workspaces:
-            self._workspaces[body] = replace(formulation_of(problem.model).workspace(), target=self.residual, ends={})
+            empty, ends = formulation_of(problem.model).workspace(), self._ends.setdefault(mesh, {})
+            self._workspaces[body] = replace(empty, target=self.residual, ends=ends)
         return self._workspaces[body]
 
     def _body(self, model: Model, still: bool) -> Problem:

@@ -47,7 +47,13 @@ normals of two elastic bodies: in one of 69 sections they change friction by 3 %
 
 _RAISED, _ALTERED = 4.0, 1.25
 """Factors by which large deformation is taken to raise the change of friction or stick by another effect at most, and
-to raise or lower that of another number; a change below the tolerance over the first needs no second mesh."""
+to raise or lower that of another number."""
+
+_SMALL = 0.02
+"""Change up to which its error on the press's own mesh is taken as large as itself, without a second mesh."""
+
+_OF_FRICTION = "kinetic_friction"
+"""The effect that changes hardly anything but friction and stick."""
 
 _RESIDUAL = 1e-4
 """Residual at which increments at finite strain end: friction, which is the most sensitive, is known to 0.02 %."""
@@ -153,9 +159,10 @@ def judge(scene: Scene, report: Progress) -> Need:
     largest = {name: _largest(one(with_error=False)) for name, one in found.items()}
     used = {name for name, (_, change) in largest.items() if abs(change) > least}
     added_s = _added_seconds(plain, cost, {name: on[name] for name in found}, used)
-    matters = scene.auto / _RAISED
     estimates = {
-        name: _with_error(one, abs(largest[name][1]) > matters) for name, one in found.items() if name not in used
+        name: _with_error(one, presses.factor > 1.0 or abs(largest[name][1]) > _SMALL)
+        for name, one in found.items()
+        if name not in used
     }
     judged = {
         name: Judged(name in used, estimates.get(name, ChangeEstimate()), *largest[name], added_s[name])
@@ -213,8 +220,8 @@ def _beside_each_other(
 ) -> tuple[dict[str, Callable[..., ChangeEstimate]], dict[str, str]]:
     """Return the estimate of each effect beside all others, as a function, and why others cannot be judged, by name.
 
-    Effects are judged beside each other in small strain, and large deformation beside them; if it is used, those that
-    it may make needed or needless are judged again beside it.
+    Effects are judged beside each other in small strain, and large deformation beside them; if it is used, kinetic
+    friction and those that it may make needed or needless are judged beside it.
 
     Parameters
     ----------
@@ -235,18 +242,21 @@ def _beside_each_other(
                 return
 
     small = {name: on[name] for name in sorted(on) if name != LARGE_DEFORMATION}
-    for name in small:
+    others = [name for name in small if name != _OF_FRICTION]
+    for name in others:
         judge_beside(name, small, {name: on[name]})
-    together = {name: small[name] for name in found}
-    for name in together if len(together) < len(small) else ():
+    together = {name: small[name] for name in small if name in found or name == _OF_FRICTION}
+    for name in list(found) if len(together) < len(small) else ():
         judge_beside(name, together)
     large = {LARGE_DEFORMATION: on[LARGE_DEFORMATION]}
     judge_beside(LARGE_DEFORMATION, together | large, large)
-    if LARGE_DEFORMATION in found and abs(_largest(found[LARGE_DEFORMATION](with_error=False))[1]) > least:
-        for name in together:
-            fickle, firm = (abs(_largest(found[name](with_error=False), some)[1]) for some in (True, False))
-            if firm < _ALTERED * least and max(fickle * _RAISED, firm * _ALTERED) > least:
-                judge_beside(name, together | large)
+    is_large = LARGE_DEFORMATION in found and abs(_largest(found[LARGE_DEFORMATION](with_error=False))[1]) > least
+    if _OF_FRICTION in small:
+        judge_beside(_OF_FRICTION, *[together | large] * is_large, together, {_OF_FRICTION: on[_OF_FRICTION]})
+    for name in sorted(together.keys() & others) if is_large else ():
+        fickle, firm = (abs(_largest(found[name](with_error=False), some)[1]) for some in (True, False))
+        if firm < _ALTERED * least and max(fickle * _RAISED, firm * _ALTERED) > least:
+            judge_beside(name, together | large)
     return found, {name: why for name, why in failed.items() if name not in found}
 
 
@@ -268,10 +278,10 @@ def _largest(estimate: ChangeEstimate, fickle: bool | None = None) -> tuple[str,
     return max(known.items(), key=lambda item: abs(item[1]), default=("", 0.0))
 
 
-def _with_error(estimate: Callable[..., ChangeEstimate], matters: bool) -> ChangeEstimate:
-    """Return the estimate with its error, which is as large as a change that hardly matters, or has no coarser mesh."""
+def _with_error(estimate: Callable[..., ChangeEstimate], by_mesh: bool) -> ChangeEstimate:
+    """Return the estimate with its error, which is as large as a change that is small or has no coarser mesh."""
     try:
-        return estimate(with_error=matters)
+        return estimate(with_error=by_mesh)
     except FAILURES:
         return estimate(with_error=False)
 
