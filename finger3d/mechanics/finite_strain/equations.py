@@ -91,7 +91,7 @@ class IncrementEquations:
             return self.failed(now, Outcome.UNSTABLE, error, spent)
         state, error = self.reached(now, solution.state), max(solution.residual, error)
         if self.workspace.ends is not None:
-            self.workspace.ends[self.move] = self.start.body.unknowns, now.x
+            self.workspace.ends.setdefault(self.move, (self.start.body.unknowns, now.x))
         return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(

@@ -74,7 +74,7 @@ class FiniteStrainWorkspace(Workspace):
     Attributes
     ----------
     target : residual at which the iteration of an increment ends
-    ends : unknowns before and after each motion of the last press, near which a similar press begins; None: not kept
+    ends : unknowns before and after each motion of the first press, near which similar ones begin; None: not kept
     """
 
     target: float = TARGET_RESIDUAL
