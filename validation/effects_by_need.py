@@ -5,9 +5,11 @@ An effect is needed if a press with all effects changes a number by more than th
 left out, on the same mesh: forces, lengths and areas of contact and stick, and readings, relative as
 finger3d.accuracy.richardson.relative_error has it.  Lengths and areas count as far as their change exceeds their
 resolution by the contact points in both presses.  Where the largest change is within a fifth of the tolerance, or only
-the resolution decides, either answer is right.  An elastic object and stiff gauges are left out by an object of 1e9 MPa and
-foils of 1e-9 MPa: gaps beside a rigid object, and gauges without foils, are discretised in another way, which changes
-friction by 3 % in section 49 and a gauge by 0.7 % in solid 5 whatever the stiffness.
+the resolution decides, either answer is right.
+
+An elastic object and stiff gauges are left out by an object of 1e9 MPa and foils of 1e-9 MPa: gaps beside a rigid
+object, and gauges without foils, are discretised in another way, which changes friction by 3 % in section 49 and a
+gauge by 0.7 % in solid 5 whatever the stiffness.
 
 The press that auto makes is also compared, in every third scene, with all effects on a finer mesh: the truth is to lie
 within two total bars in nine of ten numbers, where a total bar is that of mesh and increments, and the farther end of
