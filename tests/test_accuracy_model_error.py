@@ -75,7 +75,7 @@ def test_no_change_is_told_where_none_can_be_estimated(monkeypatch: pytest.Monke
 
     reason = "a run did not converge"
 
-    def fail(problem: Any) -> Any:
+    def fail(*_: Any) -> Any:
         raise Finger3dError(reason)
 
     monkeypatch.setattr(module, "last_step", fail)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 
 import finger3d
 from finger3d.accuracy.changes import changing_numbers
-from finger3d.accuracy.model_error import CoarsePresses
+from finger3d.accuracy.model_error import CoarsePresses, at_large_deformation
 from finger3d.analyses.effects_by_need import judge
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.progress import QUIET
@@ -81,6 +82,38 @@ def test_bodies_that_share_what_is_condensed_are_those_condensed_alone() -> None
         some = {name: on[name] for name in on if name != left_out}
         alone = CoarsePresses(plain, 2.0).numbers(some, False)[0]
         assert shared.numbers(some, False)[0] == pytest.approx(alone, rel=error)
+
+
+def test_presses_at_finite_strain_begin_near_each_other_and_end_where_they_do_alone() -> None:
+    """Increments that end at a residual of 1e-4 leave 0.1 % in friction.
+
+    An object of another modulus is not condensed anew: its compliance is inversely proportional to that.
+    """
+    effects = {"auto": True, "elastic_object": {"E_MPa": 2.0, "nu": 0.4}, "kinetic_friction": {"ratio": 0.7}}
+    asked = parse({**needs(2.0).given, "gauge": LONG, "effects": effects})
+    plain, on = asked.with_effects(()).model(), {name: effect.apply for name, effect in asked.effects.items()}
+    on["large_deformation"] = at_large_deformation
+    shared = CoarsePresses(plain, 2.0, 1e-4)
+    shared.numbers(on, False)
+    stiff = replace(asked.effects["elastic_object"], E_MPa=40.0).apply
+    for name, some in (
+        ("kinetic_friction", {name: on[name] for name in on if name != "kinetic_friction"}),
+        ("elastic_object", {**on, "elastic_object": stiff}),
+    ):
+        alone = CoarsePresses(plain, 2.0).numbers(some, False)[0]
+        beside = {f"other {key}" if key == name else key: effect for key, effect in some.items()}
+        assert shared.numbers(beside, False)[0] == pytest.approx(alone, rel=2e-3)
+
+
+def test_gauges_are_read_alike_with_foils_and_without() -> None:
+    """Between points on a coarse mesh: foils without stiffness leave the body as it is, and read what others read."""
+    asked = parse({**needs(2.0).given, "gauge": LONG, "effects": {"auto": True, "embedded_gauge": GAUGES}})
+    soft = replace(asked.effects["embedded_gauge"], E_MPa=1e-9)
+    plain, large = asked.with_effects(()).model(), {"large_deformation": at_large_deformation}
+    presses = CoarsePresses(plain, 2.0, 1e-6)
+    presses.numbers({**large, "embedded_gauge": asked.effects["embedded_gauge"].apply}, False)
+    wanted = CoarsePresses(plain, 2.0).numbers({**large, "embedded_gauge": soft.apply}, False)[0]
+    assert presses.numbers(large, False)[0] == pytest.approx(wanted, rel=1e-4)
 
 
 def test_an_effect_is_judged_beside_all_others() -> None:

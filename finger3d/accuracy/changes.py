@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +17,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
 from finger3d.mechanics.results.history import StepResult, measure
+
+FAILURES = Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError
+"""Errors of presses that an estimate makes, which then tells no changes."""
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
@@ -87,42 +88,23 @@ class ChangeEstimate:
         return {name: {"change": c.change, "low": c.low, "high": c.high} for name, c in self.changes.items()}
 
 
-def affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> float:
+def affordable_factor(coarse: Callable[[float], Model], budget_s: float, first: Sequence[float] = ()) -> float:
     """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget.
 
     Parameters
     ----------
     coarse : function of this factor that returns the model of the coarse press
+    first : factors to be tried before those of a coarse mesh
 
     Raises
     ------
     Finger3dError
         If all coarse presses cost more.
     """
-    for factor in _FACTORS:
+    for factor in (*first, *_FACTORS):
         if without_output_s(forecast(coarse(factor))) <= budget_s:
             return factor
     raise Finger3dError(f"it would take more than {budget_s:.2g} s")
-
-
-def attempted(
-    estimate: Callable[[Problem, StepResult, int], ChangeEstimate],
-) -> Callable[[Problem, StepResult, int], ChangeEstimate]:
-    """Let an estimate of a press return its time, and where it fails one without changes that states why.
-
-    The estimate takes the press, its last increment, and its number of increments, from which its cost is modelled.
-    """
-
-    @functools.wraps(estimate)
-    def timed(problem: Problem, last: StepResult, increments: int) -> ChangeEstimate:
-        start = time.perf_counter()
-        try:
-            found = estimate(problem, last, increments)
-        except (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError) as error:
-            found = ChangeEstimate(method=f"no estimate: {error}")
-        return replace(found, seconds=time.perf_counter() - start)
-
-    return timed
 
 
 def two_digits(value: float) -> str:

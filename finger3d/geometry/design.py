@@ -33,6 +33,10 @@ class Design(Protocol):
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[object]]]
 
+    def __hash__(self) -> int:
+        """Hash of the fields."""
+        ...
+
     @property
     def name(self) -> str:
         """Name in scenes and messages."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import Literal
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
@@ -258,12 +258,26 @@ class Model:
     @cached_property
     def first_contact(self) -> InitialContact:
         """Where the rigid object touches first, and the box over which it would overlap the finger at rest."""
-        return initial_contact(self.contact_path)
+        return first_contact(self.design, self.object, self.legs, self.domain, self.object_compliance is None)
 
     @property
     def contact_path(self) -> ContactPath:
         """The object and its path into the finger."""
         return contact_path(self.design, self.object, self.legs, self.domain, self.object_compliance is None)
+
+
+def first_contact(
+    design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool = True
+) -> InitialContact:
+    """Return the first touch on a path, which models on other meshes and with other effects have in common."""
+    return _first_contact(design, obj, tuple(replace(leg, steps=1, duration_s=None) for leg in legs), domain, rigid)
+
+
+@lru_cache(maxsize=16)
+def _first_contact(
+    design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool
+) -> InitialContact:
+    return initial_contact(contact_path(design, obj, legs, domain, rigid))
 
 
 def contact_path(

@@ -14,10 +14,10 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import ElasticConstants
-from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, first_contact
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
-from finger3d.objects import OBJECTS, RigidObject, initial_contact
+from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
 from finger3d.scene.derived import legs_of, parts_of
@@ -244,8 +244,8 @@ class _Parts:
         """
         domain = self.tables.model.domain
         legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
-        way = contact_path(self.design, self.object, legs, domain)
-        box, linear = initial_contact(way).contact_box, not set(self.settings) - {"kinetic_friction"}
+        box = first_contact(self.design, self.object, legs, domain).contact_box
+        linear = not set(self.settings) - {"kinetic_friction"}
         # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
         quick = linear and self.tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in legs)
         return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)

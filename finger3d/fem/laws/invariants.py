@@ -95,13 +95,13 @@ class InvariantLaw(ABC):
         inverse = 1.0 / square
         by = self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1))
         g1, g2 = 2.0 * square, -2.0 * inverse
-        zero = np.zeros(stretches.shape[:-1])
-        w2, w11, w12, w22 = (zero if w is None else w for w in (by.w2, by.w11, by.w12, by.w22))
-        stress = _wide1(by.w1) * g1 + _wide1(w2) * g2
-        diagonal = _wide1(by.w1) * 2.0 * g1 - _wide1(w2) * 2.0 * g2
+        stress, diagonal = _wide1(by.w1) * g1, _wide1(by.w1) * 2.0 * g1
+        if by.w2 is not None:
+            stress, diagonal = stress + _wide1(by.w2) * g2, diagonal - _wide1(by.w2) * 2.0 * g2
         out = diagonal[..., None] * np.eye(3)
-        for w, a, b in ((w11, g1, g1), (w12, g1, g2), (w12, g2, g1), (w22, g2, g2)):
-            out = out + _wide(w) * a[..., :, None] * b[..., None, :]
+        for w, a, b in ((by.w11, g1, g1), (by.w12, g1, g2), (by.w12, g2, g1), (by.w22, g2, g2)):
+            if w is not None:
+                out = out + _wide(w) * a[..., :, None] * b[..., None, :]
         return stress, out
 
 

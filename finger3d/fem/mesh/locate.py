@@ -11,6 +11,9 @@ from finger3d.fem.mesh.simplex import Mesh
 _NEWTON_ITERATIONS = 8
 """Newton iterations on a quadratic element; the map of a linear one is inverted exactly by the first."""
 
+_SETTLED = 1e-9
+"""Largest step, in barycentric coordinates, of the last iteration: the next would be of the order of its square."""
+
 _INSIDE = -1e-6
 """Least barycentric coordinate of a point that counts as inside a cell."""
 
@@ -34,6 +37,8 @@ def inverse_map(element: Element, nodes: Float, points: Float, start: Float | No
         step[regular] = np.linalg.solve(jacobian[regular], miss[regular][:, :, None])[:, :, 0]
         step = np.clip(step, -1.0, 1.0)
         bary = bary + np.hstack([-step.sum(axis=1, keepdims=True), step])
+        if np.abs(step).max(initial=0.0) < _SETTLED:
+            break
     return bary
 
 
@@ -42,11 +47,9 @@ def cells_at(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:
 
     Several cells hold a point of a shared facet, none a point outside the mesh.
     """
-    corners = mesh.points[mesh.cells]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    slack = 0.05 * (high - low).max(axis=1, keepdims=True)
-    near = np.flatnonzero(np.all((low - slack <= point) & (point <= high + slack), axis=1))
-    bary = inverse_map(mesh.element, corners[near], np.broadcast_to(point, (len(near), mesh.dim)))
+    low, high = mesh.boxes
+    near = np.flatnonzero(np.all((low <= point) & (point <= high), axis=1))
+    bary = inverse_map(mesh.element, mesh.points[mesh.cells[near]], np.broadcast_to(point, (len(near), mesh.dim)))
     inside = bary.min(axis=1) >= _INSIDE
     return [(int(cell), b) for cell, b in zip(near[inside], bary[inside], strict=True)]
 

@@ -93,6 +93,14 @@ class Mesh:
         return keys % len(self.points), corner.reshape(corners.shape)
 
     @cached_property
+    def boxes(self) -> tuple[Float, Float]:
+        """Lowest and highest coordinates (e, d) of a box around each cell, with room for a curved facet."""
+        nodes = self.points[self.cells]
+        low, high = nodes.min(axis=1), nodes.max(axis=1)
+        slack = 0.05 * (high - low).max(axis=1, keepdims=True)
+        return low - slack, high + slack
+
+    @cached_property
     def by_part(self) -> tuple[MeshPart, ...]:
         """The parts that have cells, each as a mesh of its own."""
         if self.part is None:

@@ -215,7 +215,10 @@ def displacement_rows(mesh: Mesh, point: Float, signs: Float) -> sp.csr_matrix:
     row = np.zeros(len(mesh.points))
     for cell, bary in cells:
         np.add.at(row, mesh.cells[cell], mesh.element.shape(bary[None])[0] / len(cells))
-    return sp.kron(sp.csr_matrix(row), np.diag(signs), format="csr")
+    nodes, d = np.flatnonzero(row), len(signs)
+    columns = d * nodes + np.arange(d)[:, None]
+    entries, starts = np.outer(signs, row[nodes]), len(nodes) * np.arange(d + 1)
+    return sp.csr_matrix((entries.ravel(), columns.ravel(), starts), shape=(d, d * len(row)))
 
 
 def _holding(mesh: Mesh, point: Float) -> list[tuple[int, Float]]:

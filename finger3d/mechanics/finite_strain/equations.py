@@ -43,9 +43,6 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_object, motion_until_touch, transported
 from finger3d.objects import Move, vertical_frame
 
-_TARGET_RESIDUAL = 5e-9
-"""Residual at which the iteration ends; where round-off prevents it, one up to `TOLERANCE` that no longer falls."""
-
 _NEGLIGIBLE = 1e-6
 """Force, over the shear modulus times the square of the depth, below which contact is negligible."""
 
@@ -65,11 +62,6 @@ class Configuration:
     contact: DeformedContact
 
 
-def converged(error: float, last_error: float) -> bool:
-    """Whether an iteration ends at a residual, after another one."""
-    return error <= _TARGET_RESIDUAL or 0.3 * last_error < error <= TOLERANCE
-
-
 @dataclass(frozen=True)
 class IncrementEquations:
     """Equations of an increment from a state, as the object moves.
@@ -87,6 +79,10 @@ class IncrementEquations:
     move: Move
     workspace: FiniteStrainWorkspace
 
+    def has_converged(self, error: float, last_error: float) -> bool:
+        """Whether an iteration ends at a residual, after another one."""
+        return error <= self.workspace.target or 0.3 * last_error < error <= TOLERANCE
+
     def finished(
         self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int
     ) -> ContactSolution[State[DeformedBody]]:
@@ -94,6 +90,8 @@ class IncrementEquations:
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
         state, error = self.reached(now, solution.state), max(solution.residual, error)
+        if self.workspace.ends is not None:
+            self.workspace.ends.setdefault(self.move, (self.start.body.unknowns, now.x))
         return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(
@@ -168,6 +166,9 @@ class IncrementEquations:
         """Yield expected unknowns (N,) and contact forces (c, d)."""
         start = self.start
         unknowns = start.body.unknowns
+        if self.workspace.ends and self.move in self.workspace.ends:
+            first, last = self.workspace.ends[self.move]
+            yield unknowns + last - first, start.contact.force if guess is None else guess
         if start.body.previous is not None:
             before, x = start.body.previous
             ratio = self.move.length_ratio(before)

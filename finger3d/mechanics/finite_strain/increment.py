@@ -19,7 +19,7 @@ from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.tensors import InvertedError
-from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations, converged
+from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.failure import cause_of_failure
 from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
@@ -100,7 +100,7 @@ class FiniteIncrement(IncrementEquations):
                 continue
             (increment, now), force = after, solution.state.force
             last_error, error = error, increment._error(now, solution.state)
-            if converged(error, last_error):
+            if self.has_converged(error, last_error):
                 return increment, increment.finished(now, solution, error, spent)
             if factors and error > _DIVERGED:
                 break
@@ -127,7 +127,7 @@ class FiniteIncrement(IncrementEquations):
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
             now, force, last_error, error = after[1], solution.state.force, error, next_error
-            if converged(error, last_error):
+            if self.has_converged(error, last_error):
                 solution = replace(solution, method=SNAPPED) if snapped else solution
                 return self.finished(now, solution, error, spent)
             change = error / last_error if math.isfinite(last_error) else 1.0

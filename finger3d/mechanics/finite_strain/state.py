@@ -17,6 +17,9 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.small_strain.relaxation import InternalVariables
 from finger3d.objects import Move, ObjectPose
 
+TARGET_RESIDUAL = 5e-9
+"""Residual at which the iteration ends; where round-off prevents it, one up to the tolerance that no longer falls."""
+
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
 
@@ -67,8 +70,15 @@ class FiniteStrainWorkspace(Workspace):
     """Discretisation and last linearisation of a body, with which its next increment begins.
 
     Both have two entries: of the body with its inclusions (True) and without.
+
+    Attributes
+    ----------
+    target : residual at which the iteration of an increment ends
+    ends : unknowns before and after each motion of the first press, near which similar ones begin; None: not kept
     """
 
+    target: float = TARGET_RESIDUAL
+    ends: dict[Move, tuple[Float, Float]] | None = None
     bodies: dict[bool, FiniteBody] = field(default_factory=dict)
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
 

@@ -20,7 +20,7 @@ from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.tensors import InvertedError
-from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations, converged
+from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
 
@@ -98,7 +98,7 @@ class _Trial:
     @property
     def has_converged(self) -> bool:
         """Whether the iteration has ended."""
-        return converged(self.error, self.last_error)
+        return self.equations.has_converged(self.error, self.last_error)
 
     def lags(self) -> bool:
         """Count the iteration if more than `_TOO_SLOW` remain; return whether two have been counted."""

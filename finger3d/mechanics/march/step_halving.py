@@ -316,8 +316,8 @@ def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str,
     return largest
 
 
-def last_step(problem: Problem) -> StepResult:
-    """Solve all increments and return the result of the last.
+def last_step(problem: Problem, workspace: Workspace | None = None) -> StepResult:
+    """Solve all increments and return the result of the last; for the workspace see `march`.
 
     Raises
     ------
@@ -325,7 +325,7 @@ def last_step(problem: Problem) -> StepResult:
         If an increment does not converge.
     """
     result = None
-    for result in march(problem):
+    for result in march(problem, workspace=workspace):
         if not result.outcome.ok:
             raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
     if result is None:
