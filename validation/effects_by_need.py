@@ -53,7 +53,7 @@ from ._runner import studies
 
 OUT = Path(__file__).resolve().parent.parent / "out"
 SEED = 20261126
-SECTIONS, SOLIDS = 69, 15
+SECTIONS, SOLIDS = 81, 19
 FINER = {"solid": 0.75, "section": 0.7}
 """Edge lengths of the truth over those of the press."""
 MOST_S = 60.0
