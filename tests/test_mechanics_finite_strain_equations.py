@@ -52,7 +52,7 @@ def test_the_tangent_is_the_derivative_of_the_forces_out_of_balance(
     linearisation = increment.linearise(now, state.contact.force)
     out = increment.out_of_balance(now, state.contact.force)
     eliminated = linearisation.condensation.eliminated(-out)
-    found, change = increment.contact(now, state.contact.force, linearisation, eliminated.displacement)
+    _, found, change = increment.contact(now, state.contact.force, linearisation, eliminated.displacement)
     assert found.outcome.ok
     assert change is not None
     after = increment.moved(now, eliminated.unknowns(change))

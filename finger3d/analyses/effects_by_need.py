@@ -282,8 +282,9 @@ def _with_error(estimate: Callable[..., ChangeEstimate], by_mesh: bool) -> Chang
     """Return the estimate with its error, which is as large as a change that is small or has no coarser mesh."""
     try:
         return estimate(with_error=by_mesh)
-    except FAILURES:
-        return estimate(with_error=False)
+    except FAILURES as error:
+        found = estimate(with_error=False)
+        return replace(found, method=f"{found.method}; no second mesh: {error}")
 
 
 def _added_seconds(model: Model, press: PressCost, on: Mapping[str, Enriched], used: Set[str]) -> dict[str, float]:

@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -98,16 +99,12 @@ class IncrementEquations:
         self, now: Configuration, outcome: Outcome, error: float, spent: int, detail: str = ""
     ) -> ContactSolution[State[DeformedBody]]:
         """Return the initial state and the reason of the failure; later increments begin with a new tangent."""
-        self.forget()
-        unstable = self.body.instability(now.x)
-        outcome = Outcome.UNSTABLE if unstable else outcome
-        return ContactSolution(self.start, outcome, error, spent, "none", unstable or detail)
-
-    def forget(self) -> None:
-        """Keep no linearisation for later iterations but its sparsity pattern."""
         last = self.workspace.linearisations.get(self._has_inclusions)
         if last is not None:
             self.workspace.linearisations[self._has_inclusions] = replace(last, reusable=False)
+        unstable = self.body.instability(now.x)
+        outcome = Outcome.UNSTABLE if unstable else outcome
+        return ContactSolution(self.start, outcome, error, spent, "none", unstable or detail)
 
     def last_linearisation(self) -> Linearisation | None:
         """Return the linearisation that an earlier increment left; None if it must not be reused."""
@@ -224,24 +221,19 @@ class IncrementEquations:
 
     def contact(
         self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
-    ) -> tuple[ContactSolution[ContactState], Float]:
-        """Solve contact of the linearised body; returns the solution and the changes (r,) of the forces on its rows.
+    ) -> tuple[Self, ContactSolution[ContactState], Float]:
+        """Solve contact of the linearised body.
 
-        `displacement` (r,) mm is that of the rows under the forces out of balance alone.
+        Parameters
+        ----------
+        displacement : (r,) mm, of the rows under the forces out of balance alone
+
+        Returns
+        -------
+        increment : with the motion that the solution is for
+        solution : of the contact
+        change : (r,) N, of the forces on the rows
         """
-        problem = self.contact_problem(now, force, linearisation, displacement)
-        solution = RULES[self.problem.model.rule](problem, force)
-        return solution, self.change(now, solution.state.force - force, linearisation)
-
-    def change(self, now: Configuration, change: Float, linearisation: Linearisation) -> Float:
-        """Return changes of forces (c, d) as those (r,) on the rows of the linearised body."""
-        rotation = linearisation.rotation(now.contact.bases)
-        return np.asarray(np.einsum("cij,ci->cj", rotation, change).ravel()[self.problem.system.active_dofs])
-
-    def contact_problem(
-        self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
-    ) -> ContactProblem:
-        """Return the contact problem of the linearised body; for `displacement` see `contact`."""
         problem, start, bases = self.problem, transported(self.start.contact, now.contact.bases), now.contact.bases
         active, rotation = problem.system.active_dofs, linearisation.rotation(bases)
         delassus = rotated_delassus(linearisation.delassus, rotation)
@@ -254,7 +246,7 @@ class IncrementEquations:
         free_displacement += self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
-        return ContactProblem.of(
+        contact = ContactProblem.of(
             start,
             free_displacement,
             delassus,
@@ -263,6 +255,15 @@ class IncrementEquations:
             self._augmentation,
             problem.surface.area,
         )
+        increment, solution = self._solved(now, force, contact)
+        change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
+        return increment, solution, change.ravel()[active]
+
+    def _solved(
+        self, now: Configuration, force: Float, contact: ContactProblem
+    ) -> tuple[Self, ContactSolution[ContactState]]:
+        """Return the contact solution from a guess of the forces (c, d), N, and the increment that it is for."""
+        return self, RULES[self.problem.model.rule](contact, force)
 
     def out_of_balance(self, now: Configuration, force: Float) -> Float:
         """Return internal less contact forces (N,)."""

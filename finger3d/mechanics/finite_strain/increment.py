@@ -147,21 +147,14 @@ class FiniteIncrement(IncrementEquations):
     ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
         """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
         eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
-        problem = self.contact_problem(now, force, linearisation, eliminated.displacement)
-        increment, solution = self._balanced(now, force, problem)
-        step = eliminated.unknowns(self.change(now, solution.state.force - force, linearisation))
+        increment, solution, change = self.contact(now, force, linearisation, eliminated.displacement)
+        step = eliminated.unknowns(change)
         if not solution.outcome.ok or not np.isfinite(step).all():
             return solution, None
         try:
             return solution, (increment, increment.moved(now, step))
         except InvertedError:
             return solution, None
-
-    def _balanced(
-        self, now: Configuration, force: Float, problem: ContactProblem
-    ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Return the contact solution of the linearised body, and the increment with the motion that it is for."""
-        return self, RULES[self.problem.model.rule](problem, force)
 
 
 @dataclass(frozen=True)
@@ -205,14 +198,14 @@ class IncrementToForce(FiniteIncrement):
         state = replace(self.start.contact, force=force, bases=now.contact.bases)
         return -float(self.problem.world_force(state)[:, 1].sum())
 
-    def _balanced(
-        self, now: Configuration, force: Float, problem: ContactProblem
+    def _solved(
+        self, now: Configuration, force: Float, contact: ContactProblem
     ) -> tuple[Self, ContactSolution[ContactState]]:
         """Lower the object by the secant method until the linearised body has the force."""
         down, rate, depth = self.active(now.contact.bases[:, :, 1].ravel()), self.rate, self.move.end.depth_mm
         lowered, last, allowed = 0.0, (0.0, 0.0), _EXACT * self.wanted
         for number in range(_SOLUTIONS):
-            at_depth = replace(problem, free_motion=problem.free_motion + lowered * down)
+            at_depth = replace(contact, free_motion=contact.free_motion + lowered * down)
             solution = RULES[self.problem.model.rule](at_depth, force)
             if not solution.outcome.ok:
                 return self, solution

@@ -77,7 +77,7 @@ class _Trial:
 
     def contact(self, linearisation: Linearisation, displacement: Float) -> Float | None:
         """Solve contact; returns the changes (r,) of the forces on the rows, None if there is no solution."""
-        self.solution, change = self.equations.contact(self.now, self.force, linearisation, displacement)
+        _, self.solution, change = self.equations.contact(self.now, self.force, linearisation, displacement)
         self.spent += self.solution.iterations
         return change if self.solution.outcome.ok else None
 
