@@ -37,13 +37,14 @@ def test_automatic_increments_end_within_their_estimate() -> None:
     problem = build(fig9(domain="plane-strain", object=Cylinder(radius_mm=80.0), legs=(Leg(10.0, steps="auto"),)))
     seen: list[tuple[int, int]] = []
     *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
-    assert seen[:11] == [*((k, 10) for k in range(1, 11)), (1, 20)]
+    assert seen[:6] == [*((k, 5) for k in range(1, 6)), (1, 10)]
     assert seen[-1] == (len(frames), len(frames))
     assert estimate is not None
     assert estimate.met
     assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01
     assert estimate.dissipation <= 0.05
-    assert [count for count, _ in estimate.runs] == [10 * 2**k for k in range(len(estimate.runs))]
+    assert [count for count, _ in estimate.runs] == [5 * 2**k for k in range(len(estimate.runs))]
+    assert len(estimate.runs) >= 3
     fine = list(march(replace(problem, model=replace(problem.model, legs=(Leg(10.0, steps=4 * len(frames)),)))))
     a, b = measure(problem.points, frames[-1]), measure(problem.points, fine[-1])
     assert a["normal_force_N"] == pytest.approx(b["normal_force_N"], rel=0.01)
@@ -132,7 +133,7 @@ def test_the_error_is_exact_at_first_order(ratio: float) -> None:
 
 def test_two_runs_that_agree_by_chance_do_not_hide_the_error_of_those_before() -> None:
     runs = [(10, {"x": 1.4, "y": 1.0}), (20, {"x": 1.0, "y": 1.3}), (40, {"x": 1.0, "y": 1.0})]
-    assert errors_of_runs(runs) == pytest.approx({"x": 0.2, "y": 0.3})
+    assert errors_of_runs(runs) == pytest.approx({"x": 0.4 * 0.5**1.5, "y": 0.3})
     assert errors_of_runs(runs[1:]) == pytest.approx({"x": 0.0, "y": 0.3})
 
 
@@ -143,6 +144,6 @@ def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Dom
         limits(model, PressSize(2 if domain == "plane-strain" else 3, 1e4 * points, points))
         for points in (30, 300, 3000)
     ]
-    assert all(first == 10 and last >= 20 for first, last in found)
+    assert all(first == 5 and last >= 20 for first, last in found)
     assert found[0][1] >= found[1][1] >= found[2][1]
     assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (6, 12)

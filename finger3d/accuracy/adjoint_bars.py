@@ -69,6 +69,10 @@ _SHARES = {
 _FEW_POINTS = 8.0
 """Relative error of the friction in a section over (h/a)^3: a zone of few points has errors of higher order, too."""
 
+_UNDER_CURVED = {Kind.FRICTION_SUM: 3.0, Kind.DISSIPATION: 5.0}
+"""Relative errors in a section under a curved object over (h/a)^2: presses with every second multiplier have the
+normals of this one, and do not see how few points follow the object's surface."""
+
 _BASE_SHARE = 0.035
 """Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
 
@@ -173,6 +177,8 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
             relative = math.hypot(relative, min(1.0, _FEW_POINTS * resolution.along**3) * scales[kind])
         if kind is Kind.DISSIPATION and problem.dim == 3:
             relative = math.hypot(relative, spacing * _unused_friction(problem.model, numbers) * abs(value))
+        if kind in _UNDER_CURVED and problem.dim == 2 and not problem.model.object.is_flat:
+            relative = math.hypot(relative, _UNDER_CURVED[kind] * resolution.along**2 * scales.get(kind, abs(value)))
         contact = math.hypot(max(changes[name]) / shares.change, relative)
         parts[name] = body.bar(name, shares.body[problem.dim - 2]), contact
     bars = {name: math.hypot(*both) for name, both in parts.items()}
@@ -180,8 +186,32 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
         bars[name] = math.hypot(bars[name], relative * numbers[name])
     unresolved = UNRESOLVED_DISSIPATION * resolution.share * abs(numbers["external_work_mJ"])
     bars["dissipation_mJ"] = math.hypot(bars["dissipation_mJ"], unresolved)
+    zones = resolution.zone_bars
+    if problem.dim == 2:
+        zones |= _stick_that_comes_and_goes(zones, short, few[-1], ends, resolution.spacing_mm)
     reach = measure(problem.points, steps[-1])["contact_half_length_mm"]
-    return AdjointBars(bars | resolution.zone_bars, parts, body, presses[0], kinds, float(reach))
+    return AdjointBars(bars | zones, parts, body, presses[0], kinds, float(reach))
+
+
+def _stick_that_comes_and_goes(
+    bars: Mapping[str, float],
+    problem: Problem,
+    step: StepResult,
+    coarse: Sequence[tuple[Problem, StepResult]],
+    spacing_mm: float,
+) -> dict[str, float]:
+    """Return the error bars of the length of stick, no less than its change with every second multiplier.
+
+    Under a wave a whole crest may stick or slip.  A change below the distance of the points does not count.
+
+    Parameters
+    ----------
+    coarse : presses with every second multiplier, and their last increments
+    """
+    presses = [(problem, step), *(both for both in coarse if both[1].outcome.ok)]
+    own, *others = (measure(press.points, end)["stick_half_length_mm"] for press, end in presses)
+    half = max(bars["stick_half_length_mm"], max(abs(other - own) for other in others) - spacing_mm)
+    return {"stick_half_length_mm": half, "stick_length_mm": 2.0 * half}
 
 
 def _unused_friction(model: Model, numbers: Mapping[str, float]) -> float:
