@@ -80,7 +80,8 @@ def numbers(title: str, scene: Path | dict[str, Any]) -> Iterator[Number]:
     result = press(scene)
     seconds = time.perf_counter() - begin
     summary, last = result.summary(), result.history.steps[-1]
-    values, kinds = table_row(result.history.points, last), kinds_of(last.readings)
+    kinds = kinds_of(last.readings)
+    values = {name: value for name, value in table_row(result.history.points, last).items() if name in kinds}
     for name, bar in ErrorBars.of_summary(summary).totals().items():
         relative = relative_error(values, kinds, name, bar)
         yield Number(title, summary["scene"]["model"]["domain"], name, float(values[name]), bar, relative, seconds)
