@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -166,10 +167,16 @@ class ResultWriter:
             {} if mesh.part is None else {"part": mesh.part},
         )
 
-    def pictures(self, record: PressRecord, fields: Fields) -> None:
-        """Draw finger.png, contact.png, force.png, and markers.png if there are markers."""
+    @contextmanager
+    def pictures(self, record: PressRecord, fields: Fields) -> Iterator[Callable[[], None]]:
+        """Draw finger.png, contact.png, force.png, and markers.png if there are markers.
+
+        Yields
+        ------
+        function that draws and writes them; a solid is rendered beside what is done before
+        """
         from finger3d.plotting import figures
-        from finger3d.plotting.deformed import DeformedFinger, draw_fingers
+        from finger3d.plotting.deformed import DeformedFinger, drawing_fingers
         from finger3d.plotting.gauges import marks_of
         from finger3d.plotting.layout import save
 
@@ -181,10 +188,6 @@ class ResultWriter:
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
         stuck = np.full(len(table["status"]), STICK)
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
-        figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
-        figures.force_figure(self.folder / "force.png", steps)
-        if markers := _markers(record):
-            figures.marker_figure(self.folder / "markers.png", markers)
         finger = DeformedFinger(
             mesh=mesh,
             displacement=fields.displacement,
@@ -198,8 +201,17 @@ class ResultWriter:
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
             zones=problem.points.zones(good[-1].state),
         )
-        (figure,), _ = draw_fingers([finger])
-        save(figure, self.folder / "finger.png")
+
+        def draw() -> None:
+            figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
+            figures.force_figure(self.folder / "force.png", steps)
+            if markers := _markers(record):
+                figures.marker_figure(self.folder / "markers.png", markers)
+            (figure,), _ = drawn()
+            save(figure, self.folder / "finger.png")
+
+        with drawing_fingers([finger]) as drawn:
+            yield draw
 
 
 def _markers(record: PressRecord) -> Tree | None:

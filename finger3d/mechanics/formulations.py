@@ -40,8 +40,8 @@ def increment_to_force(
 
     Returns
     -------
-    Motion to the depth of the force, and the solution; None where the iteration does not converge, where the solution is
-    that of the increments as they are, and where the contact geometry is given.
+    Motion to the depth of the force, and the solution; None where the iteration does not converge.  In small strain
+    there is none with viscosity, where the increments define the solution, and where the contact geometry is given.
     """
     if problem.contact_geometry is not None:
         return None
