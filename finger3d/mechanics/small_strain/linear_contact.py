@@ -40,7 +40,8 @@ _MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
-"""Iteration from which mean gradients of the distance are held fixed if they still change by more than this."""
+"""Iteration, at about the same depth, from which mean gradients of the distance are held fixed if they still change by
+more than this."""
 
 _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
@@ -183,7 +184,8 @@ class Increment:
         spent, error, start = 0, np.inf, guess
         tried: list[Float] = []
         displacements: list[Float] = []
-        for iteration in range(1, _MOST_SOLUTIONS + 1):
+        settled = 0
+        for _ in range(_MOST_SOLUTIONS):
             before = increment
             increment, solution = before.solve_linearised(geometry, expansion_point, start)
             spent += solution.iterations
@@ -196,10 +198,11 @@ class Increment:
                 break
             after = increment.geometry(displacement).holding(held, geometry)
             error = increment.error(after, after.angles(geometry), displacement, solution.state)
-            error = max(error, increment.distance_from(before))
+            error = max(error, apart := increment.distance_from(before))
             if error <= _TARGET:
                 break
-            if iteration >= _HOLD_FROM:
+            settled += apart <= _HOLD_ABOVE
+            if settled >= _HOLD_FROM:
                 change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
                 held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
             # as seen from the object, which may have been lowered
