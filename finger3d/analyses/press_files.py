@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger3d._types import Array, Float, Tree
+from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.readings.marker_grid import marker_table
-from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, measure, table_row
+from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, row_of_entry
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
@@ -109,7 +109,7 @@ class ResultWriter:
         begin = time.perf_counter()
         self.summary(record, outcome)
         if record.steps:
-            write_csv(self.folder / "history.csv", history_table(record.problem.points, record.steps))
+            write_csv(self.folder / "history.csv", history_table(record.steps, map(record.entry, record.steps)))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
             write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
         self._written = time.perf_counter()
@@ -181,7 +181,7 @@ class ResultWriter:
         from finger3d.plotting.layout import save
 
         problem, good, mesh = record.problem, record.converged_steps, fields.mesh
-        steps = [measure(problem.points, step) for step in good]
+        steps = [record.entry(step) for step in good]
         table = contact_table(problem.points, good[-1].state)
         placed = problem.placed(good[-1].target)
         thing = object_drawing(problem, [placed])
@@ -222,9 +222,9 @@ def _markers(record: PressRecord) -> Tree | None:
     return marker_table(record.problem, good, grid, record.marker_errors)
 
 
-def history_table(points: ContactPoints, steps: Sequence[StepResult]) -> dict[str, ArrayLike]:
-    """Return the columns of history.csv; none without steps."""
-    rows = [table_row(points, step) for step in steps]
+def history_table(steps: Sequence[StepResult], entries: Iterable[TreeView]) -> dict[str, ArrayLike]:
+    """Return the columns of history.csv from the entries of the steps in summary.json; none without steps."""
+    rows = [row_of_entry(entry, step) for step, entry in zip(steps, entries, strict=True)]
     return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
