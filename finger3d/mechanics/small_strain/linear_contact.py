@@ -192,13 +192,15 @@ class Increment:
             if not (solution.outcome.ok or solution.outcome.is_cycle):
                 return self, replace(solution.with_state(state), iterations=spent)
             start = solution.state.force
-            displacement = body.displacement(start, geometry.bases)
-            if (flat and increment is self) or solution.outcome.is_cycle:
-                error = 0.0
-                break
+            displacement, apart = body.displacement(start, geometry.bases), increment.distance_from(before)
+            if flat or solution.outcome.is_cycle:
+                error = apart
+                if error <= _TARGET:
+                    break
+                geometry = increment.geometry(expansion_point)
+                continue
             after = increment.geometry(displacement).holding(held, geometry)
-            error = increment.error(after, after.angles(geometry), displacement, solution.state)
-            error = max(error, apart := increment.distance_from(before))
+            error = max(increment.error(after, after.angles(geometry), displacement, solution.state), apart)
             if error <= _TARGET:
                 break
             settled += apart <= _HOLD_ABOVE
