@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from finger3d.contact.state import ContactState
 from finger3d.fem.tensors import bases_of, rotated_delassus
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import MeshOptions
+from finger3d.mechanics.formulations import formulation_of, increment_to_force
+from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.results.history import measure
 from finger3d.mechanics.small_strain.linear_contact import LinearBody, carried_by_object, transported
-from finger3d.objects import Move, ObjectPose, vertical_frame
+from finger3d.objects import Move, ObjectPose, Plane, Sphere, vertical_frame
 from tests.contact_cases import random_compliance
-from tests.models import block
+from tests.models import block, run
 
 
 def directions(count: int, dim: int, seed: int = 0) -> np.ndarray:
@@ -72,3 +76,23 @@ def test_the_object_carries_points_by_its_slide_and_its_turn() -> None:
     c, s = 1.0 - np.cos(angle), np.sin(angle)
     mean = problem.surface.average @ np.stack([c * x + s * z, 0.0 * x, c * z - s * x], axis=1)
     assert turned == pytest.approx(mean, abs=1e-12)
+
+
+@pytest.mark.parametrize("thing", [Sphere(radius_mm=4.0), Plane()], ids=["ball", "plane"])
+def test_an_increment_to_a_force_ends_at_the_depth_that_has_it(thing: Sphere | Plane) -> None:
+    problem, frames = run(block(object=thing, legs=(Leg(0.2, steps=1), Leg(0.2, slide_x_mm=0.3, steps=1))))
+    wanted = measure(problem.points, frames[1])["normal_force_N"]
+    workspace = formulation_of(problem.model).workspace()
+    start = frames[0].meshed_state, None
+    # the iteration begins a fifth of the depth off
+    move = Move(frames[0].target, replace(frames[1].target, depth_mm=0.24))
+    found = increment_to_force(problem, start, move, wanted, workspace)
+    assert found is not None
+    there, solution = found
+    # both geometries are exact to 1e-9 of the depth
+    assert there.end.depth_mm == pytest.approx(0.2, rel=1e-8)
+    assert solution.state.contact.force == pytest.approx(frames[1].meshed_state.contact.force, abs=1e-7 * wanted)
+    assert solution.state.body == pytest.approx(frames[1].meshed_state.body, abs=1e-8)
+    assert -problem.world_force(solution.state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-10)
+    by_increments = replace(problem, model=replace(problem.model, rule="paper"))
+    assert increment_to_force(by_increments, start, move, wanted, workspace) is None

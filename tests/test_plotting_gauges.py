@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_the_render_and_the_marks_have_one_scale(tmp_path: Path, monkeypatch: py
     pixel = 2.0 * solid.half_height(size) / high
     low = np.round(0.5 * np.array([wide, high]) - 0.5 * size / pixel).astype(int)
     window[low[1] : high - low[1], low[0] : wide - low[0]] = 0
-    monkeypatch.setattr(solid, "render", lambda drawings: [window] * len(drawings))
+    monkeypatch.setattr(solid, "rendering", lambda drawings: nullcontext(lambda: [window] * len(drawings)))
     found = solid.render_solids([(skin, np.zeros((len(skin.contact), 3, 3)), False)])
     assert found is not None
     images, extent = found

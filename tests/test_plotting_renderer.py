@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -95,3 +97,19 @@ def test_a_missing_opengl_driver_is_survived(
     mesh, result = solid
     assert finger_picture(tmp_path / "f.png", mesh, **result) == "matplotlib"
     assert_shows_the_zones(tmp_path / "f.png")
+
+
+def test_a_child_that_renders_ends_with_the_block_beside_which_it_runs(tmp_path: Path) -> None:
+    said = tmp_path / "pid"
+    child = f"import os, pathlib, time; pathlib.Path({str(said)!r}).write_text(str(os.getpid())); time.sleep(600)"
+
+    def interrupted() -> None:
+        with renderer.running_child([sys.executable, "-c", child]):
+            while not (said.exists() and said.read_text()):
+                time.sleep(0.01)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(said.read_text()), 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -96,19 +97,19 @@ def run_press(
     record.need = need
     fields = _recover(record, writer, report)
     summary = writer.summary(record, record.outcome())
-    if error:
-        _estimate_errors(record, report)
-        writer.error_shares(record)
-        writer.markers(record)
-        _estimate_changes(record, report)
-        summary = writer.summary(record, record.outcome())
-    if figures:
-        from finger3d.report.press import press_page
+    with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
+        if error:
+            _estimate_errors(record, report)
+            writer.error_shares(record)
+            writer.markers(record)
+            _estimate_changes(record, report)
+            summary = writer.summary(record, record.outcome())
+        if figures:
+            from finger3d.report.press import press_page
 
-        report.stage("drawing")
-        if fields:
-            writer.pictures(record, fields)
-        press_page(writer.folder)
+            report.stage("drawing")
+            draw()
+            press_page(writer.folder)
     return record, summary
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger3d._types import Array, Float, Tree
+from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.readings.marker_grid import marker_table
-from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, measure, table_row
+from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, row_of_entry
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
@@ -108,7 +109,7 @@ class ResultWriter:
         begin = time.perf_counter()
         self.summary(record, outcome)
         if record.steps:
-            write_csv(self.folder / "history.csv", history_table(record.problem.points, record.steps))
+            write_csv(self.folder / "history.csv", history_table(record.steps, map(record.entry, record.steps)))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
             write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
         self._written = time.perf_counter()
@@ -166,25 +167,27 @@ class ResultWriter:
             {} if mesh.part is None else {"part": mesh.part},
         )
 
-    def pictures(self, record: PressRecord, fields: Fields) -> None:
-        """Draw finger.png, contact.png, force.png, and markers.png if there are markers."""
+    @contextmanager
+    def pictures(self, record: PressRecord, fields: Fields) -> Iterator[Callable[[], None]]:
+        """Draw finger.png, contact.png, force.png, and markers.png if there are markers.
+
+        Yields
+        ------
+        function that draws and writes them; a solid is rendered beside what is done before
+        """
         from finger3d.plotting import figures
-        from finger3d.plotting.deformed import DeformedFinger, draw_fingers
+        from finger3d.plotting.deformed import DeformedFinger, drawing_fingers
         from finger3d.plotting.gauges import marks_of
         from finger3d.plotting.layout import save
 
         problem, good, mesh = record.problem, record.converged_steps, fields.mesh
-        steps = [measure(problem.points, step) for step in good]
+        steps = [record.entry(step) for step in good]
         table = contact_table(problem.points, good[-1].state)
         placed = problem.placed(good[-1].target)
         thing = object_drawing(problem, [placed])
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
         stuck = np.full(len(table["status"]), STICK)
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
-        figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
-        figures.force_figure(self.folder / "force.png", steps)
-        if markers := _markers(record):
-            figures.marker_figure(self.folder / "markers.png", markers)
         finger = DeformedFinger(
             mesh=mesh,
             displacement=fields.displacement,
@@ -198,8 +201,17 @@ class ResultWriter:
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
             zones=problem.points.zones(good[-1].state),
         )
-        (figure,), _ = draw_fingers([finger])
-        save(figure, self.folder / "finger.png")
+
+        def draw() -> None:
+            figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)
+            figures.force_figure(self.folder / "force.png", steps)
+            if markers := _markers(record):
+                figures.marker_figure(self.folder / "markers.png", markers)
+            (figure,), _ = drawn()
+            save(figure, self.folder / "finger.png")
+
+        with drawing_fingers([finger]) as drawn:
+            yield draw
 
 
 def _markers(record: PressRecord) -> Tree | None:
@@ -210,9 +222,9 @@ def _markers(record: PressRecord) -> Tree | None:
     return marker_table(record.problem, good, grid, record.marker_errors)
 
 
-def history_table(points: ContactPoints, steps: Sequence[StepResult]) -> dict[str, ArrayLike]:
-    """Return the columns of history.csv; none without steps."""
-    rows = [table_row(points, step) for step in steps]
+def history_table(steps: Sequence[StepResult], entries: Iterable[TreeView]) -> dict[str, ArrayLike]:
+    """Return the columns of history.csv from the entries of the steps in summary.json; none without steps."""
+    rows = [row_of_entry(entry, step) for step, entry in zip(steps, entries, strict=True)]
     return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 

@@ -81,6 +81,7 @@ class PressRecord:
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     workspace: Workspace = field(init=False)
+    _entries: dict[int, tuple[StepResult, Tree]] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         from finger3d.mechanics.discretise import resolution
@@ -116,6 +117,13 @@ class PressRecord:
         """Increments that converged; all but the last of a press that failed."""
         return [step for step in self.steps if step.outcome.ok]
 
+    def entry(self, step: StepResult) -> Tree:
+        """Return the entry of an increment in summary.json, which is measured once."""
+        key = id(step)  # of an object that stays, as it is kept beside its entry
+        if key not in self._entries:
+            self._entries[key] = step, measure(self.problem.points, step)
+        return self._entries[key][1]
+
     def keep_penetration(self) -> None:
         """Enter the penetration of the surface checks into the steps."""
         left = iter(self.surface_checks)
@@ -150,7 +158,7 @@ class PressRecord:
             "outcome": outcome,
             "warnings": self.warnings,
             "advice": self.advice,
-            "steps": [measure(self.problem.points, step) for step in self.steps],
+            "steps": [self.entry(step) for step in self.steps],
             "slip_limit": self._slip_limit(),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,

@@ -13,7 +13,7 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
-from finger3d.mechanics.results.history import History, contact_table
+from finger3d.mechanics.results.history import History, contact_table, measure
 from finger3d.results.summary import PressStep, read_rows, steps_of
 from finger3d.results.vtu import grid
 
@@ -125,7 +125,8 @@ class PressResult:
             return rows.astype({name: int if name == "step" else float for name in rows if name != "marker"})
         if table != "history":
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
-        return pandas.DataFrame(history_table(self.history.points, self.history.steps))
+        points, steps = self.history.points, self.history.steps
+        return pandas.DataFrame(history_table(steps, [measure(points, step) for step in steps]))
 
     def derivatives(self, number: str, falling: bool = False) -> dict[str, float]:
         """Return the derivatives of a number at the end of the press by the keys of its scene, per unit of each key.

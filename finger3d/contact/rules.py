@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Final, Literal, Protocol
 
 import numpy as np
@@ -15,6 +16,12 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
+
+_SOLUTIONS = 4
+"""Largest number of solutions in a search for the depth of a prescribed force."""
+
+_INEXACT = 1e-2
+"""Error of that force, over that of the first solution, at which the search ends."""
 
 
 def maeno_active_set(problem: ContactProblem, guess: Float | None = None) -> ContactSolution[ContactState]:
@@ -71,3 +78,57 @@ RULES: Final[dict[RuleName, StickRule]] = {"projection": solve_increment, "paper
 
 STEP_DEPENDENT_RULES: Final[frozenset[RuleName]] = frozenset({"paper"})
 """Rules whose increments are never cut and may end in a cycle, so that the result depends on the increments."""
+
+
+@dataclass(frozen=True)
+class ForceCondition:
+    """Condition that the contact forces r add up to a prescribed normal force as the object is lowered further.
+
+    Attributes
+    ----------
+    down : (c, d) relative displacement of the points, in their own directions, per distance that the object is lowered
+        The normal force is ``-sum(down * r)``, by duality.
+    force : N
+    rate : of the force by the depth, as far as it is known, N/mm
+    reach : mm, least and largest distance by which the object may be lowered
+    tolerance : relative error of the force that is sought
+    """
+
+    down: Float
+    force: float
+    rate: float
+    reach: tuple[float, float]
+    tolerance: float
+
+
+def solve_to_force(
+    rule: RuleName, problem: ContactProblem, guess: Float | None, condition: ForceCondition
+) -> tuple[ContactSolution[ContactState], float, float]:
+    """Solve one increment, with the object lowered by the secant method until the forces meet a condition.
+
+    The search ends early: at a hundredth of the first error, or after a few solutions.
+
+    Returns
+    -------
+    solution : of the increment
+    lowered : mm, by how much the object is lowered
+    rate : of the force by the depth, N/mm
+    """
+    lowered, rate, last = 0.0, condition.rate, (0.0, 0.0)
+    allowed = condition.tolerance * condition.force
+    for number in range(_SOLUTIONS):
+        at_depth = replace(problem, free_motion=problem.free_motion + lowered * condition.down)
+        solution = RULES[rule](at_depth, guess)
+        if not solution.outcome.ok:
+            break
+        guess = solution.state.force
+        reached = -float(np.sum(condition.down * guess))
+        if number and (reached - last[1]) * (lowered - last[0]) > 0.0:
+            rate = (reached - last[1]) / (lowered - last[0])
+        error = abs(reached - condition.force)
+        allowed = allowed if number else max(allowed, _INEXACT * error)
+        last = lowered, reached
+        if error <= allowed:
+            break
+        lowered = min(max(lowered + (condition.force - reached) / rate, condition.reach[0]), condition.reach[1])
+    return solution, last[0], rate

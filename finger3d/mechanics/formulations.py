@@ -40,9 +40,16 @@ def increment_to_force(
 
     Returns
     -------
-    Motion to the depth of the force, and the solution; None where the iteration does not converge, and in small strain,
-    where trial depths are cheap.
+    Motion to the depth of the force, and the solution; None where the iteration does not converge.  In small strain
+    there is none with viscosity, where the increments define the solution, and where the contact geometry is given.
     """
+    if problem.contact_geometry is not None:
+        return None
+    formulation = formulation_of(problem.model)
+    if isinstance(formulation, SmallStrain):
+        if problem.model.is_defined_by_increments:
+            return None
+        return formulation.increment_to_force(problem, start, move, wanted, workspace)
     if problem.model.hyperelastic_law is None:
         return None
     from finger3d.mechanics.finite_strain.formulation import FiniteStrain

@@ -6,7 +6,8 @@ case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,9 +38,10 @@ from finger3d.plotting.solid import (
     OBJECT,
     OBJECT_TINT,
     REST,
+    Rendered,
     Skin,
     draw_solid,
-    render_solids,
+    rendering_solids,
     skin_of,
 )
 
@@ -98,7 +100,18 @@ class DeformedFinger:
 def draw_fingers(
     fingers: Sequence[DeformedFinger], window: tuple[int, int] = WINDOW, arrows: bool = True
 ) -> tuple[list[Figure], str]:
-    """Return figures of one finger at several steps, with one camera and one scale of pressure, and their renderer.
+    """Return figures of one finger at several steps, and their renderer; see `drawing_fingers`."""
+    with drawing_fingers(fingers, window, arrows) as drawn:
+        return drawn()
+
+
+@contextmanager
+def drawing_fingers(
+    fingers: Sequence[DeformedFinger], window: tuple[int, int] = WINDOW, arrows: bool = True
+) -> Iterator[Callable[[], tuple[list[Figure], str]]]:
+    """Draw one finger at several steps, with one camera and one scale of pressure.
+
+    Solids are rendered beside what else is done within the block.
 
     Parameters
     ----------
@@ -106,15 +119,24 @@ def draw_fingers(
     window : width and height of rendered solids, in pixels
     arrows : whether friction on solids is drawn
 
-    Returns
-    -------
-    figures : one for each step
-    renderer : ``pyvista`` or ``matplotlib``
+    Yields
+    ------
+    function that returns the figures, one for each step, and the renderer: ``pyvista`` or ``matplotlib``
     """
     highest = highest_of(np.concatenate([finger.pressure for finger in fingers]))
     if fingers[0].mesh.dim == 2:
-        return _sections(fingers, highest), "matplotlib"
-    return _solids(fingers, highest, window, arrows)
+        yield lambda: (_sections(fingers, highest), "matplotlib")
+        return
+    skins = [finger.skin for finger in fingers]
+    pictures = []
+    for skin in skins:
+        by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
+        pictures += [
+            (skin, pressure_colours(skin.pressure, highest, skin.status[:, None]), False),
+            (skin, by_status, arrows),
+        ]
+    with rendering_solids(pictures, window) as rendered:
+        yield lambda: _solids(fingers, highest, pictures, rendered())
 
 
 def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]:
@@ -175,18 +197,14 @@ def coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
 
 
 def _solids(
-    fingers: Sequence[DeformedFinger], highest: float, window: tuple[int, int], arrows: bool
+    fingers: Sequence[DeformedFinger],
+    highest: float,
+    pictures: Sequence[tuple[Skin, Float, bool]],
+    rendered: Rendered | None,
 ) -> tuple[list[Figure], str]:
-    """Draw a solid; without a renderer by matplotlib."""
-    skins = [finger.skin for finger in fingers]
-    pictures = []
-    for skin in skins:
-        by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
-        pictures += [
-            (skin, pressure_colours(skin.pressure, highest, skin.status[:, None]), False),
-            (skin, by_status, arrows),
-        ]
-    images, extent = render_solids(pictures, window) or (None, None)
+    """Draw a solid from its two pictures at each step; where they are not rendered, by matplotlib."""
+    images, extent = rendered or (None, None)
+    skins, arrows = [skin for skin, _, _ in pictures[::2]], pictures[-1][-1]
     seen = np.concatenate([flat(skin.points) for skin in skins])
     low, span = seen.min(axis=0), np.ptp(seen, axis=0)
     aspect = float(span[1] / span[0]) if images is None else images[0].shape[0] / images[0].shape[1]

@@ -11,7 +11,8 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -218,14 +219,21 @@ FAILURES: list[str] = []
 
 
 def render(drawings: Sequence[Drawing]) -> list[Image] | None:
-    """Render drawings in a child process.
+    """Render drawings in a child process; see `rendering`."""
+    with rendering(drawings) as images:
+        return images()
+
+
+@contextmanager
+def rendering(drawings: Sequence[Drawing]) -> Iterator[Callable[[], list[Image] | None]]:
+    """Render drawings in a child process, beside what else is done within the block; at its end the child ends.
 
     The environment variable FINGER3D_RENDERER may ask for ``pyvista`` or ``matplotlib``.
 
-    Returns
-    -------
-    list of (h, w, 3) arrays, or None
-        None if PyVista is not installed or cannot render, or if matplotlib is asked for.
+    Yields
+    ------
+    function that waits for the images, (h, w, 3) arrays, and returns them
+        It returns None if PyVista is not installed or cannot render, or if matplotlib is asked for.
 
     Raises
     ------
@@ -236,33 +244,55 @@ def render(drawings: Sequence[Drawing]) -> list[Image] | None:
     if wanted == "pyvista":
         require("FINGER3D_RENDERER=pyvista", "pyvista")
     if wanted == "matplotlib" or not available("pyvista"):
-        return None
-    if not FAILURES:
-        with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
-            source, target = Path(folder) / "drawings", Path(folder) / "images"
-            source.write_bytes(pickle.dumps(list(drawings)))
-            why = run_child([sys.executable, "-P", "-m", "finger3d.plotting.renderer", str(source), str(target)])
+        yield lambda: None
+        return
+
+    def failed() -> None:
+        if wanted == "pyvista":
+            raise MissingError(f"PyVista cannot render here: {FAILURES[0]}; unset FINGER3D_RENDERER to use matplotlib")
+
+    if FAILURES:
+        yield failed
+        return
+    with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
+        source, target = Path(folder) / "drawings", Path(folder) / "images"
+        source.write_bytes(pickle.dumps(list(drawings)))
+
+        def images() -> list[Image] | None:
+            why = outcome()
             if why is None and target.exists():
-                images: list[Image] = pickle.loads(target.read_bytes())
-                return images
+                found: list[Image] = pickle.loads(target.read_bytes())
+                return found
             FAILURES.append(why or "it wrote no picture")
-    if wanted == "pyvista":
-        raise MissingError(f"PyVista cannot render here: {FAILURES[0]}; unset FINGER3D_RENDERER to use matplotlib")
-    return None
+            failed()
+            return None
+
+        command = [sys.executable, "-P", "-m", "finger3d.plotting.renderer", str(source), str(target)]
+        with running_child(command) as outcome:
+            yield images
 
 
 def run_child(command: list[str], window: bool = False) -> str | None:
-    """Run a rendering command in a child process, which isolates crashes of the OpenGL driver.
+    """Run a rendering command in a child process; return why it failed, in one line, and None if it succeeded.
+
+    For the parameters see `running_child`.
+    """
+    with running_child(command, window) as outcome:
+        return outcome()
+
+
+@contextmanager
+def running_child(command: list[str], window: bool = False) -> Iterator[Callable[[], str | None]]:
+    """Run a rendering command in a child process, which isolates crashes of the OpenGL driver, within the block.
 
     Parameters
     ----------
     command : program and its arguments
     window : whether the command opens a window; if not, there is a time limit
 
-    Returns
-    -------
-    str or None
-        Why it failed, in one line; None if it succeeded.
+    Yields
+    ------
+    function that waits for its end, and returns why it failed, in one line; None if it succeeded
     """
     # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
     egl = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
@@ -270,14 +300,29 @@ def run_child(command: list[str], window: bool = False) -> str | None:
     env = {**hidden, **child_environment()}
     limit = None if window else _TIME_LIMIT_S
     try:
-        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=limit, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return str(error)
-    if done.returncode == 0:
-        return None
-    if done.returncode < 0:
-        return f"it crashed (signal {-done.returncode}); OpenGL may be missing (apt install libegl1 libgl1-mesa-dri)"
-    return " ".join(done.stderr.strip().splitlines()[-1:]) or f"it ended with code {done.returncode}"
+        child = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    except OSError as error:
+        why = str(error)
+        yield lambda: why
+        return
+
+    def outcome() -> str | None:
+        try:
+            _, said = child.communicate(timeout=limit)
+        except subprocess.TimeoutExpired as error:
+            return str(error)
+        code = child.returncode
+        if code == 0:
+            return None
+        if code < 0:
+            return f"it crashed (signal {-code}); OpenGL may be missing (apt install libegl1 libgl1-mesa-dri)"
+        return " ".join(said.strip().splitlines()[-1:]) or f"it ended with code {code}"
+
+    with child:
+        try:
+            yield outcome
+        finally:
+            child.kill()
 
 
 def _image(drawing: Drawing) -> Image:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from finger3d.plotting.renderer import (
     flat,
     framed,
     half_height,
-    render,
+    rendering,
     unshared,
 )
 
@@ -329,10 +330,21 @@ Extent = tuple[float, float, float, float]
 """Left, right, lower and upper edge of a picture in the picture plane of `flat`, mm."""
 
 
-def render_solids(
+Rendered: TypeAlias = tuple[list[Image], Extent]
+"""Pictures (h, w, 3), cropped alike, and their extent."""
+
+
+def render_solids(pictures: Sequence[tuple[Skin, Float, bool]], window: tuple[int, int] = WINDOW) -> Rendered | None:
+    """Render solids with one camera; see `rendering_solids`."""
+    with rendering_solids(pictures, window) as rendered:
+        return rendered()
+
+
+@contextmanager
+def rendering_solids(
     pictures: Sequence[tuple[Skin, Float, bool]], window: tuple[int, int] = WINDOW
-) -> tuple[list[Image], Extent] | None:
-    """Render solids with one camera.
+) -> Iterator[Callable[[], Rendered | None]]:
+    """Render solids with one camera, beside what else is done within the block.
 
     Parameters
     ----------
@@ -340,18 +352,22 @@ def render_solids(
         The solid, RGB colours (t, 3, 3) at the corners of the contact triangles, and whether to draw friction arrows.
     window : width and height, in pixels
 
-    Returns
-    -------
-    tuple or None
-        Pictures (h, w, 3), cropped alike, and their extent; None if PyVista does not render.
+    Yields
+    ------
+    function that waits for the pictures, and returns them; None if PyVista does not render
     """
     middle, size = frame = _common_frame([skin for skin, _, _ in pictures])
     camera = Camera(AXES, middle, half_height(size), window)
-    images = render([Drawing(camera, _parts(*picture)) for picture in pictures])
-    if images is None:
-        return None
-    cropped, extent = framed(np.array(images), frame)
-    return list(cropped), extent
+
+    def rendered() -> Rendered | None:
+        found = images()
+        if found is None:
+            return None
+        cropped, extent = framed(np.array(found), frame)
+        return list(cropped), extent
+
+    with rendering([Drawing(camera, _parts(*picture)) for picture in pictures]) as images:
+        yield rendered
 
 
 def _common_frame(skins: Sequence[Skin]) -> tuple[Float, Float]:

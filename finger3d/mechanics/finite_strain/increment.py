@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.rules import RULES
+from finger3d.contact.rules import ForceCondition, solve_to_force
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
@@ -34,11 +34,8 @@ _SLOW = 0.35
 _ASTRAY, _DIVERGED = 0.1, 1.0
 """Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
 
-_SOLUTIONS = 4
-"""Largest number of contact solutions in an iteration to a prescribed force."""
-
-_INEXACT, _EXACT = 1e-2, 1e-10
-"""Error of that force, over that at the start of the iteration and over the force, at which the iteration goes on."""
+_EXACT = 1e-10
+"""Relative error of a prescribed force at which the contact of the linearised body is solved."""
 
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations; twice as many where the body may snap."""
@@ -201,22 +198,17 @@ class IncrementToForce(FiniteIncrement):
     def _solved(
         self, now: Configuration, force: Float, contact: ContactProblem
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Lower the object by the secant method until the linearised body has the force."""
-        down, rate, depth = self.active(now.contact.bases[:, :, 1].ravel()), self.rate, self.move.end.depth_mm
-        lowered, last, allowed = 0.0, (0.0, 0.0), _EXACT * self.wanted
-        for number in range(_SOLUTIONS):
-            at_depth = replace(contact, free_motion=contact.free_motion + lowered * down)
-            solution = RULES[self.problem.model.rule](at_depth, force)
-            if not solution.outcome.ok:
-                return self, solution
-            force = solution.state.force
-            reached = self._force(now, force)
-            if number and (reached - last[1]) * (lowered - last[0]) > 0.0:
-                rate = (reached - last[1]) / (lowered - last[0])
-            allowed = allowed if number else max(allowed, _INEXACT * abs(reached - self.wanted))
-            last, further = (lowered, reached), (self.wanted - reached) / rate
-            if abs(reached - self.wanted) <= allowed:
-                break
-            lowered = min(max(depth + lowered + further, self.depths[0]), self.depths[1]) - depth
-        move = Move(self.move.start, replace(self.move.end, depth_mm=depth + last[0]))
-        return replace(self, move=move, rate=rate), solution
+        """Lower the object until the linearised body has the force."""
+        depth, images = self.move.end.depth_mm, 2.0 ** len(self.problem.axes)
+        condition = ForceCondition(
+            down=self.active(now.contact.bases[:, :, 1].ravel()),
+            force=self.wanted / images,
+            rate=self.rate / images,
+            reach=(self.depths[0] - depth, self.depths[1] - depth),
+            tolerance=_EXACT,
+        )
+        solution, lowered, rate = solve_to_force(self.problem.model.rule, contact, force, condition)
+        if not solution.outcome.ok:
+            return self, solution
+        move = Move(self.move.start, replace(self.move.end, depth_mm=depth + lowered))
+        return replace(self, move=move, rate=images * rate), solution

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._types import Float, Tree, freeze_arrays
+from finger3d._types import Float, Tree, TreeView, freeze_arrays
 from finger3d.contact.friction import STATUS_NAMES
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
@@ -268,7 +268,12 @@ def _half_extent(line: tuple[Float, NDArray[np.int64]], zone: Zone) -> float:
 
 def table_row(points: ContactPoints, step: StepResult) -> Tree:
     """Return the row of history.csv for one increment: its numbers, and its readings by the names of their columns."""
-    numbers = {key: value for key, value in measure(points, step).items() if key not in _READINGS}
+    return row_of_entry(measure(points, step), step)
+
+
+def row_of_entry(entry: TreeView, step: StepResult) -> Tree:
+    """Return the row of history.csv for one increment from its entry in summary.json."""
+    numbers = {key: value for key, value in entry.items() if key not in _READINGS}
     return numbers | by_key(in_space(step.readings))
 
 

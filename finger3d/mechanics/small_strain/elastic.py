@@ -16,7 +16,12 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Loads, Workspace
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_increment, solve_linearised
+from finger3d.mechanics.small_strain.linear_contact import (
+    LinearBody,
+    solve_increment,
+    solve_increment_to_force,
+    solve_linearised,
+)
 from finger3d.objects import Move, ObjectPose
 
 
@@ -43,6 +48,18 @@ class SmallStrain:
         if problem.contact_geometry is not None:
             return solve_linearised(problem, state, move, body, guess)
         return solve_increment(problem, state, move, body, guess, workspace)
+
+    def increment_to_force(
+        self,
+        problem: Problem,
+        start: tuple[State[Float], Float | None],
+        move: Move,
+        wanted: float,
+        workspace: Workspace,
+    ) -> tuple[Move, ContactSolution[State[Float]]] | None:
+        """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
+        body = LinearBody(problem.delassus, np.zeros_like(start[0].body))
+        return solve_increment_to_force(problem, start, move, body, wanted, workspace)
 
     def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
         """Yield the unknowns from the forces, by one back-substitution for many states."""

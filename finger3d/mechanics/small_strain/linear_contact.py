@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
-from finger3d.contact.rules import RULES
+from finger3d.contact.rules import RULES, ForceCondition, solve_to_force
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
@@ -33,11 +33,15 @@ from finger3d.objects import DistanceTracker, Move, vertical_frame
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
+_EXACT = 1e-12
+"""Relative error of a prescribed force at which the contact of the body is solved."""
+
 _MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
 
 _HOLD_FROM, _HOLD_ABOVE = 4, 1e-4
-"""Iteration from which mean gradients of the distance are held fixed if they still change by more than this."""
+"""Iteration, at about the same depth, from which mean gradients of the distance are held fixed if they still change by
+more than this."""
 
 _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
@@ -87,49 +91,26 @@ def solve_increment(
         Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
         directions at the displacement found agree with those that the forces were solved with.
     """
-    increment = Increment(problem, state, move, body, workspace.tracker)
-    gap_before = state.contact.gap
-    if moves_too_far(problem, move, gap_before, carried_by_object(problem, move, state.body)):
-        return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
-    flat = problem.model.object.is_flat
-    expansion_point = np.zeros_like(body.past)
-    if not flat:
-        expected = state.contact.force if guess is None else guess
-        expansion_point = body.displacement(expected, state.contact.own_bases)
-    geometry = increment.geometry(expansion_point)
-    held = np.zeros(len(expansion_point), dtype=bool)
-    spent, error, start = 0, np.inf, guess
-    tried: list[Float] = []
-    displacements: list[Float] = []
-    for iteration in range(1, _MOST_SOLUTIONS + 1):
-        solution = increment.solve(geometry, expansion_point, start)
-        spent += solution.iterations
-        if not (solution.outcome.ok or solution.outcome.is_cycle):
-            return replace(solution.with_state(state), iterations=spent)
-        start = solution.state.force
-        displacement = body.displacement(start, geometry.bases)
-        if flat or solution.outcome.is_cycle:
-            error = 0.0
-            break
-        after = increment.geometry(displacement).holding(held, geometry)
-        error = increment.error(after, after.angles(geometry), displacement, solution.state)
-        if error <= _TARGET:
-            break
-        if iteration >= _HOLD_FROM:
-            change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
-            held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
-        tried, displacements = [*tried, expansion_point][-_MEMORY:], [*displacements, displacement][-_MEMORY:]
-        expansion_point = _extrapolated(tried, displacements)
-        following = after if expansion_point is displacement else increment.geometry(expansion_point)
-        geometry = following.holding(held, geometry)
-    if error > TOLERANCE:
-        return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
-    gap = None if flat else increment.geometry(displacement, np.inf).holding(held, geometry).gap
-    after_state = increment.reached(geometry, expansion_point, displacement, solution.state, gap)
-    through = passes_through(problem, move, state.body, displacement, gap_before)
-    if through or pulls(problem, state.contact, after_state.contact, move):
-        return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
-    return replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
+    return Increment(problem, state, move, body, workspace.tracker).solve(guess)[1]
+
+
+def solve_increment_to_force(
+    problem: Problem,
+    start: tuple[State[Float], Float | None],
+    move: Move,
+    body: LinearBody,
+    wanted: float,
+    workspace: Workspace,
+) -> tuple[Move, ContactSolution[State[Float]]] | None:
+    """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
+    (state, guess), motion = start, move.end.depth_mm - move.start.depth_mm
+    rise = wanted + float(problem.world_force(state.contact)[:, 1].sum())
+    rate = rise / motion if rise * motion > 0.0 else wanted / length_scale(problem, move)
+    first = IncrementToForce(problem, state, move, body, workspace.tracker, wanted, rate)
+    increment, solution = first.solve(guess)
+    reached = -float(problem.world_force(solution.state.contact)[:, 1].sum())
+    is_there = solution.outcome.ok and abs(reached - wanted) <= 100.0 * _EXACT * wanted
+    return (increment.move, solution) if is_there else None
 
 
 def solve_linearised(
@@ -143,7 +124,7 @@ def solve_linearised(
         return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
     geometry, expansion_point = problem.contact_geometry[move.end]
     increment = Increment(problem, state, move, body, DistanceTracker())
-    solution = increment.solve(geometry, expansion_point, guess)
+    increment, solution = increment.solve_linearised(geometry, expansion_point, guess)
     if not solution.outcome.ok:
         return solution.with_state(state)
     displacement = body.displacement(solution.state.force, geometry.bases)
@@ -188,9 +169,84 @@ class Increment:
 
         return contact_geometry(distance, problem.surface, displacement, problem.axes, object_share)
 
-    def solve(
+    def solve(self, guess: Float | None) -> tuple[Self, ContactSolution[State[Float]]]:
+        """Return the increment with the motion that was found, where that is unknown, and the solution at its end."""
+        problem, state, body, increment = self.problem, self.state, self.body, self
+        if self._moves_too_far:
+            return self, ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
+        flat = problem.model.object.is_flat
+        expansion_point = np.zeros_like(body.past)
+        if not flat:
+            expected = state.contact.force if guess is None else guess
+            expansion_point = body.displacement(expected, state.contact.own_bases)
+        geometry = self.geometry(expansion_point)
+        held = np.zeros(len(expansion_point), dtype=bool)
+        spent, error, start = 0, np.inf, guess
+        tried: list[Float] = []
+        displacements: list[Float] = []
+        settled = 0
+        for _ in range(_MOST_SOLUTIONS):
+            before = increment
+            increment, solution = before.solve_linearised(geometry, expansion_point, start)
+            spent += solution.iterations
+            if not (solution.outcome.ok or solution.outcome.is_cycle):
+                return self, replace(solution.with_state(state), iterations=spent)
+            start = solution.state.force
+            displacement, apart = body.displacement(start, geometry.bases), increment.distance_from(before)
+            if flat or solution.outcome.is_cycle:
+                error = apart
+                if error <= _TARGET:
+                    break
+                geometry = increment.geometry(expansion_point)
+                continue
+            after = increment.geometry(displacement).holding(held, geometry)
+            error = max(increment.error(after, after.angles(geometry), displacement, solution.state), apart)
+            if error <= _TARGET:
+                break
+            settled += apart <= _HOLD_ABOVE
+            if settled >= _HOLD_FROM:
+                change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
+                held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
+            # as seen from the object, which may have been lowered
+            seen = expansion_point + before.lowered_by(self), displacement + increment.lowered_by(self)
+            tried, displacements = [*tried, seen[0]][-_MEMORY:], [*displacements, seen[1]][-_MEMORY:]
+            expansion_point, following = displacement, after
+            if len(tried) > 1:
+                expansion_point = _extrapolated(tried, displacements) - increment.lowered_by(self)
+                following = increment.geometry(expansion_point)
+            geometry = following.holding(held, geometry)
+        if error > TOLERANCE:
+            return self, ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
+        gap = None
+        if not (flat and increment is self):
+            gap = increment.geometry(displacement, np.inf).holding(held, geometry).gap
+        after_state = increment.reached(geometry, expansion_point, displacement, solution.state, gap)
+        through = passes_through(problem, increment.move, state.body, displacement, state.contact.gap)
+        through |= increment is not self and increment._moves_too_far
+        if through or pulls(problem, state.contact, after_state.contact, increment.move):
+            return self, ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
+        found = replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
+        return increment, found
+
+    @property
+    def _moves_too_far(self) -> bool:
+        carried = carried_by_object(self.problem, self.move, self.state.body)
+        return moves_too_far(self.problem, self.move, self.state.contact.gap, carried)
+
+    def lowered_by(self, other: Increment) -> Float:
+        """Return how far (d,) mm the points have moved up, as seen from the object, since another end of the motion."""
+        up = np.zeros(self.body.past.shape[1])
+        up[1] = self.move.end.depth_mm - other.move.end.depth_mm
+        return up
+
+    def distance_from(self, other: Increment) -> float:
+        """Return the distance of the ends of two motions of different depths, over the depth."""
+        apart = self.move.end.depth_mm - other.move.end.depth_mm
+        return abs(apart) / length_scale(self.problem, self.move)
+
+    def solve_linearised(
         self, geometry: ContactGeometry, expansion_point: Float, guess: Float | None
-    ) -> ContactSolution[ContactState]:
+    ) -> tuple[Self, ContactSolution[ContactState]]:
         """Solve contact with the gaps linearised at a displacement (c, d); far points cannot touch."""
         problem, bases = self.problem, geometry.bases
         d = bases.shape[-1]
@@ -198,20 +254,27 @@ class Increment:
         free_displacement = self.relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free_displacement[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
-        rule, law = RULES[problem.model.rule], problem.model.contact_law
+        law = problem.model.contact_law
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
-            return rule(ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area), guess)
+            contact = ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area)
+            return self._solved(contact, guess, bases)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
         contact = ContactProblem.of(
             start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
         )
-        part = rule(contact, expected[near])
+        increment, part = self._solved(contact, expected[near], bases[near])
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
-        return replace(part, state=replace(start, force=force, status=status))
+        return increment, replace(part, state=replace(start, force=force, status=status))
+
+    def _solved(
+        self, contact: ContactProblem, guess: Float | None, bases: Float
+    ) -> tuple[Self, ContactSolution[ContactState]]:
+        """Return the contact solution of points with bases (k, d, d), and the increment that it is for."""
+        return self, RULES[self.problem.model.rule](contact, guess)
 
     def relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
         """Return gap and slip (c, d) mm of the increment at a displacement, the gap linearised at another one.
@@ -251,6 +314,30 @@ class Increment:
             relative[:, 0] = gap
         reached = advanced(self.state, replace(contact, bases=geometry.bases), relative, self._until_touch, self.move)
         return replace(reached, body=displacement)
+
+
+@dataclass(frozen=True)
+class IncrementToForce(Increment):
+    """An increment to a prescribed normal force, with the depth at its end as one more unknown of the iteration.
+
+    Attributes
+    ----------
+    wanted : on the whole finger, N
+    rate : of the force by the depth in the last iteration, N/mm
+    """
+
+    wanted: float
+    rate: float
+
+    def _solved(
+        self, contact: ContactProblem, guess: Float | None, bases: Float
+    ) -> tuple[Self, ContactSolution[ContactState]]:
+        """Lower the object until the points have the force; no further than distances are exact."""
+        images, far = 2.0 ** len(self.problem.axes), _NEAR * length_scale(self.problem, self.move)
+        condition = ForceCondition(bases[:, :, 1], self.wanted / images, self.rate / images, (-far, far), _EXACT)
+        solution, lowered, rate = solve_to_force(self.problem.model.rule, contact, guess, condition)
+        end = replace(self.move.end, depth_mm=self.move.end.depth_mm + lowered)
+        return replace(self, move=Move(self.move.start, end), rate=images * rate), solution
 
 
 def motion_until_touch(problem: Problem, state: State[Any], move: Move) -> Float:
