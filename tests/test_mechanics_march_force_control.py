@@ -18,9 +18,15 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.force_control import DepthSearch, Trial, at_depth_reached, forecast_depth
+from finger3d.mechanics.march.force_control import (
+    DepthSearch,
+    Trial,
+    adapted,
+    at_depth_reached,
+    forecast_depth,
+)
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.model import Domain, Leg, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from finger3d.scene import load
@@ -152,17 +158,44 @@ def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool)
         assert measure(build(model).points, last)["normal_force_N"] == pytest.approx(5.0, rel=1e-6)
 
 
-def test_a_force_at_large_deformation_takes_at_most_twice_the_factorisations_of_a_depth() -> None:
-    def factors(legs: tuple[Leg, ...]) -> tuple[int, float]:
-        problem = build(LargeDeformation().apply(block(legs=legs, domain="plane-strain")))
-        workspace = formulation_of(problem.model).workspace()
-        last = list(march(problem, workspace=workspace))[-1]
-        assert last.outcome.ok
-        return workspace.factorizations, measure(problem.points, last)["normal_force_N"]
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_a_press_by_force_at_large_deformation_is_the_press_by_its_depths_at_twice_the_factorisations(
+    domain: Domain,
+) -> None:
+    problem = build(LargeDeformation().apply(block(legs=(Leg(1.0, steps=5),), domain=domain)))
 
-    by_depth, force = factors((Leg(1.0, steps=5),))
-    by_force, _ = factors((Leg(1.0, steps=5, force_N=force),))
-    assert by_force <= 2 * by_depth
+    def pressed(*legs: Leg) -> tuple[int, list[dict[str, float]]]:
+        workspace = formulation_of(problem.model).workspace()
+        steps = list(march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace))
+        assert all(step.outcome.ok for step in steps)
+        return workspace.factorizations, [measure(problem.points, step) for step in steps]
+
+    _, there = pressed(Leg(1.0, steps=5))
+    factors, by_force = pressed(Leg(1.0, steps=5, force_N=there[-1]["normal_force_N"]))
+    least, by_depth = pressed(*(Leg(step["depth_mm"], steps=1) for step in by_force))
+    assert factors <= 2 * least
+    for a, b in zip(by_depth, by_force, strict=True):
+        assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-8)
+        # the residual of 5e-9 of the forces; parts of the first increment 1e-4 off change it by as much
+        assert b["friction_sum_N"] == pytest.approx(a["friction_sum_N"], rel=1e-6)
+
+
+def test_an_increment_is_repeated_until_its_parts_are_those_of_its_depth() -> None:
+    solution = ContactSolution(REST, Outcome.CONVERGED, 0.0, 1, "none")
+    near = []
+
+    def repeated(_: Trial, depth: float, is_similar: bool) -> Trial:
+        near.append(is_similar)
+        return Trial(1.0 + 0.02 * (depth - 1.0) + 1e-3 * (depth - 1.0) ** 2, solution, 1.0)
+
+    first = repeated(Trial(0.0, solution, 0.0), 0.5, False)
+    near.clear()
+    assert adapted(first, 0.5, repeated).depth == pytest.approx(1.0, rel=1e-9)
+    assert near == [False, True, True]  # 1e-2, 5e-6 and 1e-10 off by the secant method, 4e-6 the last without it
+    assert adapted(first, 0.5, lambda *_: None) is first
+    near.clear()
+    assert adapted(first, first.depth, repeated) is first
+    assert near == []
 
 
 def test_a_forecast_is_good_to_a_factor_of_two() -> None:

@@ -31,13 +31,14 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.state import ContactState
+from finger3d.fem.tensors import block_diagonal
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
-from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, block_diagonal, upright
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.objects import Move, vertical_frame
 
 _ROUND_OFF = 1e-12

@@ -6,6 +6,7 @@ Explicit formulas are several times as fast as LAPACK.
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from finger3d._types import Float, Int
 
@@ -74,3 +75,9 @@ def rotated_delassus(delassus: Float, rotations: Float, points: Int | None = Non
         return delassus
     half = (rotations @ delassus.reshape(k, d, k * d)).reshape(k * d, k, d)
     return np.asarray((half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d))
+
+
+def block_diagonal(blocks: Float) -> sp.csr_array:
+    """Return the sparse matrix (c m, c n) of blocks (c, m, n)."""
+    c = len(blocks)
+    return sp.csr_array(sp.bsr_array((blocks, np.arange(c), np.arange(c + 1))))

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
+from finger3d.fem.tensors import block_diagonal
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,8 @@ class Bars:
         along = sp.csr_matrix((unit.ravel(), np.arange(count * d), np.arange(count + 1) * d)) @ self.relative
         across = np.eye(d) - unit[:, :, None] * unit[:, None, :]
         blocks = (self.tension(u, relaxation) / length)[:, None, None] * across
-        turning = sp.bsr_matrix((blocks, np.arange(count), np.arange(count + 1)))
         stretching = along.T @ sp.csr_matrix(self._stiffness(relaxation)) @ along
-        return sp.csr_matrix(stretching + self.relative.T @ turning @ self.relative)
+        return sp.csr_matrix(stretching + self.relative.T @ block_diagonal(blocks) @ self.relative)
 
     @property
     def coupled_nodes(self) -> tuple[Int, Int]:

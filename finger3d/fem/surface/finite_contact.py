@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +11,7 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.mesh.simplex import axis_numbers
 from finger3d.fem.surface.traces import BoundarySurface, outward_normals
-from finger3d.fem.tensors import bases_of
+from finger3d.fem.tensors import bases_of, block_diagonal
 
 
 @dataclass(frozen=True)
@@ -59,32 +58,33 @@ class _Area:
     @cached_property
     def derivative(self) -> sp.csr_matrix:
         """Derivative (q, n d) of the ratio."""
-        scaled = [sp.diags_array(1.0 / self.initial) @ slope for slope in self.face.along]
-        return _rows(
-            [
-                sum(sp.diags_array(t[:, k]) @ x for t, x in zip(self.turned, scaled, strict=True))
-                for k in range(self.moved[0].shape[1])
-            ]
-        )
+        turned = np.concatenate(self.turned, axis=1) / self.initial[:, None]
+        return sp.csr_matrix(block_diagonal(turned[:, None, :]) @ self.face.vector_slopes)
 
     def second_derivative(self, weights: Float) -> sp.csr_matrix:
-        """Return the sum (n d, n d) of the second derivatives with weights (q,)."""
-        d = self.moved[0].shape[1]
-        length = self.ratio * self.initial
-        parts = [_change(self.face, self.moved, i) for i in range(d)]
-        stretched = sp.diags_array(weights / (length * self.initial))
-        total = sum(part.T @ stretched @ part for part in parts)
-        spread = self.derivative
-        total = total - spread.T @ sp.diags_array(weights * self.initial / length) @ spread
+        """Return the sum (n d, n d) of the second derivatives with weights (q,).
+
+        The area is the length of a vector v of the tangents t: the tangent in 2D, the tangents' cross product in 3D.
+        With C = dv/dt and e = v / |v| its second derivative by the tangents is ``C^T (I - e e^T) C / |v| + e v''``.
+        """
+        d, length = self.moved[0].shape[1], self.ratio * self.initial
+        identity = np.eye(d)
+        if d == 2:
+            unit, by_tangents = self.turned[0], np.broadcast_to(identity, (len(length), d, d))
+        else:
+            one, other = self.moved
+            unit = np.cross(one, other) / length[:, None]
+            turns = np.cross(identity, other[:, None, :]), np.cross(one[:, None, :], identity)
+            by_tangents = np.swapaxes(np.concatenate(turns, axis=1), 1, 2)
+        across = identity - unit[:, :, None] * unit[:, None, :]
+        second = np.swapaxes(by_tangents, 1, 2) @ across @ by_tangents / length[:, None, None]
         if d == 3:
-            unit = np.cross(self.moved[0], self.moved[1]) / length[:, None]
-            cross = sp.diags_array(weights / self.initial)
-            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-                along = cross @ sp.diags_array(unit[:, i])
-                first, second = ([_component(x, axis) for axis in (j, k)] for x in self.face.along)
-                half = first[0].T @ along @ second[1] - first[1].T @ along @ second[0]
-                total = total + half + half.T
-        return sp.csr_matrix(total)
+            twist = np.cross(identity, unit[:, None, :])  # e . (a x b) = b^T twist a
+            second[:, d:, :d] += twist
+            second[:, :d, d:] += np.swapaxes(twist, 1, 2)
+        second *= (weights / self.initial)[:, None, None]
+        slopes = self.face.vector_slopes
+        return sp.csr_matrix(slopes.T @ block_diagonal(second) @ slopes)
 
 
 @dataclass(frozen=True)
@@ -140,20 +140,22 @@ class DeformedContact:
     @cached_property
     def rows(self) -> sp.csr_matrix:
         """Rows (c d, n d) of `displacements`."""
-        face = self.face
-        c, d = self.bases.shape[:2]
-        blocks = [_rows([sp.diags_array(self.bases[:, t, k]) @ face.trace for k in range(d)]) for t in range(d)]
+        face, (c, d) = self.face, self.bases.shape[:2]
+        bases = self.bases.copy()
+        if self.follows_area:
+            bases[:, 0] = 0.0
+        rows = block_diagonal(bases) @ face.vector_trace
         if self.follows_area:
             weight = sp.diags_array(1.0 / self._mean_area) @ face.average
             deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.gap) @ weight
-            blocks[0] = weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative
-        return sp.csr_matrix(sp.vstack(blocks, format="csr")[np.arange(c * d).reshape(d, -1).T.ravel()])
+            normal = weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative
+            rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ normal
+        return sp.csr_matrix(rows)
 
     @cached_property
     def _d_gap(self) -> sp.csr_matrix:
         """Derivative (q, n d) of the gap at the samples."""
-        normal = self.samples_normal
-        return _rows([sp.diags_array(normal[:, k]) @ self.face.interpolate for k in range(normal.shape[1])])
+        return sp.csr_matrix(block_diagonal(self.samples_normal[:, None, :]) @ self.face.vector_interpolate)
 
     def geometric_stiffness(self, force: Float, curvature: Float | None = None) -> sp.csr_matrix:
         """Return the geometric stiffness (n d, n d) of normal forces (c,) N, which is subtracted from K.
@@ -176,10 +178,7 @@ class DeformedContact:
         total = half + half.T + self.area.second_derivative(uneven)
         if curvature is not None:
             weighted = (pressure.diagonal() * self.area.ratio)[:, None, None] * curvature
-            for i, j in np.ndindex(*curvature.shape[1:]):
-                unit = np.zeros(curvature.shape[1:])
-                unit[i, j] = 1.0
-                total = total + sp.kron(face.interpolate.T @ sp.diags_array(weighted[:, i, j]) @ face.interpolate, unit)
+            total = total + face.vector_interpolate.T @ block_diagonal(weighted) @ face.vector_interpolate
         return sp.csr_matrix(total)
 
 
@@ -222,29 +221,3 @@ def deformed_contact(
         mean_normal[face.points[:, k] == 0.0, k] = 0.0
     bases = bases_of(mean_normal / np.linalg.norm(mean_normal, axis=1)[:, None])
     return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None)
-
-
-def _rows(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
-    """Rows (m, n d) on displacements from rows (m, n) on each of their components."""
-    d, n = len(parts), parts[0].shape[1]
-    return sp.csr_matrix(sp.hstack(parts, format="csr")[:, np.arange(n * d).reshape(d, n).T.ravel()])
-
-
-def _component(rows: sp.csr_matrix, axis: int) -> sp.csr_matrix:
-    """Rows (q, 3 n) on one component of displacements from rows (q, n)."""
-    return sp.csr_matrix(sp.kron(rows, np.eye(3)[[axis]], format="csr"))
-
-
-def _change(face: BoundarySurface, moved: list[Float], i: int) -> sp.csr_matrix:
-    """Derivative (q, n d) of component i of the tangent in 2D, of the tangents' cross product in 3D."""
-    d = moved[0].shape[1]
-    if d == 2:
-        return sp.csr_matrix(sp.kron(face.along[0], np.eye(2)[[i]], format="csr"))
-    j, k = (i + 1) % 3, (i + 2) % 3
-    first, second = moved
-    return sp.csr_matrix(
-        sp.diags_array(second[:, k]) @ _component(face.along[0], j)
-        - sp.diags_array(second[:, j]) @ _component(face.along[0], k)
-        + sp.diags_array(first[:, j]) @ _component(face.along[1], k)
-        - sp.diags_array(first[:, k]) @ _component(face.along[1], j)
-    )

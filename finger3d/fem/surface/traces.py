@@ -73,6 +73,27 @@ class BoundarySurface:
         """Centroids (c, d) mm of the hat functions, where nodal forces act."""
         return np.asarray(self.average @ self.samples)
 
+    @cached_property
+    def vector_trace(self) -> sp.csr_matrix:
+        """Rows (c d, n d) of `trace` on displacements, a row for each of their components."""
+        return self._on_vectors(self.trace)
+
+    @cached_property
+    def vector_interpolate(self) -> sp.csr_matrix:
+        """Rows (q d, n d) of `interpolate` on displacements."""
+        return self._on_vectors(self.interpolate)
+
+    @cached_property
+    def vector_slopes(self) -> sp.csr_matrix:
+        """Rows (q (d - 1) d, n d) of the slopes `along`; those of a sample follow each other."""
+        count, d = len(self.along), self.points.shape[1]
+        rows = self._on_vectors(sp.vstack(self.along, format="csr"))
+        order = np.arange(rows.shape[0]).reshape(count, -1, d).swapaxes(0, 1).ravel()
+        return sp.csr_matrix(rows[order])
+
+    def _on_vectors(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        return sp.csr_matrix(sp.kron(rows, np.eye(self.points.shape[1]), format="csr"))
+
     def interpolated(self, values: Float) -> Float:
         """Return values (q, k) at the samples, linear between those of the points (c, k).
 

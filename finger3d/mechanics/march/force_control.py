@@ -25,7 +25,7 @@ _DEEPEST = 0.99
 FORCE_TOLERANCE = 1e-6
 """Largest relative error of a prescribed force that counts as reached."""
 
-TARGET, TARGET_IF_FACTORED = 1e-12, 1e-8
+_TARGET, _TARGET_IF_FACTORED = 1e-12, 1e-8
 """Relative error of the force at which the search ends, in small strain and where increments factor the stiffness;
 where round-off prevents it, one up to a hundred times as large."""
 
@@ -43,6 +43,13 @@ _NEARER = (0.5, 0.25, 0.125)
 
 _LEAST_POWER = 2.0 / 3.0
 """Power of the force with which the depth grows under a ball (Hertz 1881); a longer first trial is not taken."""
+
+_SIMILAR = 0.15
+"""Relative change of the depth up to which increments are similar."""
+
+_SAME, _REPEATED, _CONTRACTION = 1e-7, 7, 0.5
+"""Relative difference of the depths of an increment and of its parts at which these are not adapted any more, largest
+number of times, and change of the one with the other below which it is extrapolated."""
 
 _GRID = (81, 21)
 
@@ -98,6 +105,42 @@ def first_trial(start: float, stride: float, force: float, wanted: float) -> flo
     return min(start + stride, by_hertz) if wanted > force or stride > 0.0 else start + stride
 
 
+def target(finite_strain: bool) -> float:
+    """Return the relative error of the force at which the search ends."""
+    return _TARGET_IF_FACTORED if finite_strain else _TARGET
+
+
+def is_similar(depth: float, other: float) -> bool:
+    """Return whether increments to two depths (mm) are similar, so that one may begin at the end of the other."""
+    return abs(depth - other) < _SIMILAR * abs(depth)
+
+
+def adapted(trial: Trial, depth: float, repeated: Callable[[Trial, float, bool], Trial | None]) -> Trial:
+    """Return a trial whose increment is repeated until its parts are at their shares of the depth that it ends at.
+
+    The depth of the parts is found by the secant method.
+
+    Parameters
+    ----------
+    trial : with the force, from parts of an increment to another depth
+    depth : mm, that other one
+    repeated : function of the last trial, a depth (mm), and whether that is similar to the last one
+        Returns the trial that the parts at shares of the depth lead to; None if there is none.
+    """
+    slope, last = 0.0, trial
+    for _ in range(_REPEATED):
+        away = trial.depth - depth
+        if abs(away) <= _SAME * abs(trial.depth):
+            break
+        step = away / (1.0 - slope) if abs(slope) < _CONTRACTION else away
+        end = repeated(trial, depth + step, abs(step) < _SIMILAR * abs(depth + step))
+        if end is None:
+            break
+        last, trial, depth = trial, end, depth + step
+        slope = (trial.depth - last.depth) / step
+    return trial
+
+
 @dataclass
 class DepthSearch:
     """Search for the depth at which the normal force is the one wanted: interpolation inside a bracket.
@@ -120,7 +163,7 @@ class DepthSearch:
     start: float
     most: float
     begin: Trial | None = None
-    target: float = TARGET
+    target: float = _TARGET
     good: list[Trial] = field(default_factory=list, init=False)
     failed: list[Trial] = field(default_factory=list, init=False)
 
@@ -158,6 +201,14 @@ class DepthSearch:
         if cause.is_cycle or untouched:  # no later increment starts from another force, as it does from a cycle
             cause = Outcome.FORCE_NOT_REACHED
         return self._ended(cause, self._extreme())
+
+    def expected_ends(self, depth: float) -> tuple[tuple[State[Any], State[Any]], float]:
+        """Return the ends of two trials, and the share of their difference to add to the first for a depth (mm)."""
+        one, other = self.good[-1], self.good[-2] if len(self.good) > 1 else self.begin
+        if other is None:
+            return (one.solution.state, one.solution.state), 0.0
+        share = (depth - one.depth) / (one.depth - other.depth) if one.depth != other.depth else 0.0
+        return (one.solution.state, other.solution.state), share if abs(share) < 1.0 else 0.0
 
     def _tried(self, depth: float) -> Trial:
         """Try a depth; one without force is tried again nearer, since the object may have passed through the finger."""

@@ -18,7 +18,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
-from finger3d.mechanics.march.force_control import TARGET, TARGET_IF_FACTORED, DepthSearch, Trial, deepest, first_trial
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, deepest, first_trial, is_similar, target
 from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting, solved_in_turn
 from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
@@ -36,9 +36,8 @@ _FIRST_PARTS = 1.0 / 16.0, 0.25
 """Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
 ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
 
-_NEAR, _SIMILAR, _SAME, _REPEATED = 0.2, 0.15, 1e-7, 8
-"""Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins; change of the
-depth up to which increments are similar, and error up to which parts are not adapted, both relative; most trials."""
+_NEAR = 0.2
+"""Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
 
 
 def march(
@@ -246,12 +245,11 @@ class Press:
         iteration, from a trial with a force of that size.  If the force is not reached, the solution says why, and
         state and pose are those at the beginning.
         """
-        problem, state, parts = self.problem, self.state, dict[float, list[Substep]]()
+        problem, state, parts, trials = self.problem, self.state, dict[float, list[Substep]](), list[Trial]()
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
-        start_mm, start_s = move.start.depth_mm, move.start.time_s
-        only_deeper = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
-        rest, trials = ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none"), list[Trial]()
-        begin = Trial(start_mm, rest, force) if only_deeper else None
+        start_mm, start_s, is_finite = move.start.depth_mm, move.start.time_s, problem.model.finite_strain
+        deepens = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
+        begin = Trial(start_mm, ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none"), force) if deepens else None
 
         def noted(trial: Trial, its_parts: list[Substep]) -> Trial:
             trials.append(trial)
@@ -260,33 +258,36 @@ class Press:
             self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {trial.depth:.4g} mm")
             return trial
 
-        def trial_at(depth: float, good: Sequence[Trial], last_change: float = 0.0) -> Trial:
+        def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
             self._end_if_cancelled()
             there = Move(move.start, replace(move.end, depth_mm=depth))
-            start, guess = state, self.expected_force(there.end)
+            start, guess, near = state, self.expected_force(there.end), list[Substep]()
             if good:
-                one, other = good[-1], good[-2] if len(good) > 1 else begin
-                share = (depth - one.depth) / (one.depth - other.depth) if other and one.depth != other.depth else 0.0
-                share = share if abs(share) < 1.0 else 0.0
-                ends = one.solution.state, other.solution.state if other else one.solution.state
+                ends, share = search.expected_ends(depth)
                 guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
-                start = expecting(state, there, ends, share) if problem.model.finite_strain else state
-            is_similar = problem.model.finite_strain and good and abs(depth - good[-1].depth) < _SIMILAR * abs(depth)
-            moves, near = self.moves_to(there.end), parts[good[-1].depth] if is_similar else []
+                start = expecting(state, there, ends, share) if is_finite else state
+                near = parts[good[-1].depth] if is_finite and is_similar(depth, good[-1].depth) else []
+            moves = self.moves_to(there.end)
             found, its_parts = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess, near)
             reached = self._normal_force(found.state) if found.outcome.ok else np.nan
             trial = noted(Trial(depth, found, reached), its_parts)
-            if not (problem.model.finite_strain and _NEAR * wanted < reached < wanted / _NEAR):
+            if not (is_finite and _NEAR * wanted < reached < wanted / _NEAR):
                 return trial
+            end = to_force_from_last(its_parts)
+            return trial if end is None else adapted(end, depth, repeated) if its_parts[:-1] else end
+
+        def repeated(trial: Trial, depth: float, near_last: bool) -> Trial | None:
+            its_parts, (*earlier, last) = parts[trial.depth], self.moves_to(replace(move.end, depth_mm=depth))
+            whole = len(its_parts) == len(earlier) + 1
+            moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
+            found, now = solved_in_turn(problem, self.workspace, state, moves, self._cuts, None, near)
+            now += [Substep(found.state, trial.solution.state, last)] if whole else []
+            return to_force_from_last(now) if found.outcome.ok else None
+
+        def to_force_from_last(its_parts: list[Substep]) -> Trial | None:
             *before, last = its_parts
-            ends = last.after, last.after
-            end = to_force(expecting(last.before, last.move, ends, 0.0), last.move, last.after.contact.force, before)
-            if end is None:
-                return trial
-            change = abs(end.depth - depth)
-            error = change * min(change / last_change, 1.0) if last_change else change
-            adapted = not before or error <= _SAME * abs(depth) or len(good) >= _REPEATED
-            return end if adapted else trial_at(end.depth, [*good, end], change)
+            start = expecting(last.before, last.move, (last.after, last.after), 0.0)
+            return to_force(start, last.move, last.after.contact.force, before)
 
         def to_force(start: State[Any], there: Move, guess: Float | None, before: list[Substep]) -> Trial | None:
             found = increment_to_force(problem, (start, guess), there, wanted, self.workspace)
@@ -296,8 +297,7 @@ class Press:
             trial = Trial(there.end.depth_mm, solution, self._normal_force(solution.state))
             return noted(trial, [*before, Substep(start, solution.state, there)])
 
-        target = TARGET_IF_FACTORED if problem.model.finite_strain else TARGET
-        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target)
+        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target(is_finite))
         stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
         first = first_trial(start_mm, stride, force, wanted)
         there = Move(move.start, replace(move.end, depth_mm=first))
@@ -348,7 +348,7 @@ class Press:
             wanted[free],
             float(np.nanmax(np.abs([normal, *wanted]))),
             1e-4 * max(move.end.depth_mm, move.start.depth_mm),
-            TARGET_IF_FACTORED if problem.model.finite_strain else TARGET,
+            target(problem.model.finite_strain),
             largest,
             (size, float(np.linalg.norm(np.nan_to_num(load.forces[1:])))),
             None if load.begins else self._stiffness,

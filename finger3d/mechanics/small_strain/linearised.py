@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.linalg import lu_factor, lu_solve
 
 from finger3d._types import Float
@@ -15,7 +14,7 @@ from finger3d.contact.conditions import ContactProblem, augmentation_parameters
 from finger3d.contact.friction import OPEN, SLIP
 from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState
-from finger3d.fem.tensors import rotated_delassus
+from finger3d.fem.tensors import block_diagonal, rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import vertical_frame
@@ -96,9 +95,3 @@ def upright(state: ContactState, local: Float) -> Float:
     """Return vectors (c, d) in the directions of an upright object."""
     d = local.shape[1]
     return np.asarray(np.einsum("ca,cak->ck", local, state.own_bases) @ vertical_frame(d).T)
-
-
-def block_diagonal(blocks: Float) -> Any:
-    """Return the sparse matrix (c d, c d) of blocks (c, d, d)."""
-    c = len(blocks)
-    return sp.bsr_array((blocks, np.arange(c), np.arange(c + 1))).tocsr()
