@@ -5,8 +5,8 @@ the Jacobian J of the residuals over their standard deviations, ``J^T J`` is the
 covariance of the values (Bard 1974, Ch. 7).  An eigenvector of the Fisher matrix along which the standard deviation is
 a quarter of the range or more is a combination of values that the data do not determine.
 
-Each step solves the linear least-squares problem within the bounds and a box around the values.  Of several first values
-the fit takes those from which such a step would leave the least sum of squares.
+Each step solves the linear least-squares problem within the bounds and a box around the values.  Of several first
+values the fit takes those from which such a step would leave the least sum of squares.
 
 Errors b of the simulation shift the values by ``(J^T J)^-1 J^T b``.
 """
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
@@ -105,28 +105,6 @@ class FittedValues:
     untold: tuple[str, ...]
     numerical: Float
 
-    def with_errors(self, scales: Sequence[Scale], derivative: Float, errors: Float) -> FittedValues:
-        """Return the values with standard deviations to which errors of the simulation are added.
-
-        Parameters
-        ----------
-        derivative : (n, k) of the residuals by shares
-        errors : (m, n) standard deviations of m independent errors, each of which shifts all residuals at once
-        """
-        fisher = derivative.T @ derivative + 12.0 * np.eye(len(self.values))  # see `uncertainty`
-        shifts = np.linalg.solve(fisher, derivative.T @ errors.T).T * _slopes(scales, self.shares)
-        numerical = np.linalg.norm(shifts, axis=0)
-        covariance = self.correlation * np.outer(self.stds, self.stds) + shifts.T @ shifts
-        stds = np.sqrt(np.diag(covariance))
-        ends = [
-            np.hypot(side, numerical) * sign + self.values
-            for side, sign in ((self.values - self.low, -1.0), (self.high - self.values, 1.0))
-        ]
-        bounds = np.array([[scale.low, scale.high] for scale in scales]).T
-        low, high = (np.clip(end, *bounds) for end in ends)
-        correlation = covariance / np.outer(stds, stds)
-        return replace(self, stds=stds, low=low, high=high, correlation=correlation, numerical=numerical)
-
 
 Residuals = Callable[[Float], Float]
 """Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
@@ -214,25 +192,39 @@ def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, slope
     return np.array(columns).T
 
 
-def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float) -> FittedValues:
-    """Return the values with their uncertainty, from the Jacobian (n, k) by shares.
+def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, errors: Float) -> FittedValues:
+    """Return the values with their uncertainty.
 
-    The 68 % interval of a value reaches one standard deviation of its share to both sides.
+    The 68 % interval of a value reaches one standard deviation of its share to both sides, within the bounds, and the
+    root mean square of the distances of its ends is the standard deviation of the value.
+
+    Parameters
+    ----------
+    derivative : (n, k) of the residuals by shares
+    errors : (m, n) standard deviations of m independent errors of the simulation, each of which shifts all residuals
     """
     fisher = derivative.T @ derivative
     eigenvalues, vectors = np.linalg.eigh(fisher)
     # prior knowledge: a uniform distribution over the range, whose variance is 1/12
-    covariance = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
+    of_noise = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
+    shifts = errors @ derivative @ of_noise
+    covariance = of_noise + shifts.T @ shifts
     sd = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sd, sd)
+    values = values_at(scales, shares)
     low, high = (values_at(scales, np.clip(shares + sign * sd, 0.0, 1.0)) for sign in (-1.0, 1.0))
+    stds = np.sqrt(0.5 * ((values - low) ** 2 + (high - values) ** 2))
     told = [
         *_untold(scales, eigenvalues, vectors),
-        *_correlated(scales, correlation, eigenvalues),
+        *_correlated(scales, _correlation(of_noise), eigenvalues),
         *_bound(scales, shares),
     ]
-    values, stds, none = values_at(scales, shares), sd * _slopes(scales, shares), np.zeros(len(scales))
-    return FittedValues(values, stds, low, high, correlation, shares, tuple(told), none)
+    numerical = stds * np.linalg.norm(shifts, axis=0) / sd
+    return FittedValues(values, stds, low, high, _correlation(covariance), shares, tuple(told), numerical)
+
+
+def _correlation(covariance: Float) -> Float:
+    sd = np.sqrt(np.diag(covariance))
+    return np.asarray(covariance / np.outer(sd, sd))
 
 
 def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:

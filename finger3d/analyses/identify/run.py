@@ -228,14 +228,13 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     values = values_at(scales, shares)
     derivative = jacobian(scales, shares, residuals, slopes)
     report.stage("errors of mesh and increments")
-    fitted = uncertainty(scales, shares, derivative)
     simulated = simulation.at(values, data)
     known = simulation.errors(values, data)
     unknown = sorted(set(data.columns) - set(known))
     zero = np.zeros((1, len(data.at)))
     # a row of zeros for all columns but the one that the error is of
     blocks = [known.get(name, zero) / (_BAR * stds[name]) for name in data.columns]
-    fitted = fitted.with_errors(scales, derivative, block_diag(*blocks))
+    fitted = uncertainty(scales, shares, derivative, block_diag(*blocks))
     reduced = _reduced_chi_square(data, simulated, len(scales))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
     notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]

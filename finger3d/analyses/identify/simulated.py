@@ -61,7 +61,8 @@ _MAX_STORED = 4  # bodies, and presses
 _STEP, _LEAST = 1e-5, 0.1
 """Step of central differences of interpolated curves, over the value or over `_LEAST` if that is larger."""
 
-Key, Value = TypeVar("Key"), TypeVar("Value")
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 Curve = Mapping[str, Float]
 """Columns of history.csv, a value for each increment."""
