@@ -14,6 +14,7 @@ import pytest
 
 import finger3d
 from finger3d.analyses.identify.fit import FittedValues
+from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.results.journal import Journal
@@ -77,6 +78,31 @@ def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> 
     )
     assert found.presses == 1
     assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
+
+
+def test_three_values_need_twelve_presses(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four points with noise: a press has a body and its increments, and no derivative presses again."""
+    counted = {"bodies": 0, "presses": 0}
+    built, pressed = PressedBody._built, PressedBody.steps
+
+    def count(name: str, function: Any) -> Any:
+        def counting(*args: Any, **kwargs: Any) -> Any:
+            counted[name] += 1
+            return function(*args, **kwargs)
+
+        return counting
+
+    monkeypatch.setattr(PressedBody, "_built", count("bodies", built))
+    monkeypatch.setattr(PressedBody, "steps", count("presses", pressed))
+    measured = bench(tmp_path / "bench.csv", stds=True)
+    lines = measured.read_text().splitlines()
+    measured.write_text("\n".join([lines[0], *lines[2::2]]) + "\n")
+    found = finger3d.identify(scene_file, measured, FREE | {"material.nu": (0.3, 0.495)}, tmp_path / "out")
+    assert found.measured.count == 2 * 4
+    assert found.presses == counted["presses"] <= 12
+    assert counted["bodies"] <= 8  # of one body all friction that is tried at first
+    for value, std, true in zip(found.fitted.values, found.fitted.stds, [*TRUE.values(), 0.45], strict=True):
+        assert value == pytest.approx(true, abs=4.0 * std)
 
 
 def test_a_hardness_is_fitted_by_the_modulus_that_it_gives(tmp_path: Path, scene_file: Path) -> None:

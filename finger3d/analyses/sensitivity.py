@@ -160,7 +160,7 @@ def sensitivity(
             except Finger3dError:  # such as dimensions that change the cells of the mesh; it is named with the result
                 continue
             keys[key] = value
-    *_, (step, *both) = tangents(problem, variations)
+    *_, (step, *both) = tangents(problem, variations, pressed)
     values = table_row(problem.points, step)
     numbers = {name: values[name] for name in tuple(of) or names}
     falling = growing = derivatives(step, variations, both[0])

@@ -47,7 +47,7 @@ def optimise(
         int, Parameter(help="Number of designs; of bodies, if keys of gauges are optimised for each body.")
     ] = 60,
     method: Annotated[
-        str, Parameter(help="differential-evolution, dual-annealing or nelder-mead.")
+        str, Parameter(help="differential-evolution, dual-annealing, or gradient: along derivatives from the start.")
     ] = "differential-evolution",
     seed: Annotated[int, Parameter(help="Seed of the random number generator.")] = 0,
     set_: Set = None,

@@ -5,10 +5,8 @@ the Jacobian J of the residuals over their standard deviations, ``J^T J`` is the
 covariance of the values (Bard 1974, Ch. 7).  An eigenvector of the Fisher matrix along which the standard deviation is
 a quarter of the range or more is a combination of values that the data do not determine.
 
-The response to friction saturates, so that the curvature at the solution may not hold one standard deviation away.
-Each value is therefore varied, and the others with it according to their covariance, until the sum of squares has
-increased by one: these are the ends of its 68 % interval, and the root mean square of their distances from the value
-is the standard deviation that the noise leaves.
+Each step solves the linear least-squares problem within the bounds and a box around the values.  Of several first
+values the fit takes those from which such a step would leave the least sum of squares.
 
 Errors b of the simulation shift the values by ``(J^T J)^-1 J^T b``.
 """
@@ -17,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
@@ -29,22 +27,22 @@ from finger3d.errors import Finger3dError
 _STEP = 0.01
 """Step of shares for the Jacobian; contact changes point by point, so that smaller steps would resolve the mesh."""
 
-_SHARE_CHANGE, _COST_CHANGE, _MOST = 1e-4, 1e-5, 40
-"""Relative changes of the shares and of the sum of squares at which the fit ends, and its largest number of trials."""
+_SHARE_CHANGE, _COST_CHANGE, _MOST = 1e-4, 1e-3, 40
+"""Largest step, and foretold fall of the sum of squares over one plus it, at which the fit ends, and its most steps."""
 
-_INSIDE = 1e-6
-"""Distance of the first shares from their bounds, which the trust region method asks for."""
+_RADIUS, _LEAST_GAIN, _LARGE_GAIN = 0.25, 0.25, 0.75
+"""Largest first step, and falls of the sum of squares, over those foretold, from which a step is taken, and steps grow.
+Where all of the contact sticks nothing tells friction, so that a fit does not return from there."""
+
+_INSIDE = 1e-9
+"""Margin of the bounds of a step, which must not coincide."""
 
 _UNTOLD = 0.25
 """Standard deviation of a combination, relative to the range, at which the data do not determine it."""
 
-_TRIALS, _RISE_TOLERANCE, _LARGEST_STEP = 6, 0.1, 3.0
-"""Trials for an end of an interval, tolerance of the rise of the sum of squares, and largest change of a step."""
-
 _STRONG = 0.95  # correlation that is named
 _AT_BOUND = 1e-3  # distance of a share from 0 or 1
 _PART = 0.3  # component of an eigenvector that is named
-_FAILED = 1e3  # residuals of a failed press, in standard deviations
 _MISFIT = 2.0  # residuals over their stated standard deviation beyond which the scene does not explain the data
 _DECADE = 10.0
 
@@ -107,29 +105,6 @@ class FittedValues:
     untold: tuple[str, ...]
     numerical: Float
 
-    def with_errors(self, scales: Sequence[Scale], derivative: Float, errors: Float) -> FittedValues:
-        """Return the values with standard deviations to which errors of the simulation are added.
-
-        Parameters
-        ----------
-        derivative : (n, k) of the residuals by shares
-        errors : (m, n) standard deviations of m independent errors, each of which shifts all residuals at once
-        """
-        fisher = derivative.T @ derivative + 12.0 * np.eye(len(self.values))  # see `uncertainty`
-        slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, self.shares, strict=True)])
-        shifts = np.linalg.solve(fisher, derivative.T @ errors.T).T * slopes
-        numerical = np.linalg.norm(shifts, axis=0)
-        covariance = self.correlation * np.outer(self.stds, self.stds) + shifts.T @ shifts
-        stds = np.sqrt(np.diag(covariance))
-        ends = [
-            np.hypot(side, numerical) * sign + self.values
-            for side, sign in ((self.values - self.low, -1.0), (self.high - self.values, 1.0))
-        ]
-        bounds = np.array([[scale.low, scale.high] for scale in scales]).T
-        low, high = (np.clip(end, *bounds) for end in ends)
-        correlation = covariance / np.outer(stds, stds)
-        return replace(self, stds=stds, low=low, high=high, correlation=correlation, numerical=numerical)
-
 
 Residuals = Callable[[Float], Float]
 """Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
@@ -147,25 +122,42 @@ def fit(
 ) -> Float:
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
 
-    `announce` is called with the values of each iteration.
+    Each step is the solution of the linear problem within the bounds and within a box, which shrinks where the sum of
+    squares falls less than foretold.  `announce` is called with the values of each iteration.
     """
-    count = len(residuals(values_at(scales, start)))
-
-    def cost(shares: Float) -> Float:
-        try:
-            return residuals(values_at(scales, shares))
-        except Finger3dError:
-            return np.full(count, _FAILED)
-
-    def slope(shares: Float) -> Float:
+    shares, radius = np.clip(start, 0.0, 1.0), _RADIUS
+    now = residuals(values_at(scales, shares))
+    for _ in range(_MOST):
         announce(values_at(scales, shares))
-        return jacobian(scales, shares, residuals, slopes)
+        derivative, cost, share_of_foretold = jacobian(scales, shares, residuals, slopes), float(now @ now), -1.0
+        while share_of_foretold < _LEAST_GAIN:
+            step, left = _step(derivative, now, shares, radius)
+            if radius < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
+                return shares
+            try:
+                after = residuals(values_at(scales, shares + step))
+            except Finger3dError:
+                after = np.full(len(now), np.inf)
+            share_of_foretold = (cost - float(after @ after)) / (cost - left)
+            size = float(np.abs(step).max())
+            if share_of_foretold < _LEAST_GAIN:
+                radius = 0.25 * size
+            elif share_of_foretold > _LARGE_GAIN:
+                radius = max(radius, 2.0 * size)
+        shares, now = shares + step, after
+    return shares
 
-    inside = np.clip(start, _INSIDE, 1.0 - _INSIDE)
-    found = optimize.least_squares(
-        cost, inside, slope, bounds=(0.0, 1.0), xtol=_SHARE_CHANGE, ftol=_COST_CHANGE, gtol=None, max_nfev=_MOST
-    )
-    return np.asarray(found.x)
+
+def _step(derivative: Float, now: Float, shares: Float, radius: float = 1.0) -> tuple[Float, float]:
+    """Return the step (k,) to the least sum of squares by the derivatives (n, k), and that sum.
+
+    A step over the whole range of a share counts as one standard deviation, so that values stay where the data do not
+    determine them.
+    """
+    low, high = np.maximum(-shares, -radius), np.minimum(1.0 - shares, radius)
+    damped = np.vstack([derivative, np.eye(len(shares))]), np.concatenate([-now, np.zeros(len(shares))])
+    step = np.asarray(optimize.lsq_linear(*damped, (low - _INSIDE, high + _INSIDE)).x).clip(low, high)
+    return step, float(np.sum((now + derivative @ step) ** 2))
 
 
 def values_at(scales: Sequence[Scale], shares: Float) -> Float:
@@ -173,11 +165,25 @@ def values_at(scales: Sequence[Scale], shares: Float) -> Float:
     return np.array([scale.value(float(share)) for scale, share in zip(scales, shares, strict=True)])
 
 
+def _slopes(scales: Sequence[Scale], shares: Float) -> Float:
+    """Return the derivatives (k,) of values by shares."""
+    return np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
+
+
+def foretold(scales: Sequence[Scale], shares: Float, residuals: Residuals, slopes: Slopes) -> float:
+    """Return the sum of squares after a step from `shares`, by the derivatives there; that before where not known."""
+    values = values_at(scales, shares)
+    now, known = residuals(values), slopes(values)
+    if known is None:
+        return float(now @ now)
+    return _step(known * _slopes(scales, shares), now, shares)[1]
+
+
 def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, slopes: Slopes) -> Float:
     """Return the derivatives (n, k) of residuals by shares; central differences where those by values are not known."""
     known = slopes(values_at(scales, shares))
     if known is not None:
-        return known * [scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)]
+        return known * _slopes(scales, shares)
     columns = []
     for i in range(len(scales)):
         ends = [float(np.clip(shares[i] + step, 0.0, 1.0)) for step in (-_STEP, _STEP)]
@@ -186,49 +192,39 @@ def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, slope
     return np.array(columns).T
 
 
-def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, residuals: Residuals) -> FittedValues:
-    """Return the values with their uncertainty, from the Jacobian (n, k) by shares and from the residuals around."""
+def uncertainty(scales: Sequence[Scale], shares: Float, derivative: Float, errors: Float) -> FittedValues:
+    """Return the values with their uncertainty.
+
+    The 68 % interval of a value reaches one standard deviation of its share to both sides, within the bounds, and the
+    root mean square of the distances of its ends is the standard deviation of the value.
+
+    Parameters
+    ----------
+    derivative : (n, k) of the residuals by shares
+    errors : (m, n) standard deviations of m independent errors of the simulation, each of which shifts all residuals
+    """
     fisher = derivative.T @ derivative
     eigenvalues, vectors = np.linalg.eigh(fisher)
     # prior knowledge: a uniform distribution over the range, whose variance is 1/12
-    covariance = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
+    of_noise = (vectors / (np.maximum(eigenvalues, 0.0) + 12.0)) @ vectors.T
+    shifts = errors @ derivative @ of_noise
+    covariance = of_noise + shifts.T @ shifts
     sd = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(sd, sd)
     values = values_at(scales, shares)
-    ends = np.array([_interval(i, scales, shares, covariance[i] / sd[i], residuals) for i in range(len(scales))])
+    low, high = (values_at(scales, np.clip(shares + sign * sd, 0.0, 1.0)) for sign in (-1.0, 1.0))
+    stds = np.sqrt(0.5 * ((values - low) ** 2 + (high - values) ** 2))
     told = [
         *_untold(scales, eigenvalues, vectors),
-        *_correlated(scales, correlation, eigenvalues),
+        *_correlated(scales, _correlation(of_noise), eigenvalues),
         *_bound(scales, shares),
     ]
-    stds = np.sqrt(np.mean((ends - values[:, None]) ** 2, axis=1))
-    none = np.zeros(len(scales))
-    return FittedValues(values, stds, ends[:, 0], ends[:, 1], correlation, shares, tuple(told), none)
+    numerical = stds * np.linalg.norm(shifts, axis=0) / sd
+    return FittedValues(values, stds, low, high, _correlation(covariance), shares, tuple(told), numerical)
 
 
-def _interval(
-    number: int, scales: Sequence[Scale], shares: Float, direction: Float, residuals: Residuals
-) -> tuple[float, float]:
-    """Return the ends of the interval of a value in which the sum of squares rises by less than one.
-
-    `direction` (k,) is the change of the shares for one standard deviation of the value, by the covariance.
-    """
-    least = float(np.sum(residuals(values_at(scales, shares)) ** 2))
-    ends = []
-    for sign in (-1.0, 1.0):
-        step = 1.0
-        for _ in range(_TRIALS):
-            moved = np.clip(shares + sign * step * direction, 0.0, 1.0)
-            try:
-                rise = float(np.sum(residuals(values_at(scales, moved)) ** 2)) - least
-            except Finger3dError:
-                rise = math.inf
-            if abs(rise - 1.0) < _RISE_TOLERANCE or (rise < 1.0 and moved[number] in (0.0, 1.0)):
-                break
-            step *= min(max(1.0 / math.sqrt(max(rise, 1e-12)), 1.0 / _LARGEST_STEP), _LARGEST_STEP)
-            step = max(step, 1.0 / _LARGEST_STEP)  # where the fit is poor, round-off of the minimum exceeds one
-        ends.append(scales[number].value(float(moved[number])))
-    return ends[0], ends[1]
+def _correlation(covariance: Float) -> Float:
+    sd = np.sqrt(np.diag(covariance))
+    return np.asarray(covariance / np.outer(sd, sd))
 
 
 def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:

@@ -13,7 +13,16 @@ from scipy.linalg import block_diag
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
-from finger3d.analyses.identify.fit import FittedValues, Scale, fit, jacobian, misfit_text, uncertainty, values_at
+from finger3d.analyses.identify.fit import (
+    FittedValues,
+    Scale,
+    fit,
+    foretold,
+    jacobian,
+    misfit_text,
+    uncertainty,
+    values_at,
+)
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.simulated import (
     MODULI,
@@ -185,15 +194,12 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     """Fit, weight columns without standard deviations by their residuals, and fit again."""
     report.stage("first presses")
     scales = [Scale.of(f) for f in simulation.free]
-    begin = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
-    starts = [begin, np.zeros(len(scales)), np.ones(len(scales))]
-    curves = [simulation.at(values_at(scales, shares), data) for shares in starts]
-    data.check_signs(curves)
-    magnitudes = [largest(curve) for curve in curves]
-    data.check_units(
-        {n: min(m[n] for m in magnitudes) for n in data.columns},
-        {n: max(m[n] for m in magnitudes) for n in data.columns},
-    )
+    given = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
+    begin = np.clip(given, _FROM_BOUND, 1.0 - _FROM_BOUND)
+    own = np.array([f.key.startswith("friction.") for f in simulation.free])
+    starts = [begin, *(np.where(own, share, begin) for share in _FRICTION if own.any())]
+    tried = [_with_modulus(simulation, shares) for shares in starts]
+    _check_columns(simulation, scales, [shares for trials in tried for shares in trials], data)
     stds = {
         n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
         for n, v in data.columns.items()
@@ -211,11 +217,8 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
 
-    own = np.array([f.key.startswith("friction.") for f in simulation.free])
-    starts += [np.where(own, share, begin) for share in _FRICTION if own.any()]
-    tried = [trial for shares in starts for trial in _with_modulus(simulation, shares)]
-    costs = [float(np.sum(residuals(values_at(scales, shares)) ** 2)) for shares in tried]
-    shares = np.clip(tried[int(np.argmin(costs))], _FROM_BOUND, 1.0 - _FROM_BOUND)
+    best = [min(trials, key=lambda s: float(np.sum(residuals(values_at(scales, s)) ** 2))) for trials in tried]
+    shares = min(best, key=lambda s: foretold(scales, s, residuals, slopes)) if len(best) > 1 else best[0]
     shares = fit(scales, shares, residuals, slopes, announce)
     weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
     if weighted:
@@ -225,14 +228,13 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     values = values_at(scales, shares)
     derivative = jacobian(scales, shares, residuals, slopes)
     report.stage("errors of mesh and increments")
-    fitted = uncertainty(scales, shares, derivative, residuals)
     simulated = simulation.at(values, data)
     known = simulation.errors(values, data)
     unknown = sorted(set(data.columns) - set(known))
     zero = np.zeros((1, len(data.at)))
     # a row of zeros for all columns but the one that the error is of
     blocks = [known.get(name, zero) / (_BAR * stds[name]) for name in data.columns]
-    fitted = fitted.with_errors(scales, derivative, block_diag(*blocks))
+    fitted = uncertainty(scales, shares, derivative, block_diag(*blocks))
     reduced = _reduced_chi_square(data, simulated, len(scales))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
     notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
@@ -250,12 +252,39 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     )
 
 
+def _check_columns(
+    simulation: Simulation, scales: Sequence[Scale], tried: Sequence[Float], data: MeasuredPress
+) -> None:
+    """Check signs and units against presses that the fit needs anyway, and refuse them only if those at the bounds do.
+
+    Raises
+    ------
+    Finger3dError
+        For a column of another sign or unit than the scene gives.
+    """
+
+    def check(every: Sequence[Float]) -> None:
+        curves = [simulation.at(values_at(scales, shares), data) for shares in every]
+        data.check_signs(curves)
+        magnitudes = [largest(curve) for curve in curves]
+        data.check_units(
+            {n: min(m[n] for m in magnitudes) for n in data.columns},
+            {n: max(m[n] for m in magnitudes) for n in data.columns},
+        )
+
+    try:
+        check(tried)
+    except Finger3dError:
+        check([*tried, np.zeros(len(scales)), np.ones(len(scales))])
+
+
 def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:
     """Return the shares, and copies with several values of Young's modulus if these need no further solution."""
     own = np.array([f.key in MODULI for f in simulation.free])
     if own.sum() != 1 or not simulation.scales_with_modulus:
         return [shares]
-    return [np.where(own, share, shares) for share in (shares[own][0], *np.linspace(0.0, 1.0, _TRIED_MODULI))]
+    moduli = np.linspace(_FROM_BOUND, 1.0 - _FROM_BOUND, _TRIED_MODULI)
+    return [np.where(own, share, shares) for share in (shares[own][0], *moduli)]
 
 
 def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -56,10 +56,13 @@ _UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
 
-_MAX_STORED = 4  # bodies
+_MAX_STORED = 4  # bodies, and presses
 
 _STEP, _LEAST = 1e-5, 0.1
 """Step of central differences of interpolated curves, over the value or over `_LEAST` if that is larger."""
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 Curve = Mapping[str, Float]
 """Columns of history.csv, a value for each increment."""
@@ -88,6 +91,8 @@ class Simulation:
     journal: Journal
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
     _bodies: dict[str, PressedBody] = field(default_factory=dict)
+    _presses: dict[tuple[float, ...], tuple[Problem, list[StepResult]]] = field(default_factory=dict)
+    _slopes: dict[tuple[float, ...], list[Curve] | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take over the solutions of an earlier run."""
@@ -156,7 +161,9 @@ class Simulation:
         """
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
-        known = self._derivatives(point, [f.numbered(self.given) for f in costly])
+        if point not in self._slopes:
+            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
+        known = self._slopes[point]
         if known is None:
             return None
         by_key = dict(zip((f.key for f in costly), known, strict=True))
@@ -196,12 +203,17 @@ class Simulation:
         return {n: shapes * bar for n, bar in _scaled(known, factor).items()}
 
     def _pressed(self, point: tuple[float, ...]) -> tuple[Problem, list[StepResult]]:
-        """Return the condensed body at values of the free keys, and its increments."""
-        scene = self.scene(point)
-        model = scene.model()
-        body = self._body(scene, model)
-        steps = body.steps(model.friction, model.rule)  # which may condense it again
-        return under(body.problem, model.friction, rule=model.rule), steps
+        """Return the condensed body at values of the free keys, and its increments; the last ones are kept."""
+
+        def pressed() -> tuple[Problem, list[StepResult]]:
+            scene = self.scene(point)
+            model = scene.model()
+            key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
+            body = _kept(self._bodies, key, lambda: PressedBody(model))
+            steps = body.steps(model.friction, model.rule)  # which may condense it again
+            return under(body.problem, model.friction, rule=model.rule), steps
+
+        return _kept(self._presses, point, pressed)
 
     def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
         """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
@@ -214,7 +226,7 @@ class Simulation:
             return None
         try:
             variations = [varied(scene, problem, key) for key in keys]
-            rows = [derivatives(step, variations, sides) for step, _, sides in tangents(problem, variations)]
+            rows = [derivatives(step, variations, sides) for step, _, sides in tangents(problem, variations, steps)]
         except Finger3dError:  # forces that jump have no derivatives; differences of presses have
             return None
         if not all(all(row) for row in rows):  # of a side of a kink that is not known
@@ -236,15 +248,6 @@ class Simulation:
         columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
         return {"values": list(point), "outcome": "converged", "curve": columns}
 
-    def _body(self, scene: Scene, model: Model) -> PressedBody:
-        """Return the condensed body of a scene; the last ones are kept."""
-        key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
-        if key not in self._bodies:
-            while len(self._bodies) >= _MAX_STORED:
-                self._bodies.pop(next(iter(self._bodies)))
-            self._bodies[key] = PressedBody(model)
-        return self._bodies[key]
-
     def _keep(self, row: Mapping[str, Any]) -> None:
         """Keep the solution of a row of the journal."""
         point = tuple(float(v) for v in row["values"])
@@ -255,6 +258,16 @@ class Simulation:
 
     def _named(self, point: tuple[float, ...]) -> str:
         return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
+
+
+def _kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value:
+    """Return what is stored under a key; if nothing is, make and store it in place of the oldest."""
+    if key not in store:
+        found = made()
+        while len(store) >= _MAX_STORED:
+            store.pop(next(iter(store)))
+        store[key] = found
+    return store[key]
 
 
 def _scaled(curve: Curve, factor: float) -> Curve:

@@ -70,7 +70,7 @@ def optimise(
     mus : friction coefficients, ascending; None: nine from 0.05 to 1
     noise : standard deviation of a strain reading
     budget : number of designs, or of bodies if gauges are searched in each
-    method : "differential-evolution", "dual-annealing" or "nelder-mead"
+    method : "differential-evolution", "dual-annealing", or "gradient", which follows derivatives from the start
     seed : of the random numbers
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     report : receives the progress at every design

@@ -20,7 +20,8 @@ from finger3d.sensor.curve import LARGEST_STRAIN
 Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
-METHODS = ("differential-evolution", "dual-annealing", "nelder-mead")
+GRADIENT = "gradient"
+METHODS = ("differential-evolution", "dual-annealing", GRADIENT)
 _OBJECTIVE_ERRORS = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 
 

@@ -52,10 +52,16 @@ def refusal(model: Model) -> str:
 Tangents: TypeAlias = Iterator[tuple[StepResult, Sides, Sides]]
 
 
-def tangents(problem: Problem, variations: Sequence[Variation]) -> Tangents:
+def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult] = ()) -> Tangents:
     """Yield every increment of a press, and the sides (2 p,) of p variations at its end as they fall and as they grow.
 
     Both are the same list until an increment ends at a kink, along an exact path until the press does.
+
+    Parameters
+    ----------
+    problem : of the press
+    variations : of p parameters
+    steps : the increments, if the press is known; an exact path is followed again
 
     Raises
     ------
@@ -64,8 +70,10 @@ def tangents(problem: Problem, variations: Sequence[Variation]) -> Tangents:
     """
     if text := refusal(problem.model):
         raise Finger3dError(text)
-    follow = _on_exact_path if has_exact_path(problem.model) else _by_increments
-    yield from follow(problem, variations)
+    if has_exact_path(problem.model):
+        yield from _on_exact_path(problem, variations)
+    else:
+        yield from _by_increments(problem, variations, steps)
 
 
 def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0) -> list[Numbers]:
@@ -91,11 +99,12 @@ def _advanced(press: Press, station: Station) -> StepResult:
     return step
 
 
-def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Tangents:
-    press, falling = Press(problem), _increment_tangents(problem, variations)
-    growing = falling
-    for station in stations(problem.model.legs):
-        step = _advanced(press, station)
+def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
+    if not steps:
+        press = Press(problem)
+        steps = [_advanced(press, station) for station in stations(problem.model.legs)]
+    growing = falling = _increment_tangents(problem, variations, steps)
+    for step in steps:
         if growing is falling and falling.is_at_kink(step):
             growing = copy(falling)
         if growing is falling:
@@ -105,13 +114,15 @@ def _by_increments(problem: Problem, variations: Sequence[Variation]) -> Tangent
             yield step, falling.advance(step, -1), growing.advance(step, 1)
 
 
-def _increment_tangents(problem: Problem, variations: Sequence[Variation]) -> IncrementTangents:
+def _increment_tangents(
+    problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]
+) -> IncrementTangents:
     if not problem.model.finite_strain:
         viscous = problem.model.relaxation is not None
-        return ViscousTangents(problem, variations) if viscous else IncrementTangents(problem, variations)
+        return (ViscousTangents if viscous else IncrementTangents)(problem, variations, steps)
     from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
 
-    return FiniteIncrementTangents(problem, variations)
+    return FiniteIncrementTangents(problem, variations, steps)
 
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangents:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,9 @@ _NEGLIGIBLE = 1e-7
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
+
+_AT_ONCE = 32
+"""Increments that the body is solved for at once."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +106,15 @@ class IncrementTangents:
     ----------
     problem : of the press
     variations : of p parameters
+    steps : the increments of the press
 
     Attributes
     ----------
     sides : (2 p,) below and above each parameter, at the end of the last increment
     """
 
-    def __init__(self, problem: Problem, variations: Sequence[Variation]) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
+        self.problem, self._results = problem, steps
         self._steps = np.array([t for one in variations for t in (-one.step, one.step)])
         ends = [end for one in variations for end in one.ends]
         self.formulation = formulation_of(problem.model)
@@ -197,8 +202,22 @@ class IncrementTangents:
 
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
         """Return the derivatives of the body at the end of a part of an increment under its forces."""
-        force = self.problem.upright_force(part.after.contact)
-        return self._changes(force[None], len(steps) // 2)[0]
+        found = self._fixed[part.after.contact.force.tobytes()]
+        more = ((0, 0), (0, len(steps) // 2 - len(self._variations)))  # by poses, which change nothing in the body
+        return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
+
+    @cached_property
+    def _fixed(self) -> dict[bytes, FixedForces]:
+        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces.
+
+        Solutions for several forces at once cost less than one after another.
+        """
+        contacts = [after.contact for step in self._results for _, after in step.parts]
+        found = list[FixedForces]()
+        for start in range(0, len(contacts), _AT_ONCE):
+            forces = [self.problem.upright_force(contact) for contact in contacts[start : start + _AT_ONCE]]
+            found += self._changes(np.array(forces), len(self._variations))
+        return dict(zip((contact.force.tobytes() for contact in contacts), found, strict=True))
 
     def _changes(self, forces: Float, count: int) -> list[FixedForces]:
         """Return what variations change in the body under each of several forces (k, c, d), for `count` parameters."""

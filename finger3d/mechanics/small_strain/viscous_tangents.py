@@ -21,6 +21,7 @@ from finger3d._types import Float
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, Linear, Part, slopes
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
@@ -57,8 +58,8 @@ class ViscousTangents(IncrementTangents):
 
     formulation: Viscoelastic
 
-    def __init__(self, problem: Problem, variations: Sequence[Variation]) -> None:
-        super().__init__(problem, variations)
+    def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
+        super().__init__(problem, variations, steps)
         self._workspace = self.formulation.workspace()
         bodies = [one.body for one in variations for _ in one.ends]
         self._workspaces = [RelaxationWorkspace() if isinstance(b, BodyChange) else self._workspace for b in bodies]
