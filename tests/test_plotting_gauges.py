@@ -78,7 +78,8 @@ def test_the_render_and_the_marks_have_one_scale(tmp_path: Path, monkeypatch: py
     low = np.round(0.5 * np.array([wide, high]) - 0.5 * size / pixel).astype(int)
     window[low[1] : high - low[1], low[0] : wide - low[0]] = 0
     monkeypatch.setattr(solid, "rendering", lambda drawings: nullcontext(lambda: [window] * len(drawings)))
-    found = solid.render_solids([(skin, np.zeros((len(skin.contact), 3, 3)), False)])
+    with solid.rendering_solids([(skin, np.zeros((len(skin.contact), 3, 3)), False)]) as rendered:
+        found = rendered()
     assert found is not None
     images, extent = found
     assert images[0].shape[:2] == (high - 2 * low[1], wide - 2 * low[0])

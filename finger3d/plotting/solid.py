@@ -329,15 +329,8 @@ def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
 Extent = tuple[float, float, float, float]
 """Left, right, lower and upper edge of a picture in the picture plane of `flat`, mm."""
 
-
 Rendered: TypeAlias = tuple[list[Image], Extent]
 """Pictures (h, w, 3), cropped alike, and their extent."""
-
-
-def render_solids(pictures: Sequence[tuple[Skin, Float, bool]], window: tuple[int, int] = WINDOW) -> Rendered | None:
-    """Render solids with one camera; see `rendering_solids`."""
-    with rendering_solids(pictures, window) as rendered:
-        return rendered()
 
 
 @contextmanager
@@ -380,7 +373,7 @@ def _common_frame(skins: Sequence[Skin]) -> tuple[Float, Float]:
 
 
 def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylines | Arrows, ...]:
-    """Return what the renderer draws of a solid; for the parameters see `render_solids`."""
+    """Return what the renderer draws of a solid; for the parameters see `rendering_solids`."""
     surfaces = (
         (skin.body[:, TRIANGLES].reshape(-1, 3, 3), BODY),
         (skin.contact, np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)),
