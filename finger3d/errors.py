@@ -76,12 +76,12 @@ class Outcome(Enum):
         "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"
     )
     FORCE_JUMPS = (
-        "the prescribed force is not reached: the force jumps with the depth; prescribe a depth, or use [contact] "
-        "rule = 'projection' and a constant friction coefficient"
+        "the prescribed force is not reached: the force jumps with the depth, as where an edge slips off, or by "
+        "rule = 'paper' or kinetic friction; prescribe a depth"
     )
     SLIPS = (
-        "the whole contact slips: the prescribed tangential force is more than friction holds; prescribe a smaller "
-        "one, or a larger normal force"
+        "the whole contact slips: friction does not balance the prescribed tangential force; prescribe another one, or "
+        "a larger normal force"
     )
     EVENTS = (
         "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"

@@ -52,6 +52,17 @@ def test_a_flat_contact_slips_as_a_whole_at_mu_times_the_normal_force(domain: st
     assert steps[-1].detail == f"{asked:.6g} N asked; the contact holds at most {MU * N:.9g} N, 100 % of it"
 
 
+def test_a_slope_steeper_than_friction_holds_nothing_as_small_as_is_asked() -> None:
+    # tan(20 deg - atan mu) = .105 and tan(20 deg + atan mu) = .673 times the normal force are the least and the most
+    finger = block(
+        design=designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0), mesh=MeshOptions(0.4, 1.6),
+        object=Plane(tilt=np.radians(-20.0)), domain="plane-strain", legs=(PRESS, held(0.05 * N)),
+    )  # fmt: skip
+    steps, _ = pressed(finger)
+    assert steps[-1].outcome is Outcome.SLIPS
+    assert steps[-1].detail.endswith("but slides down its slope under less")
+
+
 @pytest.mark.parametrize(
     ("mu", "load", "above"),
     [(0.54787, 1.87586820, 1e-4), (0.54787, 1.87586820, 5e-4), (0.83208941713423, 2.113585171, 2.10350688514e-5)],

@@ -32,6 +32,9 @@ _SLOW = 0.2
 _AT_LIMIT = 1e-9
 """Relative distance from the largest force that friction transmits at which it counts as reached."""
 
+_MUCH = 1.1
+"""Largest tangential force that a contact holds over the one that it slips under, beyond which a slope drives it."""
+
 
 @dataclass(frozen=True)
 class PoseTrial:
@@ -179,7 +182,9 @@ class PoseSearch:
         if outcome is Outcome.SLIPS:
             now, asked = self.asked_N
             held = self.largest(trial) * now
-            detail = f"{asked:.6g} N asked; the contact holds at most {held:.9g} N, {100.0 * held / asked:.4g} % of it"
+            slides_down = held > _MUCH * asked
+            share = "but slides down its slope under less" if slides_down else f"{100.0 * held / asked:.4g} % of it"
+            detail = f"{asked:.6g} N asked; the contact holds at most {held:.9g} N, {share}"
         else:
             detail = f"the nearest forces differ by {self._error(trial) * self.scale_N:.3g} N"
         return replace(trial, solution=replace(trial.solution, outcome=outcome, detail=detail))
