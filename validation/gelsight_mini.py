@@ -5,6 +5,7 @@ into the gel.  Neither errors of the forces nor friction are published; the gel 
 mm, without its rounded rim, on a rigid back, at large deformation.  `finger3d identify` finds Young's modulus and the
 depth at which the bench has its zero, with a standard deviation of 3 % of every force, for two laws, four
 coefficients of friction and three Poisson's ratios; then from the first three depths alone, which predicts the fourth.
+Its bands are those of the forces' errors alone; what the mesh leaves, a finer one tells.
 Helmut et al. fit a neo-Hookean law with C10 = 0.0725 MPa to the same forces, with tied contact; they give no constant
 of volume, for which CalculiX takes nu = 0.475.
 """
@@ -46,7 +47,7 @@ class Model:
 
     Attributes
     ----------
-    E, E_sd, zero : Young's modulus and its standard deviation, MPa; zero of the depth, mm
+    E, E_sd, zero : Young's modulus and its standard deviation by the forces' errors, MPa; zero of the depth, mm
     forces : (4,) N at the measured depths
     predicted, predicted_sd : force at the fourth depth from the first three, N
     curve : depth, mm, and force, N, of the simulated press
@@ -105,20 +106,31 @@ def _identified(law: str, mu: float, nu: float, size: float, folder: Path) -> Mo
         rows = [f"{d},{f},{SHARE * f}" for d, f in zip(DEPTHS[:count], FORCES[:count], strict=True)]
         (out / "bench.csv").write_text("\n".join(["depth_mm,normal_force_N,normal_force_N_std", *rows]) + "\n")
         found[count] = identify(scene(law, mu, nu, size), out / "bench.csv", FREE, out)
-    (modulus, zero), sds = found[4].fitted.values, found[4].fitted.stds
-    curve, fitted = found[3].curve, found[3].fitted
-    depth, force = np.asarray(curve["depth_mm"]), np.asarray(curve["normal_force_N"])
-    # by small changes of both values: the force is proportional to the modulus
-    at = DEPTHS[3] + fitted.values[1]
-    slopes = np.array([np.interp(at, depth, force) / fitted.values[0], np.interp(at, depth, np.gradient(force, depth))])
-    covariance = fitted.correlation * np.outer(fitted.stds, fitted.stds)
-    sd = float(np.sqrt(slopes @ covariance @ slopes))
+    modulus, zero = found[4].fitted.values
+    curve, values = found[3].curve, found[3].fitted.values
+    slopes = _slopes(curve, values, DEPTHS)
+    sd = float(np.sqrt(slopes[3] @ _covariance(slopes[:3]) @ slopes[3]))
+    sds = np.sqrt(np.diag(_covariance(_slopes(found[4].curve, found[4].fitted.values, DEPTHS))))
+    at, depth, force = DEPTHS[3] + values[1], np.asarray(curve["depth_mm"]), np.asarray(curve["normal_force_N"])
     whole = found[4].curve
     return Model(
         law, mu, nu, float(modulus), float(sds[0]), float(zero), np.asarray(found[4].simulated["normal_force_N"]),
         float(np.interp(at, depth, force)), sd,
         (np.asarray(whole["depth_mm"]) - zero, np.asarray(whole["normal_force_N"])),
     )  # fmt: skip
+
+
+def _slopes(curve: Any, values: Float, depths: Float) -> Float:
+    """Return the derivatives (n, 2) of the forces by modulus and zero: a force is proportional to the modulus."""
+    depth, force = np.asarray(curve["depth_mm"]), np.asarray(curve["normal_force_N"])
+    at = depths + values[1]
+    return np.column_stack([np.interp(at, depth, force) / values[0], np.interp(at, depth, np.gradient(force, depth))])
+
+
+def _covariance(slopes: Float) -> Float:
+    """Return the covariance (2, 2) that errors of 3 % of the first forces leave in modulus and zero."""
+    scaled = slopes / (SHARE * FORCES[: len(slopes), None])
+    return np.linalg.inv(scaled.T @ scaled)
 
 
 def _rows(models: list[Model], best: Model) -> list[Row]:
