@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,3 +27,13 @@ def test_the_slip_limit_of_a_flat_contact() -> None:
     arm = np.hypot(x - p @ x / p.sum(), z - p @ z / p.sum())
     assert limit.moment_y_Nmm == pytest.approx(MU * p @ arm, rel=1e-9)
     assert np.hypot(0.03, 0.02) / (MU * N) <= limit.used < 1.0
+
+
+def test_a_wall_across_x_has_no_friction_along_x() -> None:
+    problem = build(block(object=Plane(), legs=(PRESS,), domain="plane-strain"))
+    *_, last = march(problem)
+    walls = np.tile(np.eye(2), (len(problem.points.points), 1, 1))  # normals along x, tangents along y
+    limit = slip_limit(replace(problem.points, basis=walls), replace(last.state, bases=None), problem.model.friction)
+    assert limit is not None
+    assert limit.tangential_force_x_N == 0.0
+    assert limit.used == 0.0

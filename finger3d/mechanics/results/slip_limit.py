@@ -56,7 +56,7 @@ def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw
         return None
     force = points.with_basis_of(state).friction(state.force)
     x, _ = largest_force(points, state, friction, np.array([1.0, 0.0, 0.0]))
-    used = [force[:, 0].sum() / x]
+    used = [(force[:, 0].sum(), x)]
     z = moment = None
     if points.dim == 3:
         z, _ = largest_force(points, state, friction, np.array([0.0, 0.0, 1.0]))
@@ -64,8 +64,9 @@ def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw
         normal = _normals(points, state)
         around = np.column_stack([arm[:, 2], np.zeros(len(arm)), -arm[:, 0]])  # y x arm
         moment = float(limit @ np.linalg.norm(around - np.sum(around * normal, axis=1)[:, None] * normal, axis=1))
-        used += [force[:, 2].sum() / z, np.sum(around * force) / moment if moment else 0.0]
-    return SlipLimit(x, z, moment, math.hypot(*used))
+        used += [(force[:, 2].sum(), z), (np.sum(around * force), moment)]
+    # a wall across x has no friction along it
+    return SlipLimit(x, z, moment, math.hypot(*(own / most for own, most in used if most)))
 
 
 def _limits(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
