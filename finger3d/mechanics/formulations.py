@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
@@ -12,6 +12,16 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.objects import Move
+
+
+@runtime_checkable
+class ReachesForce(Protocol):
+    """A formulation that has increments to a normal force."""
+
+    def increment_to_force(
+        self, problem: Problem, start: tuple[State[Any], Float | None], move: Move, wanted: float, workspace: Any
+    ) -> tuple[Move, ContactSolution[State[Any]]] | None:
+        """Advance a state to a normal force; see `increment_to_force`."""
 
 
 def formulation_of(model: Model) -> Formulation[Any, Any]:
@@ -43,16 +53,7 @@ def increment_to_force(
     Motion to the depth of the force, and the solution; None where the iteration does not converge.  In small strain
     there is none with viscosity, where the increments define the solution, and where the contact geometry is given.
     """
-    if problem.contact_geometry is not None:
-        return None
     formulation = formulation_of(problem.model)
-    if isinstance(formulation, SmallStrain):
-        if problem.model.is_defined_by_increments:
-            return None
-        return formulation.increment_to_force(problem, start, move, wanted, workspace)
-    if problem.model.hyperelastic_law is None:
+    if problem.contact_geometry is not None or not isinstance(formulation, ReachesForce):
         return None
-    from finger3d.mechanics.finite_strain.formulation import FiniteStrain
-
-    formulation = FiniteStrain(problem.model.hyperelastic_law, problem.model.relaxation)
     return formulation.increment_to_force(problem, start, move, wanted, workspace)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import optimize
 
 from finger3d._types import Float
-from finger3d.analyses.free_keys import FreeKey
+from finger3d.analyses.free_keys import FIRST_BOX, LEAST_GAIN, FreeKey, next_box
 from finger3d.errors import Finger3dError
 
 _STEP = 0.01
@@ -29,10 +29,6 @@ _STEP = 0.01
 
 _SHARE_CHANGE, _COST_CHANGE, _MOST = 1e-4, 1e-3, 40
 """Largest step, and foretold fall of the sum of squares over one plus it, at which the fit ends, and its most steps."""
-
-_RADIUS, _LEAST_GAIN, _LARGE_GAIN = 0.25, 0.25, 0.75
-"""Largest first step, and falls of the sum of squares, over those foretold, from which a step is taken, and steps grow.
-Where all of the contact sticks nothing tells friction, so that a fit does not return from there."""
 
 _INSIDE = 1e-9
 """Margin of the bounds of a step, which must not coincide."""
@@ -123,38 +119,35 @@ def fit(
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
 
     Each step is the solution of the linear problem within the bounds and within a box, which shrinks where the sum of
-    squares falls less than foretold.  `announce` is called with the values of each iteration.
+    squares falls less than foretold: where all of the contact sticks nothing tells friction, so that a fit does not
+    return from there.  `announce` is called with the values of each iteration.
     """
-    shares, radius = np.clip(start, 0.0, 1.0), _RADIUS
+    shares, box = np.clip(start, 0.0, 1.0), FIRST_BOX
     now = residuals(values_at(scales, shares))
     for _ in range(_MOST):
         announce(values_at(scales, shares))
-        derivative, cost, share_of_foretold = jacobian(scales, shares, residuals, slopes), float(now @ now), -1.0
-        while share_of_foretold < _LEAST_GAIN:
-            step, left = _step(derivative, now, shares, radius)
-            if radius < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
+        derivative, cost, gain = jacobian(scales, shares, residuals, slopes), float(now @ now), -1.0
+        while gain < LEAST_GAIN:
+            step, left = _step(derivative, now, shares, box)
+            if box < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
                 return shares
             try:
                 after = residuals(values_at(scales, shares + step))
             except Finger3dError:
                 after = np.full(len(now), np.inf)
-            share_of_foretold = (cost - float(after @ after)) / (cost - left)
-            size = float(np.abs(step).max())
-            if share_of_foretold < _LEAST_GAIN:
-                radius = 0.25 * size
-            elif share_of_foretold > _LARGE_GAIN:
-                radius = max(radius, 2.0 * size)
+            gain = (cost - float(after @ after)) / (cost - left)
+            box = next_box(box, float(np.abs(step).max()), gain)
         shares, now = shares + step, after
     return shares
 
 
-def _step(derivative: Float, now: Float, shares: Float, radius: float = 1.0) -> tuple[Float, float]:
+def _step(derivative: Float, now: Float, shares: Float, box: float = 1.0) -> tuple[Float, float]:
     """Return the step (k,) to the least sum of squares by the derivatives (n, k), and that sum.
 
     A step over the whole range of a share counts as one standard deviation, so that values stay where the data do not
     determine them.
     """
-    low, high = np.maximum(-shares, -radius), np.minimum(1.0 - shares, radius)
+    low, high = np.maximum(-shares, -box), np.minimum(1.0 - shares, box)
     damped = np.vstack([derivative, np.eye(len(shares))]), np.concatenate([-now, np.zeros(len(shares))])
     step = np.asarray(optimize.lsq_linear(*damped, (low - _INSIDE, high + _INSIDE)).x).clip(low, high)
     return step, float(np.sum((now + derivative @ step) ** 2))

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.analyses.free_keys import FIRST_BOX, LEAST_GAIN, next_box
 from finger3d.analyses.optimise.task import Objective, ObjectiveTable
 from finger3d.analyses.pressed_body import under
 from finger3d.analyses.sensitivity import has_derivative, varied
@@ -23,11 +24,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, tangents
 from finger3d.scene import Scene, tree
 
-_FIRST_BOX, _LEAST_BOX = 0.25, 1e-3
-"""Half edges of the first box and of the last one, over the ranges of the keys."""
-
-_LEAST_RISE, _GOOD_RISE = 0.1, 0.75
-"""Rises of the objective, over those foretold, from which a step is taken, and from which the box grows."""
+_LEAST_BOX = 1e-3
+"""Half edge of the last box, over the ranges of the keys."""
 
 _CHANGE = 2e-3
 """Foretold rise of the objective, over it, at which the search ends."""
@@ -100,22 +98,18 @@ def climb(
     linear_at : the linearised numbers of a design that can be
     largest : finds where a function is largest, between lower and upper bounds (k,)
     """
-    x, here, box, width = start, value, _FIRST_BOX, bounds[1] - bounds[0]
+    x, here, box, width = start, value, FIRST_BOX, bounds[1] - bounds[0]
     while box > _LEAST_BOX:
         linear = linear_at(x)
-        rise = -1.0
-        while rise < _LEAST_RISE and box > _LEAST_BOX:
+        gain = -1.0
+        while gain < LEAST_GAIN and box > _LEAST_BOX:
             low, high = np.maximum(bounds[0], x - box * width), np.minimum(bounds[1], x + box * width)
             after = largest(lambda y, one=linear, at=x: objective(one.at(y - at)), low, high)  # type: ignore[misc]
             foretold = objective(linear.at(after - x)) - here
             if not foretold > _CHANGE * abs(here):
                 return
             found = value_at(after)
-            rise = (found - here) / foretold
-            size = float(np.abs((after - x) / width).max())
-            if rise < _LEAST_RISE:
-                box = 0.25 * size
-            elif rise > _GOOD_RISE:
-                box = max(box, 2.0 * size)
-        if rise >= _LEAST_RISE:
+            gain = (found - here) / foretold
+            box = next_box(box, float(np.abs((after - x) / width).max()), gain)
+        if gain >= LEAST_GAIN:
             x, here = after, found

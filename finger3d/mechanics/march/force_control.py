@@ -133,7 +133,7 @@ def adapted(trial: Trial, depth: float, repeated: Callable[[Trial, float, bool],
         if abs(away) <= _SAME * abs(trial.depth):
             break
         step = away / (1.0 - slope) if abs(slope) < _CONTRACTION else away
-        end = repeated(trial, depth + step, abs(step) < _SIMILAR * abs(depth + step))
+        end = repeated(trial, depth + step, is_similar(depth + step, depth))
         if end is None:
             break
         last, trial, depth = trial, end, depth + step

@@ -58,6 +58,8 @@ class SmallStrain:
         workspace: Workspace,
     ) -> tuple[Move, ContactSolution[State[Float]]] | None:
         """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
+        if problem.model.is_defined_by_increments:
+            return None
         body = LinearBody(problem.delassus, np.zeros_like(start[0].body))
         return solve_increment_to_force(problem, start, move, body, wanted, workspace)
 
