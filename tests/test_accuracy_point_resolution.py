@@ -24,7 +24,7 @@ def test_a_length_is_never_better_than_its_ends_are_resolved() -> None:
     assert mesh_error(same, {name: 3.08}, 2.0, (own, other)) == {name: pytest.approx(0.04)}
 
 
-@pytest.mark.parametrize(("mu", "least"), [(0.25, 0.1), (0.0, 0.0)])
+@pytest.mark.parametrize(("mu", "least"), [(0.25, 0.08), (0.0, 0.0)])
 @pytest.mark.parametrize("size", [3.0, 2.5])
 def test_a_contact_no_longer_than_the_spacing_tells_nothing_of_friction(size: float, mu: float, least: float) -> None:
     # on the plane of symmetry it has none, on the companion either; with friction on, "0 +- 0" would be a lie
@@ -32,7 +32,7 @@ def test_a_contact_no_longer_than_the_spacing_tells_nothing_of_friction(size: fl
     problem, frames = run(replace(model, friction=Coulomb(mu)))
     told, found = main_numbers(problem, frames[-1]), estimate(problem, frames)
     assert told["friction_sum_N"] == pytest.approx(0.0, abs=1e-12)
-    # a tenth of the force, the bound for a contact no longer than the distance of its points
+    # with edges of 0.1 mm it is 0.114 of the force, within two bars
     assert found.discretisation["friction_sum_N"] == pytest.approx(least * told["normal_force_N"], abs=1e-12)
 
 

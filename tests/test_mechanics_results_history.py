@@ -17,7 +17,9 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
-from finger3d.objects import ObjectPose, Sphere
+from finger3d.objects import MeshObject, ObjectPose, Sphere
+from tests.bodies import box
+from tests.models import swept_fig9
 
 
 def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
@@ -87,9 +89,15 @@ def test_an_area_is_uncertain_by_a_share_of_a_spacing_all_round() -> None:
     frame = StepResult(
         ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
     )
-    bars, with_edges = least_bars(points, frame, 1.0), least_bars(points, frame, 1.0, has_edges=True)
+    model = swept_fig9(4.0, mu=0.25)
+    bars = least_bars(points, frame, 1.0, model)
+    with_edges = least_bars(points, frame, 1.0, replace(model, object=MeshObject(surface=box(2.0, 3.0, 4.0))))
     around = 2.0 * np.pi * 8.0
-    assert 0.35 * around <= bars["stick_area_mm2"] <= 1.4 * 0.35 * around  # no point slips around it
+    # no point slips around it; where no friction is used at its border, there is no slip between the points
+    sticking = np.where(touching[:, None], [1.0, 0.0, 0.0], 0.0)
+    sure = least_bars(points, replace(frame, state=replace(state, force=sticking)), 1.0, model)
+    assert 0.275 * around <= bars["stick_area_mm2"] <= 1.4 * 0.275 * around
+    assert sure["stick_area_mm2"] == pytest.approx(0.075 / 0.275 * bars["stick_area_mm2"], rel=1e-12)
     assert 0.02 * around <= bars["contact_area_mm2"] <= 0.06 * around
     assert 0.25 * around <= with_edges["contact_area_mm2"] <= 1.4 * 0.25 * around
     # both ends lie one spacing before the next point of the line

@@ -53,7 +53,7 @@ class _Shares:
 _SHARES = {
     # on coarse meshes recovery underestimates the error at bonded corners, by a factor of 2 to 4
     Kind.NORMAL_FORCE: _Shares(body=(2.0, 1.5), points=0.07, power=2),
-    Kind.FRICTION_SUM: _Shares(change=1.5, points=0.1),
+    Kind.FRICTION_SUM: _Shares(change=1.5, points=0.08),
     Kind.FORCE: _Shares(change=2.0, body=(2.0, 1.5), points=0.02),
     Kind.MOMENT: _Shares(change=1.5, body=(2.0, 1.5), points=0.06),
     Kind.WORK: _Shares(change=2.0, body=(1.5, 1.5), points=0.03, power=2),

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN
+from finger3d.contact.friction import OPEN, FrictionLaw
+from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN
 from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
 from finger3d.mechanics.results.zones import Zone, zone_area
@@ -24,10 +26,8 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
 lie within twice the bar, and 89 % with a factor of 0.1."""
 
-_CURVED_EDGE, _CORNER = 0.12, 0.25
-"""Error of the place of the edge of contact over the distance of the points: the first times the square of that
-distance over the half-width of contact, and `_Places.contact` besides; the second at most, and under an object with
-edges."""
+_CORNER = 0.25
+"""Error of the place of the edge of contact over the distance of the points, at most and under an object with edges."""
 
 
 @dataclass(frozen=True)
@@ -36,29 +36,31 @@ class _Places:
 
     Attributes
     ----------
-    contact : of the edge of contact
-    stick : of the border of stick: where points slip beyond it, where it reaches open points, and where the zone is not
-        three points wide
-    ends : of an end of stick on a line, where the next point slips and where it is open
+    contact : of the edge of contact: at least, and over the square of that distance over the half-width of contact
+    slip : of the border of stick where points slip beyond it: in an area, and at an end on a line
+    open : of the border of stick where it reaches open points: at least, and over the square of the share of the limit
+        of friction that its points use, since a strip of slip may hide between the points
+    thin : of the border of stick where the zone is not three points wide
     """
 
-    contact: float
-    stick: tuple[float, float, float]
-    ends: tuple[float, float]
+    contact: tuple[float, float]
+    slip: tuple[float, float]
+    open: tuple[float, float]
+    thin: float
 
 
 _PLACES = {
-    (2, False): _Places(0.036, (0.4, 0.17, 0.29), (0.4, 0.17)),
-    (2, True): _Places(0.04, (0.35, 0.3, 0.3), (0.35, 0.3)),
-    (3, False): _Places(0.022, (0.15, 0.35, 0.35), (0.35, 0.2)),
-    (3, True): _Places(0.022, (0.15, 0.35, 0.35), (0.35, 0.2)),
+    (2, False): _Places((0.036, 0.12), (0.4, 0.4), (0.05, 0.5), 0.33),
+    (2, True): _Places((0.04, 0.12), (0.35, 0.35), (0.3, 0.0), 0.3),
+    (3, False): _Places((0.022, 0.06), (0.15, 0.35), (0.075, 0.2), 0.35),
+    (3, True): _Places((0.022, 0.06), (0.15, 0.35), (0.075, 0.2), 0.35),
 }
 """By dimension, in small strain and at large deformation."""
 
 _THIN = 0.35
 """Error of an end of stick on a line over the length before it in which the zone is not three points wide."""
 
-_AT_ENDS = {2: 1.0, 3: 5.5}
+_AT_ENDS = {2: 1.0, 3: 4.0}
 """Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others."""
 
 _ONE_POINT = 0.375
@@ -99,7 +101,7 @@ class PointResolution:
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
             spacing = float(np.sqrt(np.median(points.area)))
             along_z = _edge_length(points, step.state.status != OPEN)
-            least = least_bars(points, step, along_z, problem.model.object.has_edges, problem.model.finite_strain)
+            least = least_bars(points, step, along_z, problem.model)
             share = _share(spacing, reach, spacing, half_width)
             return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
         at = np.round(points.points, 9)
@@ -110,7 +112,7 @@ class PointResolution:
         rows = np.diff(np.unique(at[:, 2]))
         along_z = float(np.median(rows)) if len(rows) else 0.0
         share = _share(spacing, reach, along_z, half_width)
-        least = least_bars(points, step, along_z, problem.model.object.has_edges, problem.model.finite_strain)
+        least = least_bars(points, step, along_z, problem.model)
         if points.dim == 2:
             friction = float(np.linalg.norm(points.with_basis_of(step.state).friction(step.state.force), axis=1).sum())
             least["friction_sum_N"] = _IN_SECTIONS * share * friction
@@ -134,9 +136,7 @@ def _edge_length(points: ContactPoints, touching: NDArray[np.bool_]) -> float:
     return float(np.median(length[both] if both.any() else length)) if len(length) else 0.0
 
 
-def least_bars(
-    points: ContactPoints, step: StepResult, along_z_mm: float, has_edges: bool = False, finite_strain: bool = False
-) -> dict[str, float]:
+def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, model: Model) -> dict[str, float]:
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by a share of the area of the facets that the border of its zone cuts: the length of the border
@@ -148,21 +148,25 @@ def least_bars(
     Parameters
     ----------
     along_z_mm : spacing of the points along z
-    has_edges : whether the object has edges, at which the pressure does not fall to zero
-    finite_strain : whether the deformation is large
+    model : whose object may have edges, at which the pressure does not fall to zero
     """
     zones = dict(zip(("contact", "stick"), points.zones(step.state), strict=True))
     touching, line = step.state.status != OPEN, points.middle_line()
     reach = measure(points, step)["contact_half_length_mm"]
     one = _ONE_POINT * float(np.median(points.area[touching])) if touching.any() else 0.0
-    places = _PLACES[points.dim, finite_strain]
-    edge = _edge_error(points, zones["contact"], places.contact, has_edges)
-    at_contact = np.full(len(touching), min(_AT_ENDS[points.dim] * edge, _CORNER)), 0.0
-    at_ends = {"contact": at_contact, "stick": (np.where(touching, *places.ends), _THIN)}
+    places = _PLACES[points.dim, model.finite_strain]
+    edge = _edge_error(points, zones["contact"], places.contact, model.object.has_edges)
+    at_edge = np.full(len(touching), min(_AT_ENDS[points.dim] * edge, _CORNER))
+    at_open = places.open[0] + places.open[1] * _used_friction(points, step.state, model.friction) ** 2
+    slips = np.where(touching, places.slip[1], np.nan)
+    at_ends = {"contact": (at_edge, at_edge, 0.0), "stick": (slips, at_open, _THIN)}
     found: dict[str, float] = {}
     for name, zone in zones.items():
-        cuts = _cut_areas(points, zone.inside, ~touching)
-        area = edge * sum(cuts) if name == "contact" else float(np.dot(places.stick, cuts))
+        wide, reaches, thin = _cut_facets(points, zone.inside, ~touching)
+        by_place = places.slip[0] * wide + places.thin * thin
+        by_place += reaches * np.where(zone.inside, at_open, 0.0)[points.facets].max(axis=1)
+        error = edge * (wide | reaches | thin) if name == "contact" else by_place
+        area = float(points.facet_area @ error)
         found[f"{name}_area_mm2"] = area if np.count_nonzero(zone.inside) > 1 else max(area, one)
         found[f"{name}_half_length_mm"] = _half_length_bar(points, at_ends[name], zone.inside, line, reach)
         found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
@@ -181,34 +185,40 @@ def least_bars(
     return found
 
 
-def _cut_areas(
-    points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]
-) -> tuple[float, float, float]:
-    """Return areas (mm2) of the facets that the border of a zone cuts.
+def _used_friction(points: ContactPoints, state: ContactState, law: FrictionLaw) -> Float:
+    """Return the share (m,) of the limit of friction that every point uses; 0 where it is open."""
+    normal, friction = state.force[:, 0], np.linalg.norm(state.force[:, 1:], axis=1)
+    limit = law.coefficients(state.status, normal / points.area) * normal
+    return np.asarray(np.where(limit > friction, friction / np.where(limit > 0.0, limit, 1.0), state.status != OPEN))
 
-    They are those where the zone is wide and slip begins beyond it; where it reaches open points, so that a strip of
-    slip may hide between the points; and where it is thin.
+
+def _cut_facets(
+    points: ContactPoints, inside: NDArray[np.bool_], is_open: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which facets (f,) the border of a zone cuts.
+
+    They are those where the zone is wide and slip begins beyond it; where it reaches open points; and where it is thin.
     """
     among = inside[points.facets]
-    cut = among.any(axis=1) & ~among.all(axis=1)
+    cut = np.asarray(among.any(axis=1) & ~among.all(axis=1))
     reaches = cut & is_open[points.facets].any(axis=1)
     wide = cut & ~reaches & (points.resolved(inside)[points.facets] & among).any(axis=1)
-    resolved, opens, all_cut = (float(points.facet_area[some].sum()) for some in (wide, reaches, cut))
-    return resolved, opens, all_cut - resolved - opens
+    return wide, reaches, cut & ~reaches & ~wide
 
 
-def _edge_error(points: ContactPoints, contact: Zone, place: float, has_edges: bool) -> float:
-    """Return the error of the place of the edge of contact over the distance of points; `place`: if contact is wide."""
+def _edge_error(points: ContactPoints, contact: Zone, place: tuple[float, float], has_edges: bool) -> float:
+    """Return the error of the place of the edge of contact over the distance of points; `place`: `_Places.contact`."""
     if has_edges:
         return _CORNER
     area = zone_area(points.facets, points.facet_area, contact)
-    cut = sum(_cut_areas(points, contact.inside, ~contact.inside))
-    return min(place + _CURVED_EDGE * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
+    among = contact.inside[points.facets]
+    cut = float(points.facet_area[among.any(axis=1) & ~among.all(axis=1)].sum())
+    return min(place[0] + place[1] * (cut / area) ** 2, _CORNER) if area > 0.0 else _CORNER
 
 
 def _half_length_bar(
     points: ContactPoints,
-    errors: tuple[Float, float],
+    errors: tuple[Float, Float, float],
     zone: NDArray[np.bool_],
     line: tuple[NDArray[np.float64], NDArray[np.int64]],
     reach: float,
@@ -217,31 +227,40 @@ def _half_length_bar(
 
     Parameters
     ----------
-    errors : of an end over the distance to the next point, by that point, and over the length of what is thin before it
+    errors : of an end over the distance to the next point, (m,) by that point, and by the last one where that is nan;
+        and over the length of what is thin before the end
     """
     at, nearest = line
     on = zone[nearest]
-    ends = _to_next_points(at, on, errors[0][nearest])
+    ends = _to_next_points(at, on, errors[0][nearest], errors[1][nearest])
     if ends == 0.0 and np.count_nonzero(on) == 1:  # a single point, and no other on the line: what it stands for
         return 0.5 * float(points.area[nearest[on]].sum()) / (2.0 * points.half_width_mm)
     if points.dim == 2 or not on.any():
         return ends
     wide, half = on & points.resolved(zone)[nearest], 0.5 * float(np.ptp(at[on]))
     if wide.any():
-        return max(errors[1] * (half - 0.5 * float(np.ptp(at[wide]))), ends)
+        return max(errors[2] * (half - 0.5 * float(np.ptp(at[wide]))), ends)
     return max(0.5 * max(half, reach - half), ends)
 
 
-def _to_next_points(line: Float, on: NDArray[np.bool_], errors: Float) -> float:
-    """Return the mean error (mm) of the ends of a zone: distances to the next points of its line times their `errors`.
+def _to_next_points(line: Float, on: NDArray[np.bool_], by_next: Float, by_last: Float) -> float:
+    """Return the mean error (mm) of the ends of a zone: distances to the next points of its line times their errors.
 
     For an empty zone it is the median distance of the points, which may hide a zone between them, times the largest.
+
+    Parameters
+    ----------
+    by_next, by_last : (k,) errors over the distance, by the next point, and by the last one where that is nan
     """
     if not on.any():
         spacings = np.diff(np.unique(line))
+        errors = np.where(np.isnan(by_next), by_last, by_next)
         return float(np.median(spacings) * errors.max()) if len(spacings) else 0.0
-    left, right = line[on].min(), line[on].max()
-    below, above = line < left, line > right
-    before = float((left - line[below].max()) * errors[below][np.argmax(line[below])]) if below.any() else 0.0
-    after = float((line[above].min() - right) * errors[above][np.argmin(line[above])]) if above.any() else 0.0
-    return 0.5 * (before + after)
+    mean = 0.0
+    for end, beyond in ((line[on].min(), line < line[on].min()), (line[on].max(), line > line[on].max())):
+        if beyond.any():
+            distance = np.where(beyond, np.abs(line - end), np.inf)
+            last, following = int(np.argmax(on & (line == end))), int(np.argmin(distance))
+            error = by_last[last] if np.isnan(by_next[following]) else by_next[following]
+            mean += 0.5 * float(distance[following] * error)
+    return mean
