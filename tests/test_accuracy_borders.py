@@ -24,8 +24,8 @@ STICK_MM2 = 180.4
 
 
 def refined(model: Model, factor: float) -> tuple[Problem, Problem, Log]:
-    said, problem = Log(), build(replace(model, mesh=replace(model.mesh, stick_refinement=factor)))
-    return problem, with_refined_borders(problem, said), said
+    said, finer = Log(), replace(model, mesh=replace(model.mesh, stick_refinement=factor))
+    return build(finer), with_refined_borders(finer, said), said
 
 
 @pytest.mark.slow
@@ -51,10 +51,16 @@ def test_the_area_of_a_thin_stick_zone_becomes_known() -> None:
 
 
 @pytest.mark.parametrize("mu", [0.0, 5.0])
-def test_without_a_border_of_stick_the_mesh_stays(mu: float) -> None:
-    before, after, said = refined(replace(half_cylinder(0.4), friction=Coulomb(mu)), 4.0)
-    assert after is before
-    assert said.lines == []
+@pytest.mark.parametrize("gauge_refinement", [1.0, 2.0])
+def test_without_a_border_of_stick_the_mesh_stays(mu: float, gauge_refinement: float) -> None:
+    plain = half_cylinder(0.4)
+    mesh = replace(plain.mesh, gauge_refinement=gauge_refinement)
+    before, after, said = refined(replace(plain, friction=Coulomb(mu), mesh=mesh), 4.0)
+    assert np.array_equal(after.mesh.points, before.mesh.points)
+    assert after.model == before.model
+    assert not [line for line in said.lines if "border of stick" in line]
+    # found on a mesh without shorter edges around the gauge
+    assert sum("condensing" in line for line in said.lines) == gauge_refinement
 
 
 def test_borders_of_a_section_lie_in_its_mesh_and_are_those_at_the_ends_of_legs() -> None:

@@ -173,8 +173,7 @@ def test_points_at_the_border_of_stick_are_foretold() -> None:
 
     plain = replace(baseline("solid"), gauges=(), mesh=MeshOptions(4.0, 10.0, "swept"))
     model = replace(plain, mesh=replace(plain.mesh, stick_refinement=3.5))
-    body = PressedBody(model)
-    body.refine_borders()
+    body = PressedBody.with_refined_borders(model)
     expected, without = forecast(model), forecast(plain)
     # seven solids had 0.75 to 1.21 times the contact points and 0.81 to 1.19 times the unknowns
     assert 0.67 < body.problem.size.contact_points / expected["contact_points"] < 1.5

@@ -18,6 +18,7 @@ from finger3d.contact.friction import SLIP, STICK
 from finger3d.fem.mesh.simplex import axis_numbers
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.progress import QUIET, Progress
@@ -32,28 +33,31 @@ _RATE = 1.0
 """Growth of the edge length per distance beyond."""
 
 
-def with_refined_borders(problem: Problem, report: Progress = QUIET) -> Problem:
-    """Return the problem on a mesh with edges of ``mesh.size_mm / mesh.stick_refinement`` at the border of stick.
+def with_refined_borders(model: Model, report: Progress = QUIET) -> Problem:
+    """Return the body on a mesh with edges of ``mesh.size_mm / mesh.stick_refinement`` at the border of stick.
 
-    The problem itself is returned if nothing slips, or if its press on the coarser mesh does not converge.
+    The coarser meshes that find the border have no shorter edges around gauges.  If nothing slips on one of them, or if
+    its press does not converge, the mesh stays as coarse at the contact.
 
     Raises
     ------
     Finger3dError
         If the refined mesh is estimated to need too much memory.
     """
-    options, factor = problem.model.mesh, 1.0
+    options, factor, borders = model.mesh, 1.0, None
     while factor < options.stick_refinement:
-        short, steps = short_press(problem)
+        coarse = build(replace(model, mesh=replace(options, gauge_refinement=1.0, borders=borders)), report)
+        short, steps = short_press(coarse)
         places = stick_borders(short, _ends_of_legs(short, steps)) if steps[-1].outcome.ok else np.zeros((0, 3))
+        if not len(places) and options.gauge_refinement == 1.0:
+            return coarse
         if not len(places):
-            return problem
+            break
         edge = options.size_mm / factor
         factor = min(2.0 * factor, options.stick_refinement)
         report.say(f"border of stick: edges of {options.size_mm / factor:.3g} mm")
         borders = SizedPlaces(places, options.size_mm / factor, _RATE, _REACH * edge)
-        problem = build(replace(problem.model, mesh=replace(options, borders=borders)), report)
-    return problem
+    return build(replace(model, mesh=replace(options, borders=borders)), report)
 
 
 def _ends_of_legs(problem: Problem, steps: Sequence[StepResult]) -> list[StepResult]:

@@ -215,7 +215,7 @@ def _relative_errors(
 def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; return its problem, its round, and the mesh graded towards the goal to try next."""
     start = time.perf_counter()
-    problem = with_refined_borders(build(model))
+    problem = with_refined_borders(model)
     short, steps = short_press(problem)
     if not steps[-1].outcome.ok:
         raise Finger3dError(f"the press did not converge on this mesh: {steps[-1].outcome}")

@@ -227,9 +227,7 @@ def _pressed(model: Model, report: Progress) -> Iterator[_Pilot]:
 
 def _pilot(model: Model, factor: float) -> _Pilot:
     start = time.perf_counter()
-    body = PressedBody(replace(model, mesh=_scaled(model, factor)))
-    body.refine_borders()
-    problem = body.problem
+    problem = PressedBody.with_refined_borders(replace(model, mesh=_scaled(model, factor))).problem
     meshed = problem.seconds["cad"] + problem.seconds["mesh"]
     steps, chosen = march_automatic(problem)
     if not steps[-1].outcome.ok:

@@ -125,9 +125,9 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
     report.stage("meshing")
-    body = PressedBody(scene.model(), report, refinement.problem if refinement else None)
-    if not (refinement and refinement.problem):
-        body.refine_borders()
+    model = scene.model()
+    known = refinement.problem if refinement else None
+    body = PressedBody(model, report, known) if known else PressedBody.with_refined_borders(model, report)
 
     def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:
         spent = before.all_factorizations if before else 0

@@ -176,6 +176,18 @@ class PressedBody:
         self._report, self.seconds = report, 0.0
         self.problem = problem or self._built(model)
 
+    @classmethod
+    def with_refined_borders(cls, model: Model, report: Progress = QUIET) -> PressedBody:
+        """Return a body with shorter edges at the border of stick, which is found on coarser meshes, if asked."""
+        if model.mesh.stick_refinement <= 1.0:
+            return cls(model, report)
+        from finger3d.accuracy.borders import with_refined_borders  # most bodies need none of it
+
+        start = time.perf_counter()
+        body = cls(model, report, with_refined_borders(model, report))
+        body.seconds = time.perf_counter() - start
+        return body
+
     def pressed(
         self, press: Callable[[Problem, Result | None], tuple[Result, Sequence[StepResult]]]
     ) -> tuple[Result, list[SurfaceCheck]]:
@@ -232,16 +244,6 @@ class PressedBody:
         ends, checks = self.pressed(press)
         depths = iter(checks)
         return [replace(end, penetration_mm=next(depths).penetration_mm) if end.outcome.ok else end for end in ends]
-
-    def refine_borders(self) -> None:
-        """Shorten the edges at the border of stick, which presses on coarser meshes find, if the model asks for it."""
-        if self.problem.model.mesh.stick_refinement <= 1.0:
-            return
-        from finger3d.accuracy.borders import with_refined_borders  # most bodies need none of it
-
-        start = time.perf_counter()
-        self.problem = with_refined_borders(self.problem, self._report)
-        self.seconds += time.perf_counter() - start
 
     def widen(self) -> None:
         """Condense the body to all points of its free faces."""

@@ -145,8 +145,7 @@ def sensitivity(
     if text := refusal(model):
         raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")
-    body = PressedBody(model, report)
-    body.refine_borders()
+    body = PressedBody.with_refined_borders(model, report)
     pressed = body.steps()
     if not pressed[-1].outcome.ok:
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
