@@ -42,8 +42,6 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if model.relaxation is not None and model.finite_strain:
-        return "derivatives are not known at large deformation with viscosity"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""

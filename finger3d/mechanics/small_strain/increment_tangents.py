@@ -176,17 +176,17 @@ class IncrementTangents:
     def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
         """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
         whole, parts = Move(self._pose, step.target).change, list[Part]()
-        before, start = self._state, 0.0
+        before, place, start = self._state, self._pose, 0.0
         for pose, after in step.parts:
             if status is not None and after is step.parts[-1][1]:
                 after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
-                linear = self._linearised(before, after, Move(self._pose, pose))
+                linear = self._linearised(before, after, Move(place, pose))
             except np.linalg.LinAlgError:
                 raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
             parts.append(Part(before, after, linear, start, share))
-            before, start = after, share
+            before, place, start = after, pose, share
         return parts
 
     def _begun(self, problem: Problem) -> Side:
