@@ -10,12 +10,12 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Foils, Leg, MeshOptions
+from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Taxel
 from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder, Plane, Sphere
-from tests.differences import assert_equal_to_differences, parameters
+from tests.differences import assert_equal_to_differences, object_parameters, parameters
 from tests.models import block, small_section
 from tests.viscous_cases import TWO
 
@@ -59,6 +59,14 @@ def test_every_derivative_is_that_of_presses(case: str) -> None:
     model = CASES[case]
     # the presses themselves are solved to a residual of 5e-9
     assert_equal_to_differences(build(model), parameters(model), tolerance=1e-5, step=2e-5)
+
+
+@pytest.mark.slow
+def test_derivatives_beside_an_elastic_object() -> None:
+    bar = replace(CASES["bar"].object, x_mm=0.1)
+    model = replace(CASES["bar"], object=bar, object_compliance=ElasticObject(3.0, 0.3, None))
+    ways = parameters(model) | object_parameters(model)
+    assert_equal_to_differences(build(model), ways, tolerance=1e-5, step=2e-5)
 
 
 @pytest.mark.slow

@@ -298,6 +298,9 @@ class IncrementTangents:
         delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
+        at_fixed_forces, force = fixed.displacement.copy(), self.problem.upright_force(contact).reshape(-1, 1)
+        for k, one in enumerate(self._variations):
+            at_fixed_forces[:, k] += one.object_displacement(force)[:, 0]
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
         increments = [
             Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker())
@@ -308,7 +311,7 @@ class IncrementTangents:
         errors = list[Float]()
         for _ in range(MOST):
             fixed_basis = linear.forces @ unknowns + direct
-            moved = delassus @ (fixed_basis + turned) + fixed.displacement
+            moved = delassus @ (fixed_basis + turned) + at_fixed_forces
             force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
             place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
             ends = [
