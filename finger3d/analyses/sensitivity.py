@@ -208,8 +208,7 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
 def has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
     flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
-    unstructured = problem.dim == 3 and problem.model.mesh.mesher != "swept"  # its cells are others each time
-    if (problem.dim == 2 and key.endswith(_IN_SOLIDS)) or (unstructured and key.startswith("finger.")):
+    if problem.dim == 2 and key.endswith(_IN_SOLIDS):
         return False
     if key.endswith("turn_z_deg") and has_exact_path(problem.model):
         return False  # beside the path there are increments

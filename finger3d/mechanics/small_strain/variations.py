@@ -6,6 +6,7 @@ derivative is ``L K^-1 (dL_c^T r - dK u) + dL u``, where dK and dL are central d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -17,9 +18,11 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
+from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solvers.condense import spring_forces
 from finger3d.fem.surface.traces import local_rows, restrict
+from finger3d.geometry.design import Design
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
 from finger3d.mechanics.discretise.elastic_object import object_mesh, response_of
 from finger3d.mechanics.discretise.foils import EmbeddedBars
@@ -33,6 +36,12 @@ from finger3d.progress import QUIET
 
 _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
+
+_VOLUME, _ROUND_OFF = 0.05, 1e-9
+"""Relative errors of the growth of a stretched body, and of its volume, that are those of its mesh."""
+
+_INSIDE = 1.0 - 1e-9
+"""Share of their distance from the axis at which points on the rim are inside in spite of round-off."""
 
 _IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
@@ -270,12 +279,37 @@ def _moved(mesh: Mesh, other: Mesh) -> Mesh:
     return replace(mesh, points=mesh.points + moved)
 
 
+def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
+    """Return an unstructured mesh of a design with the dimensions of another one of its kind.
+
+    The footprint stretches along x and z, and every vertical line from the base to the contact face stretches as well.
+
+    Raises
+    ------
+    Finger3dError
+        If the body is not that between its base and its contact face, or has parts.
+    """
+    points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
+    heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
+    stands = mesh.points[:, 1] > 0.0
+    points[stands, 1] *= heights[1][stands] / heights[0][stands]
+    moved = replace(mesh, points=points)
+    growth = curved_volume(moved) / curved_volume(mesh) - 1.0
+    wanted = other.volume_mm3 / design.volume_mm3 - 1.0
+    if design.part_labels or not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
+        raise Finger3dError("it changes the cells of the mesh")
+    return moved
+
+
 def _assembled(problem: Problem, end: Problem) -> _Assembled:
     """Return the problem of a changed model, with the compliance of another."""
     model, body, face = end.model, problem.body, problem.surface
     mesh, thickness = body.mesh, body.thickness
     if model.design != problem.model.design:
-        mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
+        if mesh.dim == 3 and model.mesh.mesher != "swept":
+            mesh = stretched(mesh, problem.model.design, model.design)
+        else:
+            mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
         thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
         free, own = (free_surface(problem.model, one, thickness) for one in (mesh, body.mesh))
         place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}
