@@ -133,7 +133,7 @@ class FiniteIncrementTangents(IncrementTangents):
             both = zip((step[:n], change), scales, strict=True)
             errors.append(np.max([np.abs(by).max(axis=0, initial=0.0) / scale for by, scale in both], axis=0))
             if are_converged(errors):
-                return [end.side(*one) for end, *one in zip(ends, sides, formulations, strict=True)]
+                return [end.side(*rest) for end, rest in zip(ends, zip(sides, formulations, strict=True), strict=True)]
         raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
 
 

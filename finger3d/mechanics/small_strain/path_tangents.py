@@ -90,7 +90,7 @@ class RestTangent(NamedTuple):
     @classmethod
     def of(cls, variations: Sequence[Variation], count: int) -> RestTangent:
         """Return the derivatives at `count` points."""
-        both = [(one, *(at_rest(end) for end in one.ends)) for one in variations]
+        both = [(one, at_rest(one.low), at_rest(one.high)) for one in variations]
         gap = [one.difference(low.gap, high.gap) for one, low, high in both]
         bases = [one.difference(low.own_bases, high.own_bases) for one, low, high in both]
         return cls(np.reshape(gap, (-1, count)), np.reshape(bases, (-1, count, 2, 2)))
