@@ -24,7 +24,7 @@ def solved() -> tuple[FiniteIncrement, State[DeformedBody]]:
     formulation = formulation_of(problem.model)
     assert isinstance(formulation, FiniteStrain)
     rest, pose = formulation.start(problem), targets(problem.model.legs)[0]
-    increment = formulation._increment(problem, rest, Move(problem.origin, pose), formulation.workspace())
+    increment = formulation.equations(problem, rest, Move(problem.origin, pose), formulation.workspace())
     state = increment.solve(None).state
     return increment, state
 

@@ -8,12 +8,10 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.fem.laws import NeoHooke
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import table_row
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.mechanics.small_strain.variations import variation
 from tests.differences import STEP, differentiated
 from tests.models import fig9
@@ -40,6 +38,3 @@ def test_what_changes_the_mesh_and_what_increments_define_is_refused() -> None:
         variation(problem, model, other, STEP)
     with pytest.raises(Finger3dError, match="rule"):
         differentiated(replace(problem, model=replace(model, rule="paper")), [])
-    slow = replace(model, relaxation=Relaxation(((0.3, 1.0),), True), hyperelastic_law=NeoHooke(1.0))
-    with pytest.raises(Finger3dError, match="large deformation with viscosity"):
-        differentiated(replace(problem, model=slow), [])

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
+from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise import build as building
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.small_strain.variations import variation
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.small_strain.variations import stretched, variation
+from finger3d.objects import Plane
+from tests.differences import assert_equal_to_differences, with_dimension
 from tests.models import half_cylinder
 
 
@@ -33,3 +42,43 @@ def test_what_changes_the_mesh_has_none() -> None:
     other = replace(model, mesh=replace(model.mesh, size_mm=0.25))
     with pytest.raises(Finger3dError, match="changes the mesh"):
         variation(build(model), model, other, 1e-3)
+
+
+CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)
+FINGERTIP = designs()["fingertip"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=3.0, width_mm=4.0, skin_mm=1.0)
+SLIDE = (Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.05, steps=2))
+UNSTRUCTURED = Model(
+    CLIPPED, Isotropic(1.0, 0.3), MeshOptions(1.0, 1.6, "ftetwild"), SLIDE, object=Plane(tilt=0.03), symmetry=(),
+    friction=Coulomb(0.3), gauges=(Gauge("g", 0.7, 2.1, 0.2, 0.5),),
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("design", [CLIPPED, designs()["hemisphere"](radius_mm=4.0)], ids=lambda design: design.name)
+def test_an_unstructured_mesh_stretches_with_the_dimensions(design: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = replace(UNSTRUCTURED, design=design)
+    problem = build(model)
+
+    def same_cells(other: Model, *_: object) -> object:
+        return stretched(problem.mesh, design, other.design), problem.body.report
+
+    monkeypatch.setattr(building, "mesh_part", same_cells)
+    assert_equal_to_differences(problem, {name: with_dimension(model, name) for name in design.dimensions})
+
+
+@pytest.mark.parametrize("name", CLIPPED.dimensions)
+def test_a_stretched_mesh_is_that_of_the_other_design(name: str) -> None:
+    problem = build(replace(UNSTRUCTURED, mesh=MeshOptions(0.8, 1.2, "swept")))
+    other = with_dimension(problem.model, name)(0.1).design
+    mesh = stretched(problem.mesh, CLIPPED, other)
+    x, y, z = mesh.points[np.unique(mesh.facets["contact"])].T
+    assert y == pytest.approx(other.top(x, z), abs=1e-8)
+    corner = [other.half_length_mm, other.height_mm, 0.5 * other.width_mm]
+    assert np.abs(mesh.points).max(axis=0) == pytest.approx(corner, rel=1e-6)
+    assert curved_volume(mesh) == pytest.approx(other.volume_mm3, rel=1e-4)
+
+
+def test_parts_do_not_follow_a_stretched_body() -> None:
+    problem = build(replace(UNSTRUCTURED, design=FINGERTIP, mesh=MeshOptions(1.0, 1.6, "swept")))
+    with pytest.raises(Finger3dError, match="changes the cells"):
+        stretched(problem.mesh, FINGERTIP, replace(FINGERTIP, skin_mm=1.1))

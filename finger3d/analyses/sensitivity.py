@@ -29,7 +29,7 @@ _KEYS = re.compile(
     r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
     r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
     r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
-    r"|effects\.(elastic_object\.(E_MPa|nu)|embedded_gauge\.(E_MPa|thickness_mm|width_mm)|kinetic_friction\.ratio)"
+    r"|effects\.(elastic_object\.(E_MPa|nu|height_mm)|embedded_gauge\.(E_MPa|thickness_mm|width_mm)|kinetic_friction\.ratio)"
     r"|press\.(leg\.\d+\.)?duration_s|effects\.viscosity\.prony\.\d+\.[01]"
 )
 """Keys that numbers have derivatives by; others change the mesh or the object."""
@@ -207,8 +207,7 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
 def has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
     flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
-    unstructured = problem.dim == 3 and problem.model.mesh.mesher != "swept"  # its cells are others each time
-    if (problem.dim == 2 and key.endswith(_IN_SOLIDS)) or (unstructured and key.startswith("finger.")):
+    if problem.dim == 2 and key.endswith(_IN_SOLIDS):
         return False
     if key.endswith("turn_z_deg") and has_exact_path(problem.model):
         return False  # beside the path there are increments

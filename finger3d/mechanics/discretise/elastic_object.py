@@ -74,11 +74,23 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: 
         Where the object touches the finger; its mesh is fine there.
     report : receives the messages
     """
-    model, axes, d = problem.model, problem.axes, problem.dim
     start = time.perf_counter()
-    body = ObjectBody(model, thing.height_mm or model.design.height_mm, zone, axes, report)
-    mesh, whole = body.mesh()
+    mesh, whole = object_mesh(problem, thing, zone, report)
     meshing = time.perf_counter() - start
+    report.say(f"condensing the object's {mesh.points.size} unknowns")
+    response = response_of(problem, thing, mesh, whole)
+    return replace(response, seconds={"object_mesh": meshing, **response.seconds})
+
+
+def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> tuple[Mesh, bool]:
+    """Return the mesh of an elastic object, and whether it is whole although only a part of the finger is meshed."""
+    model = problem.model
+    return ObjectBody(model, thing.height_mm or model.design.height_mm, zone, problem.axes, report).mesh()
+
+
+def response_of(problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool) -> ObjectResponse:
+    """Condense a mesh of an elastic object; see `object_mesh`."""
+    model, axes, d = problem.model, problem.axes, problem.dim
     trace = facing_trace(problem.surface, mesh, "contact")
     frame = vertical_frame(d)
     rows = sp.kron(trace, frame, format="csr")
@@ -86,14 +98,13 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: 
     if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
         rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
     elastic = Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
-    report.say(f"condensing the object's {mesh.points.size} unknowns")
     matrix = stiffness(mesh, elastic, problem.body.thickness)
     held = held_dofs(mesh, () if whole else axes, model.held_ends)
     condensed = condense(matrix, held, rows[problem.system.active_dofs])
     c = len(problem.surface.nodes)
     out = np.zeros((c * d, c * d))
     out[np.ix_(problem.system.active_dofs, problem.system.active_dofs)] = condensed.compliance / images
-    seconds = {"object_mesh": meshing, "object_condensation": condensed.seconds}
+    seconds = {"object_condensation": condensed.seconds}
     return ObjectResponse(out.reshape(c, d, c, d), condensed.factorizations, seconds)
 
 

@@ -19,6 +19,7 @@ from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.fem.tensors import determinant
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
+from finger3d.mechanics.finite_strain.equations import IncrementEquations
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement, IncrementToForce
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_strain.together import solve_together
@@ -90,7 +91,7 @@ class FiniteStrain:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
         if _moves_too_far(problem, state, move):
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
-        increment = self._increment(problem, state, move, workspace)
+        increment = self.equations(problem, state, move, workspace)
         return self._kept_outside(increment, self._remembered(increment, increment.solve(guess)))
 
     def increment_to_force(
@@ -102,7 +103,7 @@ class FiniteStrain:
         workspace: FiniteStrainWorkspace,
     ) -> tuple[Move, ContactSolution[State[DeformedBody]]] | None:
         """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
-        plain = self._increment(problem, start[0], move, workspace)
+        plain = self.equations(problem, start[0], move, workspace)
         increment = IncrementToForce(problem, plain.body, plain.start, move, workspace, wanted)
         move, solution = increment.solve_to_force(start[1])
         if not solution.outcome.ok or _moves_too_far(problem, start[0], move):
@@ -128,7 +129,7 @@ class FiniteStrain:
         if any(_moves_too_far(problem, state, move) for problem, (state, _) in zip(problems, starts, strict=True)):
             return [None] * len(problems)
         increments = [
-            self._increment(problem, state, move, workspace)
+            self.equations(problem, state, move, workspace)
             for problem, (state, _) in zip(problems, starts, strict=True)
         ]
         solutions = solve_together(increments, [guess for _, guess in starts], leader)
@@ -138,13 +139,14 @@ class FiniteStrain:
         ]
         return [one if one is not None and one.outcome.ok else None for one in accepted]
 
-    def _increment(
+    def equations(
         self,
         problem: Problem,
         state: State[DeformedBody],
         move: Move,
         workspace: FiniteStrainWorkspace,
     ) -> FiniteIncrement:
+        """Return the equations of an increment from a state, with the relaxation of the body over its time."""
         body = self.body(problem, workspace)
         memory = state.body.memory
         if self.relaxation is not None and memory is not None:
@@ -168,12 +170,18 @@ class FiniteStrain:
         self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
     ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution with the internal variables at the end of the increment."""
-        before, after = increment.start.body, solution.state.body
-        if not solution.outcome.ok or self.relaxation is None or before.memory is None:
+        if not solution.outcome.ok:
             return solution
-        strained = increment.body.relaxing_variables(after.unknowns, self.relaxation.bulk)
-        memory = Step(self.relaxation.prony, increment.move.duration_s).after(before.memory, strained)
-        return replace(solution, state=replace(solution.state, body=replace(after, memory=memory)))
+        return replace(solution, state=self.remembered(increment, solution.state))
+
+    def remembered(self, increment: IncrementEquations, state: State[DeformedBody]) -> State[DeformedBody]:
+        """Return a state at the end of an increment with its internal variables."""
+        before = increment.start.body.memory
+        if self.relaxation is None or before is None:
+            return state
+        strained = increment.body.relaxing_variables(state.body.unknowns, self.relaxation.bulk)
+        memory = Step(self.relaxation.prony, increment.move.duration_s).after(before, strained)
+        return replace(state, body=replace(state.body, memory=memory))
 
     def unknowns(self, problem: Problem, states: Sequence[State[DeformedBody]]) -> Iterator[Float]:
         """Yield all unknowns (N,) of each state."""

@@ -6,7 +6,8 @@ of the unknowns x by a parameter solve ::
     K du + dR - d(B^T r) = 0,   D dw + E dx = 0
 
 (`finger3d.mechanics.small_strain.increment_tangents`), where dR is the change of the internal forces at fixed
-displacements.  d(B^T r) and dw are central differences between two sides on the deformed surface; they hold how rows
+displacements; in a body that relaxes they follow from internal variables before, which differ between the two sides of
+a parameter.  d(B^T r) and dw are central differences between these sides on the deformed surface; they hold how rows
 and directions change with u.  The equations are solved by iteration with the tangent of the increment, factored once.
 """
 
@@ -25,7 +26,6 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.tensors import rotated_delassus
-from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
@@ -43,6 +43,9 @@ from finger3d.mechanics.small_strain.increment_tangents import (
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
+
+_IN_BODY = ("design", "material", "parts")
+"""What a parameter may change in the body."""
 
 
 @dataclass(frozen=True)
@@ -67,26 +70,25 @@ class FiniteIncrementTangents(IncrementTangents):
     formulation: FiniteStrain
 
     @cached_property
-    def _body(self) -> FiniteBody:
-        return self.formulation.body(self.problem)
+    def _workspaces(self) -> list[FiniteStrainWorkspace]:
+        """Workspaces (2 p,) with the bodies below and above each parameter; that of the press where it changes none."""
+        own, model = self._own, self.problem.model
+        return [
+            own
+            if all(getattr(end.model, name) == getattr(model, name) for name in _IN_BODY)
+            else FiniteStrainWorkspace()
+            for one in self._variations
+            for end in one.ends
+        ]
 
     @cached_property
-    def _bodies(self) -> list[tuple[FiniteBody, FiniteBody] | None]:
-        """Bodies (p,) below and above each parameter that changes material or dimensions; None for others."""
-        own = self.problem.model
-        here = (own.design, own.material, own.parts)
-        changed = [
-            any((end.model.design, end.model.material, end.model.parts) != here for end in one.ends)
-            for one in self._variations
-        ]
-        return [
-            (self.formulation.body(one.low), self.formulation.body(one.high)) if is_changed else None
-            for one, is_changed in zip(self._variations, changed, strict=True)
-        ]
+    def _own(self) -> FiniteStrainWorkspace:
+        return self.formulation.workspace()
 
     def _linearised(self, before: State[DeformedBody], after: State[DeformedBody], move: Move) -> _Linear:
         problem, contact = self.problem, after.contact
-        equations = IncrementEquations(problem, self._body, before, move, FiniteStrainWorkspace())
+        workspace = FiniteStrainWorkspace(bodies=self._own.bodies)
+        equations = self.formulation.equations(problem, before, move, workspace)
         linearisation = equations.linearise(equations.at(after.body.unknowns), contact.force)
         delassus, compliance = linearisation.delassus, problem.system.object_compliance
         if compliance is not None:
@@ -100,16 +102,16 @@ class FiniteIncrementTangents(IncrementTangents):
         problem, contact, x = self.problem, part.after.contact, part.after.body.unknowns
         linear, active, size = part.linear, problem.system.active_dofs, steps[1::2]
         p, n, largest = len(size), problem.mesh.points.size, np.abs(contact.force).max(initial=0.0)
-        workspace = FiniteStrainWorkspace()
+        workspaces = [*self._workspaces, *[self._own] * (len(sides) - len(self._workspaces))]  # those of poses
+        formulations = [FiniteStrain(self.formulation.law, side.problem.model.relaxation) for side in sides]
         equations = [
-            IncrementEquations(side.problem, self._body, side.state, move, workspace)
-            for side, move in zip(sides, moves, strict=True)
+            formulation.equations(side.problem, side.state, move, workspace)
+            for formulation, side, move, workspace in zip(formulations, sides, moves, workspaces, strict=True)
         ]
-
-        internal = np.zeros((len(x), p))  # of parameters that change the body
-        for k, (one, bodies) in enumerate(zip(self._variations, self._bodies, strict=True)):
-            if bodies is not None:
-                internal[:, k] = one.difference(*(body.internal_forces(x) for body in bodies))
+        internal = np.zeros((len(x), p))
+        for k, pair in enumerate(zip(equations[::2], equations[1::2], strict=True)):
+            if pair[0].body is not pair[1].body:
+                internal[:, k] = slopes([one.body.internal_forces(x) for one in pair], steps[2 * k :][:2])[:, 0]
         direct = slopes(rubbed(part, sides), steps)
         unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))
         errors = list[Float]()
@@ -131,7 +133,7 @@ class FiniteIncrementTangents(IncrementTangents):
             both = zip((step[:n], change), scales, strict=True)
             errors.append(np.max([np.abs(by).max(axis=0, initial=0.0) / scale for by, scale in both], axis=0))
             if are_converged(errors):
-                return [end.side(side, self.formulation) for end, side in zip(ends, sides, strict=True)]
+                return [end.side(*rest) for end, rest in zip(ends, zip(sides, formulations, strict=True), strict=True)]
         raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
 
 
@@ -157,7 +159,7 @@ class _End:
     def side(self, before: Side, formulation: FiniteStrain) -> Side:
         """Return the side at the end of the part."""
         problem, move = before.problem, self.equations.move
-        state = self.equations.reached(self.now, self.contact)
+        state = formulation.remembered(self.equations, self.equations.reached(self.now, self.contact))
         work, lost = energies(problem, [Substep(before.state, state, move)])
         found = formulation.readings(problem, state)
         read = np.array([found[column] for column in problem.model.columns])

@@ -22,11 +22,10 @@ from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
-from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, compliance_changes
+from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
 from finger3d.mechanics.small_strain.variations import Side, Variation
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
@@ -42,8 +41,6 @@ Numbers: TypeAlias = dict[str, float]
 
 def refusal(model: Model) -> str:
     """Return why the numbers of a press have no derivatives here; empty if they have."""
-    if model.relaxation is not None and model.finite_strain:
-        return "derivatives are not known at large deformation with viscosity"
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""
@@ -127,10 +124,8 @@ def _increment_tangents(
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangents:
     press, count = Press(problem), len(variations)
-    c = len(press.state.contact.gap)
-    ends = [[at_rest(end).gap for end in one.ends] for one in variations]
-    rest = np.array([one.difference(*gaps) for one, gaps in zip(variations, ends, strict=True)]).reshape(count, c)
-    moved = np.stack([rest, np.zeros_like(rest)], axis=2)
+    rest = RestTangent.of(variations, len(press.state.contact.gap))
+    moved = np.stack([rest.gap, np.zeros_like(rest.gap)], axis=2)
     tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
     changes, way = compliance_changes(problem, variations), stations(problem.model.legs)

@@ -85,14 +85,14 @@ class ExactPath:
         if last > (self.events[-1].share if self.events else -1.0):
             state = self._state(begin.state)
             solution = ContactSolution(state, self.outcome, np.inf, 0, "none", self.detail)
-            return PathPoint(solution, self._pose(begin), (0.0, 0.0))
+            return PathPoint(solution, self.pose(begin), (0.0, 0.0))
         end, done = self.at(last)
         way = [begin, *self.events[passed:done], end]
         crossed = self.events[passed : done + 1]
         residual = max((event.residual for event in crossed), default=0.0)
         systems = end.systems - begin.systems
         solution = ContactSolution(self._state(end.state), Outcome.CONVERGED, residual, systems, "events")
-        return PathPoint(solution, self._pose(end), self.energies(way))
+        return PathPoint(solution, self.pose(end), self.energies(way))
 
     def at(self, share: float) -> tuple[Event, int]:
         """Return the state at a share as an event, and the number of events up to there."""
@@ -109,7 +109,8 @@ class ExactPath:
         body = LinearBody(self.problem.delassus, np.zeros(self.bases.shape[:2]))
         return State(replace(contact, bases=self.bases), body.displacement(contact.force, self.bases))
 
-    def _pose(self, event: Event) -> ObjectPose:
+    def pose(self, event: Event) -> ObjectPose:
+        """Return the pose of the object at a place."""
         pose = self.move.end if event.share == 1.0 else self.move.at(event.share)
         return replace(pose, depth_mm=pose.depth_mm + event.amplitude)
 

@@ -8,7 +8,7 @@ geometry of the contact, and on the parameters through the state before and the 
 
 (`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
 parameter less and plus its step to first order.  They hold the curvature of the object, and where points touch within
-the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration.
+the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson 1965).
 
 Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
@@ -33,7 +33,7 @@ from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
+from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.mechanics.small_strain.variations import Side, Variation
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
@@ -41,6 +41,9 @@ from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 _CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
 """Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
 and the largest number of iterations."""
+
+_MEMORY = 8
+"""Iterations from which the next one is extrapolated."""
 
 _NEGLIGIBLE = 1e-7
 """Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
@@ -176,17 +179,17 @@ class IncrementTangents:
     def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
         """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
         whole, parts = Move(self._pose, step.target).change, list[Part]()
-        before, start = self._state, 0.0
+        before, place, start = self._state, self._pose, 0.0
         for pose, after in step.parts:
             if status is not None and after is step.parts[-1][1]:
                 after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
-                linear = self._linearised(before, after, Move(self._pose, pose))
+                linear = self._linearised(before, after, Move(place, pose))
             except np.linalg.LinAlgError:
                 raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
             parts.append(Part(before, after, linear, start, share))
-            before, start = after, share
+            before, place, start = after, pose, share
         return parts
 
     def _begun(self, problem: Problem) -> Side:
@@ -298,17 +301,21 @@ class IncrementTangents:
         delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
+        at_fixed_forces, force = fixed.displacement.copy(), self.problem.upright_force(contact).reshape(-1, 1)
+        for k, one in enumerate(self._variations):
+            at_fixed_forces[:, k] += one.object_displacement(force)[:, 0]
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
         increments = [
             Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker())
             for side, move in zip(sides, moves, strict=True)
         ]
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
-        unknowns, turned = np.zeros((linear.forces.shape[1], p)), np.zeros((c * d, p))
-        errors = list[Float]()
+        count = linear.forces.shape[1]
+        tried, results, errors = [np.zeros((count + c * d, p))], list[Float](), list[Float]()
         for _ in range(MOST):
+            unknowns, turned = tried[-1][:count], tried[-1][count:]
             fixed_basis = linear.forces @ unknowns + direct
-            moved = delassus @ (fixed_basis + turned) + fixed.displacement
+            moved = delassus @ (fixed_basis + turned) + at_fixed_forces
             force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
             place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
             ends = [
@@ -317,12 +324,14 @@ class IncrementTangents:
             ]
             turns = slopes([end.turned_force @ frame.T for end in ends], steps)
             change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
-            error = np.abs(np.concatenate([change, turns - turned])).max(axis=0, initial=0.0)
-            unknowns, turned = unknowns - change, turns
-            errors.append(error / derivative_scale(unknowns, largest, size))
+            results.append(np.concatenate([unknowns - change, turns]))
+            error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
+            errors.append(error / derivative_scale(unknowns - change, largest, size))
             if are_converged(errors):
                 reached = self._reached(part, fixed, [end.state for end in ends], sides, steps, moves)
                 return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
+            columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]
+            tried.append(np.column_stack([extrapolated(*both) for both in columns]))
         raise Finger3dError(
             f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
             "abruptly where it touches"

@@ -131,7 +131,7 @@ def solve_linearised(
     return solution.with_state(increment.reached(geometry, expansion_point, displacement, solution.state, None))
 
 
-def _extrapolated(tried: list[Float], results: list[Float]) -> Float:
+def extrapolated(tried: list[Float], results: list[Float]) -> Float:
     """Return the next displacement from those tried and those found from them, by Anderson's method."""
     if len(tried) == 1:
         return results[-1]
@@ -212,7 +212,7 @@ class Increment:
             tried, displacements = [*tried, seen[0]][-_MEMORY:], [*displacements, seen[1]][-_MEMORY:]
             expansion_point, following = displacement, after
             if len(tried) > 1:
-                expansion_point = _extrapolated(tried, displacements) - increment.lowered_by(self)
+                expansion_point = extrapolated(tried, displacements) - increment.lowered_by(self)
                 following = increment.geometry(expansion_point)
             geometry = following.holding(held, geometry)
         if error > TOLERANCE:

@@ -34,6 +34,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.variations import Side, Variation
@@ -77,6 +78,24 @@ class PathTangent:
         return event._replace(share=share, amplitude=amplitude, state=state)
 
 
+class RestTangent(NamedTuple):
+    """Derivatives of the contact at rest by p parameters: gaps (p, c), and directions (p, c, 2, 2) of the points.
+
+    Directions change with the share of an elastic object in the compliance.
+    """
+
+    gap: Float
+    bases: Float
+
+    @classmethod
+    def of(cls, variations: Sequence[Variation], count: int) -> RestTangent:
+        """Return the derivatives at `count` points."""
+        both = [(one, at_rest(one.low), at_rest(one.high)) for one in variations]
+        gap = [one.difference(low.gap, high.gap) for one, low, high in both]
+        bases = [one.difference(low.own_bases, high.own_bases) for one, low, high in both]
+        return cls(np.reshape(gap, (-1, count)), np.reshape(bases, (-1, count, 2, 2)))
+
+
 class PlaceOnPath(NamedTuple):
     """Derivatives at a place on a path and at an event before, and those (2, p) of work and dissipation up to it.
 
@@ -95,7 +114,7 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
     They are in the directions of an upright object; None where a parameter changes nothing in the body.
     """
     active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
-    if not any(one.body for one in variations):
+    if not any(one.changes_compliance for one in variations):
         return [None] * len(variations)
     unknowns = problem.unknowns_of_rows(np.eye(count, len(active)))
     force = np.zeros((problem.surface.points.size, len(active)))
@@ -106,8 +125,12 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
         out[:, active] = rows
         return out
 
-    found = [one.body.of(problem, unknowns, force) if one.body else None for one in variations]
-    return [(dense(pair[0]), dense(pair[1])) if pair else None for pair in found]
+    def changes(one: Variation) -> tuple[Float, Float]:
+        none = np.zeros_like(force), np.zeros((len(problem.system.reading_rows), len(active)))
+        moved, read = one.body.of(problem, unknowns, force) if one.body else none
+        return dense(moved + one.object_displacement(force)), dense(read)
+
+    return [changes(one) if one.changes_compliance else None for one in variations]
 
 
 class PathTangents:
@@ -118,7 +141,7 @@ class PathTangents:
     path : of the leg
     variations : of p parameters
     changes : (p,), see `compliance_changes`
-    rest : (p, c), derivatives of the gaps at rest
+    rest : derivatives of the contact at rest
     start : derivatives of the state at the start of the leg
     motion : (p, 2), those of the displacement of the object there
     leg : number of the leg
@@ -129,14 +152,23 @@ class PathTangents:
         path: ExactPath,
         variations: Sequence[Variation],
         changes: Sequence[tuple[Float, Float] | None],
-        rest: Float,
+        rest: RestTangent,
         start: PathTangent,
         motion: Float,
         leg: int,
     ) -> None:
         self.path, self.variations, self._rest = path, variations, rest
         self._delassus = self._local(path.problem.delassus)
-        self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
+        self._changes = [
+            change and self._local(change[0].reshape(path.problem.delassus.shape)) + self._turned(turn)
+            for change, turn in zip(changes, rest.bases, strict=True)
+        ]
+        # gaps close along the normal of the object, which is not that of the points if it is elastic
+        self._closing = path.bases.copy()
+        self._closing[:, 0] = (
+            path.problem.surface.average
+            @ path.problem.placed(path.move.start).distance(path.problem.surface.samples)[1]
+        )
         none = np.zeros((len(path.problem.system.reading_rows), path.bases[:, 0].size))
         self._reading_changes = [none if change is None else change[1] for change in changes]
         self._mu = np.array(
@@ -153,7 +185,10 @@ class PathTangents:
             at_end = [
                 one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
             ]
-            self._force_slopes = np.einsum("ca,pca->p", self._weights, start.force), np.array(at_end)
+            self._turned_weights = -path.count[:, None] * rest.bases[..., 1]
+            begin = np.einsum("ca,pca->p", self._weights, start.force)
+            begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
+            self._force_slopes = begin, np.array(at_end)
         self._motions = motion, end
         self._events, self._tangents = [path.start], [start]
         for piece, event in enumerate(path.events):
@@ -193,6 +228,7 @@ class PathTangents:
             read = self._reading_changes[k] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
                 moved = place.tangent.changed(here, k, t).state
+                moved = replace(moved, bases=moved.own_bases + t * self._rest.bases[k])
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
@@ -231,17 +267,23 @@ class PathTangents:
         turned = rotated_delassus(compliance, self.path.bases @ vertical_frame(2).T, np.arange(c))
         return np.asarray(turned.reshape(2 * c, 2 * c))
 
+    def _turned(self, turn: Float) -> Float:
+        """Return the derivative (2 c, 2 c) of the compliance as the directions of the points turn, by (c, 2, 2)."""
+        own, other = (bases @ vertical_frame(2).T for bases in (self.path.bases, turn))
+        half = np.einsum("cai,ciej,ebj->caeb", other, self.path.problem.delassus, own).reshape(2 * len(turn), -1)
+        return np.asarray(half + half.T)
+
     def _moved_path(self, k: int, t: float) -> ExactPath:
         move = self.path.move
         start, end = (moved_pose(p, t * m[k]) for p, m in zip((move.start, move.end), self._motions, strict=True))
-        return replace(self.path, move=Move(start, end))
+        return replace(self.path, move=Move(start, end), bases=self.path.bases + t * self._rest.bases[k])
 
     def _at_event(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""
         before, last = self._events[piece], self._tangents[piece]
         way = event.share - before.share
         if way <= _SAME_PLACE:
-            return self._at_touch(event, last) if event.amplitude > before.amplitude else last
+            return self._at_touch(before, event, last) if event.amplitude > before.amplitude else last
         force, moved = event.state.force - before.state.force, _relative(event.state) - _relative(before.state)
         if event.is_increment and np.abs(force).max() > _JUMPED * np.abs(self.path.events[-1].state.force).max():
             raise Finger3dError("the forces jump on the path of this press, and have no derivatives there")
@@ -276,14 +318,16 @@ class PathTangents:
         own = self.path.problem.model.friction.mu
         return np.asarray(own * force[:, 0] + mu * at[0] - np.sign(at[1]) * force[:, 1])
 
-    def _at_touch(self, event: Event, last: PathTangent) -> PathTangent:
+    def _at_touch(self, before: Event, event: Event, last: PathTangent) -> PathTangent:
         """Return the derivatives where the object touches first, to which it moves before there is any force."""
         point = int(np.argmin(event.state.gap))
-        closing = self.path.bases[:, :, 1]
+        closing = self._closing[:, :, 1]
         amplitude = -last.displacement[:, point, 0] / closing[point, 0]
+        moved = last.displacement + amplitude[:, None, None] * closing
+        moved[:, :, 1] += (event.amplitude - before.amplitude) * self._rest.bases[:, :, 1, 1]
         return replace(
             last,
-            displacement=last.displacement + amplitude[:, None, None] * closing,
+            displacement=moved,
             amplitude=last.amplitude + amplitude,
         )
 
@@ -298,8 +342,9 @@ class PathTangents:
         base = np.zeros((count, c, 2))
         base[:, slips, 1] = (self._mu[:, None] * (sign * force[:, 0]))[:, slips]
         fixed = replace(last, amplitude=np.zeros(count))
-        free = -np.einsum("cak,pk->pca", self.path.bases, self.motion(fixed, share))
-        free[:, :, 0] += self._rest
+        free = -np.einsum("cak,pk->pca", self._closing, self.motion(fixed, share))
+        free[:, :, 0] += self._rest.gap
+        free[:, :, 1] -= self._rest.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
         for k, change in enumerate(self._changes):
             if change is not None:
                 free[k] += (change @ force.ravel()).reshape(c, 2)
@@ -321,10 +366,11 @@ class PathTangents:
         matrix, right = through[rows], (target - free).reshape(count, -1)[:, rows]
         motion = np.zeros((2 * c, 0))
         if self._weights is not None:
-            motion = self.path.bases[:, :, 1].reshape(-1, 1)
+            motion = self._closing[:, :, 1].reshape(-1, 1)
             resultant = unknowns.T @ self._weights.ravel()
             wanted = (1.0 - share) * self._force_slopes[0] + share * self._force_slopes[1]
             wanted = wanted - np.einsum("ca,pca->p", self._weights, base)
+            wanted -= np.einsum("pca,ca->p", self._turned_weights, force)
             matrix = np.block([[matrix, motion[rows]], [resultant[None], np.zeros((1, 1))]])
             right = np.column_stack([right, wanted])
         solved = np.linalg.solve(matrix, right.T) if len(matrix) else np.zeros((0, count))

@@ -6,6 +6,7 @@ derivative is ``L K^-1 (dL_c^T r - dK u) + dL u``, where dK and dL are central d
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -17,11 +18,13 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
+from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solvers.condense import spring_forces
 from finger3d.fem.surface.traces import local_rows, restrict
+from finger3d.geometry.design import Design
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
-from finger3d.mechanics.discretise.elastic_object import object_response
+from finger3d.mechanics.discretise.elastic_object import object_mesh, response_of
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
@@ -33,6 +36,12 @@ from finger3d.progress import QUIET
 
 _FARTHEST = 1e-2
 """Motion of the vertices, over the least size of the body, beyond which they are others."""
+
+_VOLUME, _ROUND_OFF = 0.05, 1e-9
+"""Relative errors of the growth of a stretched body, and of its volume, that are those of its mesh."""
+
+_INSIDE = 1.0 - 1e-9
+"""Share of their distance from the axis at which points on the rim are inside in spite of round-off."""
 
 _IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
@@ -122,37 +131,37 @@ class BodyChange:
 
 
 @dataclass(frozen=True)
-class ComplianceChange:
-    """Derivatives by a parameter of the compliance of contact points (c d, c d) and of readings (g, c d)."""
-
-    compliance: Float
-    readings: Float
-
-    def of(self, problem: Problem, unknowns: Float, force: Float) -> tuple[Float, Float]:
-        """Return the derivatives of contact displacements (c d, k) and readings (g, k), as of a `BodyChange`."""
-        return self.compliance @ force, self.readings @ force
-
-
-@dataclass(frozen=True)
 class Variation:
     """A parameter of a press, by the problem at its value less and plus a small step, with the same contact points.
 
     Attributes
     ----------
-    low, high : with the compliance of the press itself
+    low, high : with the compliance of the press itself, but for that of an elastic object
     step : of the parameter
-    body : what changes in the body; None if nothing does
+    body : what changes in the finger's body; None if nothing does
     """
 
     low: Problem
     high: Problem
     step: float
-    body: BodyChange | ComplianceChange | None
+    body: BodyChange | None
 
     @property
     def ends(self) -> tuple[Problem, Problem]:
         """Both problems."""
         return self.low, self.high
+
+    @property
+    def changes_compliance(self) -> bool:
+        """Whether the finger's body changes, or an elastic object."""
+        return self.body is not None or self.low.system.object_compliance is not self.high.system.object_compliance
+
+    def object_displacement(self, force: Float) -> Float:
+        """Return the derivatives (c d, k) of an elastic object's displacement at fixed contact forces (c d, k)."""
+        low, high = (end.system.object_compliance for end in self.ends)
+        if low is high or low is None or high is None:
+            return np.zeros_like(force)
+        return np.asarray(self.difference(low, high).reshape(len(force), -1) @ force)
 
     def difference(self, low: Float | float, high: Float | float) -> Float:
         """Return the central difference of two values."""
@@ -162,7 +171,7 @@ class Variation:
 def variation(problem: Problem, low: Model, high: Model, step: float) -> Variation:
     """Return the variation between two models; the mesh moves with the dimensions of the design.
 
-    They may differ in friction, path, object, materials, readings, and in dimensions that keep the cells of the mesh.
+    They may differ in friction, path, object, materials, readings, and in dimensions that keep the cells of the meshes.
 
     Raises
     ------
@@ -184,7 +193,7 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         for model, touch in zip(models, touches, strict=True)
     ]
     changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
-    change: BodyChange | ComplianceChange | None = None
+    change = None
     if changed & {*_IN_BODY, "inclusions"}:
         if own.inclusions is not None and not own.is_linear_elastic:
             raise Finger3dError("it changes foils or the body beside them, at large deformation or with viscosity")
@@ -192,12 +201,6 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
         ends, change = [below.problem, above.problem], _change(problem, below, above, step)
     if own.object_compliance is not None:
         ends = _beside_object(problem, ends, step, change)
-        if "object_compliance" in changed:
-            size = problem.surface.points.size
-            softer, stiffer = (np.asarray(end.system.object_compliance) for end in ends)
-            delassus = (stiffer - softer) / (2.0 * step)
-            none = np.zeros((len(problem.system.reading_rows), size))
-            change = ComplianceChange(delassus.reshape(size, size), none)
     return Variation(ends[0], ends[1], step, change)
 
 
@@ -215,15 +218,11 @@ def _change(problem: Problem, below: _Assembled, above: _Assembled, step: float)
     return replace(change, foils=FoilChange((whole[1] - whole[0])[:, -count:] / (2.0 * step) - of_mesh, stiff))
 
 
-def _beside_object(
-    problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | ComplianceChange | None
-) -> list[Problem]:
+def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | None) -> list[Problem]:
     """Return problems with the compliance of an elastic object by their models, and its share by both bodies."""
     system, face, image = problem.system, problem.surface, problem.symmetry.image_of
     assert system.object_compliance is not None
     assert system.object_share is not None
-    if any((end.model.design, end.model.object) != (problem.model.design, problem.model.object) for end in ends):
-        raise Finger3dError("it changes the mesh of an elastic object")
     pressed = np.zeros(face.points.shape)
     pressed[:, 0] = face.area
     yielding, slope = system.delassus - system.object_compliance, np.zeros(len(pressed))
@@ -233,7 +232,7 @@ def _beside_object(
     out = []
     for end, t in zip(ends, (-step, step), strict=True):
         thing, scale = _object_compliance(problem, end), 1.0 + t * slope / soft
-        share, points = object_share(face, yielding * scale[:, None, None, None], thing), end.system.points
+        share, points = object_share(end.surface, yielding * scale[:, None, None, None], thing), end.system.points
         compliance = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
         points = replace(points, compliance=compliance)
         out.append(replace(end, system=replace(end.system, object_compliance=thing, object_share=share, points=points)))
@@ -241,18 +240,22 @@ def _beside_object(
 
 
 def _object_compliance(problem: Problem, end: Problem) -> Float:
-    """Return the compliance (c, d, c, d) of an elastic object, whose moduli alone may differ from those of a press."""
+    """Return the compliance (c, d, c, d) of an elastic object, whose mesh moves with the dimensions of both bodies."""
     own, thing, model = problem.model.object_compliance, end.model.object_compliance, problem.model
     assert own is not None
     assert thing is not None
     assert problem.system.object_compliance is not None
-    if replace(thing, E_MPa=own.E_MPa) == own:
+    is_moved = (end.model.design, end.model.object) != (model.design, model.object)
+    if not is_moved and thing == own:
+        return problem.system.object_compliance
+    if not is_moved and replace(thing, E_MPa=own.E_MPa) == own:
         return own.E_MPa / thing.E_MPa * problem.system.object_compliance
     held = model.object.held_body(model.design, problem.dim == 3)
-    is_meshed_anew = problem.dim == 3 and held is not None and held.mesher != "swept"
-    if replace(thing, E_MPa=own.E_MPa, nu=own.nu) != own or is_meshed_anew:
+    if problem.dim == 3 and held is not None and held.mesher != "swept":
         raise Finger3dError("it changes the mesh of an elastic object")
-    return object_response(problem, thing, model.first_contact.contact_box, QUIET).compliance
+    zone = model.first_contact.contact_box
+    (mesh, whole), (other, _) = object_mesh(problem, own, zone, QUIET), object_mesh(end, thing, zone, QUIET)
+    return response_of(end, thing, _moved(mesh, other), whole).compliance
 
 
 class _Assembled(NamedTuple):
@@ -276,12 +279,37 @@ def _moved(mesh: Mesh, other: Mesh) -> Mesh:
     return replace(mesh, points=mesh.points + moved)
 
 
+def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
+    """Return an unstructured mesh of a design with the dimensions of another one of its kind.
+
+    The footprint stretches along x and z, and every vertical line from the base to the contact face stretches as well.
+
+    Raises
+    ------
+    Finger3dError
+        If the body is not that between its base and its contact face, or has parts.
+    """
+    points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
+    heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
+    stands = mesh.points[:, 1] > 0.0
+    points[stands, 1] *= heights[1][stands] / heights[0][stands]
+    moved = replace(mesh, points=points)
+    growth = curved_volume(moved) / curved_volume(mesh) - 1.0
+    wanted = other.volume_mm3 / design.volume_mm3 - 1.0
+    if design.part_labels or not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
+        raise Finger3dError("it changes the cells of the mesh")
+    return moved
+
+
 def _assembled(problem: Problem, end: Problem) -> _Assembled:
     """Return the problem of a changed model, with the compliance of another."""
     model, body, face = end.model, problem.body, problem.surface
     mesh, thickness = body.mesh, body.thickness
     if model.design != problem.model.design:
-        mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
+        if mesh.dim == 3 and model.mesh.mesher != "swept":
+            mesh = stretched(mesh, problem.model.design, model.design)
+        else:
+            mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
         thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
         free, own = (free_surface(problem.model, one, thickness) for one in (mesh, body.mesh))
         place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}

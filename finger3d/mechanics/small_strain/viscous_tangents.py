@@ -26,7 +26,7 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, Linear, Part, slopes
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
-from finger3d.mechanics.small_strain.variations import BodyChange, ComplianceChange, Side, Variation
+from finger3d.mechanics.small_strain.variations import Side, Variation
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody, with_spring_forces
 from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
 from finger3d.objects import Move
@@ -62,7 +62,7 @@ class ViscousTangents(IncrementTangents):
         super().__init__(problem, variations, steps)
         self._workspace = self.formulation.workspace()
         bodies = [one.body for one in variations for _ in one.ends]
-        self._workspaces = [RelaxationWorkspace() if isinstance(b, BodyChange) else self._workspace for b in bodies]
+        self._workspaces = [RelaxationWorkspace() if b else self._workspace for b in bodies]
 
     def _linearised(self, before: State[ViscousBody], after: State[ViscousBody], move: Move) -> _Linear:
         step = Step(self.formulation.relaxation.prony, move.duration_s)
@@ -87,9 +87,6 @@ class ViscousTangents(IncrementTangents):
             elastic[active] = memory.elastic[: len(active)]
             now, then = self._changes(np.stack([elastic.reshape(force.shape), force]), len(steps) // 2)
         moved = now.displacement
-        for k, one in enumerate(self._variations):
-            if isinstance(one.body, ComplianceChange):  # of an elastic object, which does not relax
-                moved[:, k] = one.body.compliance @ force.ravel()
         rows, compliance = body.read(variables), part.linear.response.compliance
         rows[: len(active)] += moved[active]
         rows[len(active) :][: len(now.readings)] += now.readings
@@ -118,7 +115,7 @@ class ViscousTangents(IncrementTangents):
         load = -slopes(internal, steps)
         rows = FixedForces(np.zeros((len(force), len(steps) // 2)), np.zeros((len(self._columns), len(steps) // 2)))
         for k, one in enumerate(self._variations):
-            if isinstance(one.body, BodyChange):
+            if one.body:
                 load[:, k] += one.body.contact.T @ force
                 rows.displacement[:, k] = one.body.contact @ now[: len(load)]
                 rows.readings[:, k] = one.body.readings @ now[: len(load)]
