@@ -60,8 +60,9 @@ _PLACES = {
 _THIN = 0.35
 """Error of an end of stick on a line over the length before it in which the zone is not three points wide."""
 
-_AT_ENDS = {2: 1.0, 3: 4.0}
-"""Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others."""
+_AT_ENDS, _AT_END_OF_WIDTH = {2: 1.0, 3: 3.8}, 5.5
+"""Error of an end of contact on a line over that of its edge on average: on a plane of symmetry hats are others.  The
+second is that at half the width on unstructured meshes and at large deformation."""
 
 _ONE_POINT = 0.375
 """Error of the area of a zone of one point, or of none that may hide between the points, over that of a point."""
@@ -172,8 +173,10 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, model
         found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
     if points.dim == 3:
         end = points.end_line()
+        if model.finite_strain or model.mesh.mesher != "swept":
+            at_edge = np.full(len(touching), min(_AT_END_OF_WIDTH * edge, _CORNER))
         reach = 0.5 * float(np.ptp(end[0][touching[end[1]]])) if touching[end[1]].any() else 0.0
-        found["contact_half_length_end_mm"] = _half_length_bar(points, at_ends["contact"], touching, end, reach)
+        found["contact_half_length_end_mm"] = _half_length_bar(points, (at_edge, at_edge, 0.0), touching, end, reach)
     found["contact_length_end_mm"] = 2.0 * found.get("contact_half_length_end_mm", found["contact_half_length_mm"])
     if points.dim == 3 and touching.any():
         extent = max(0.5 * float(np.ptp(points.points[touching, 2])), along_z_mm)
