@@ -10,8 +10,9 @@ deformation.
 
 Each full run draws other sections and solids, with a seed that its rows state, and judges them apart, since the factors
 of the bars were chosen on the scenes that stay, some in sections on those drawn with the seeds 11, 12 and 1196257407,
-and those of zones on those drawn with the seeds 31 and 1763572160.  Increments are judged on drawn sections only, against 1280.  All bars are those of
-finger3d.accuracy.estimate.estimate, as a press has them; a number without a bar counts as outside of it.
+and those of zones on those drawn with the seeds 31 and 1763572160.  Increments are judged on drawn sections only,
+against 1280.  All bars are those of finger3d.accuracy.estimate.estimate, as a press has them; a number without a bar
+counts as outside of it.
 """
 
 from __future__ import annotations
