@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from finger3d.contact.friction import OPEN
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import MeshObject, ObjectPose, PlacedObject, Sphere
+from finger3d.scene import scene_of
 from tests.bodies import ball, box
 from tests.object_cases import pad, pressed
+
+GEAR = Path(__file__).parents[1] / "geometries" / "gear.stl"
 
 
 def test_a_mesh_object_stands_on_its_lowest_point() -> None:
@@ -56,3 +63,21 @@ def test_a_ball_has_no_edges_where_contact_ends_and_a_box_has() -> None:
     assert not MeshObject(surface=ball(5.0)).has_edges
     assert MeshObject(surface=box(2.0, 3.0, 4.0)).has_edges
     assert not Sphere(radius_mm=5.0).has_edges
+
+
+def test_points_in_contact_beside_a_gear_lie_on_its_teeth() -> None:
+    # the gap of a point is a mean over samples of the finger's face, some of which are far from any tooth
+    scene = scene_of(
+        {
+            "finger": {"geometry": "block", "half_length_mm": 8.0, "height_mm": 6.0, "width_mm": 6.0},
+            "material": {"E_MPa": 1.0, "nu": 0.4}, "friction": {"mu": 2.0}, "press": {"depth_mm": 0.8, "steps": 4},
+            "object": {"shape": "mesh", "path": str(GEAR), "x_mm": -1.952}, "model": {"domain": "plane-strain"},
+            "mesh": {"size_mm": 0.8, "base_size_mm": 1.6, "mesher": "swept"},
+        }
+    )  # fmt: skip
+    for step in march(build(scene.model())):
+        assert step.outcome.ok
+        closed = step.state.status != OPEN
+        assert closed.any()
+        # the tolerance of the iteration, over the depth
+        assert np.abs(step.state.gap[closed]).max() <= 1e-8 * step.target.depth_mm

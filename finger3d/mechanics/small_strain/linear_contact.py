@@ -199,8 +199,11 @@ class Increment:
                     break
                 geometry = increment.geometry(expansion_point)
                 continue
-            after = increment.geometry(displacement).holding(held, geometry)
-            error = max(increment.error(after, after.angles(geometry), displacement, solution.state), apart)
+            for within in (_NEAR, np.inf):  # means over points of which some are far need exact distances in the end
+                after = increment.geometry(displacement, within).holding(held, geometry)
+                error = max(increment.error(after, after.angles(geometry), displacement, solution.state), apart)
+                if error > _TARGET:
+                    break
             if error <= _TARGET:
                 break
             settled += apart <= _HOLD_ABOVE
