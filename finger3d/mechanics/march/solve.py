@@ -104,14 +104,13 @@ class Press:
         self._cancel, self._report = cancel, report
         self._is_exact = has_exact_path(problem.model) and problem.contact_geometry is None
         self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
-        # in small strain without bulk relaxation, an increment of another duration costs a factorisation
-        model = problem.model
-        self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
+        # in a solid whose shear modulus alone relaxes, an increment of another duration costs a factorisation
+        is_cheap = problem.dim == 2 or not problem.model.refactorises or problem.model.finite_strain
+        self._may_cut = is_cheap and not problem.model.is_defined_by_increments
         self._previous: tuple[Move, Float] | None = None
         self.path: ExactPath | None = None
         self._leg: tuple[ObjectPose, float | None] | None = None
-        self._share = 1.0
-        self._work = self._dissipation = 0.0
+        self._share, self._work, self._dissipation = 1.0, 0.0, 0.0
         self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
         self._station: Station | None = None
         self._left = np.zeros(2)  # slides at the start of the leg, less those of the path
@@ -192,7 +191,8 @@ class Press:
     def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
         """Return the motions in which an increment to a pose is solved: several where contact begins."""
         move = Move(self.pose, pose)
-        return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
+        begins = self._may_cut and move.may_close_gaps and not self.state.contact.force.any()
+        return move.cut(*_FIRST_PARTS) if begins else (move,)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
         moves = self.moves_to(pose)
