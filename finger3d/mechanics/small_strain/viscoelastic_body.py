@@ -22,7 +22,7 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Prony, Step, relaxed
 
 _FACTORS_KEPT = 5
-"""Number of condensations kept, each with a factor: a path rarely has more than two lengths of step beside three parts."""
+"""Number of condensations kept, each with a factor: few paths have more than two lengths of step beside three parts."""
 
 
 @dataclass
