@@ -5,7 +5,7 @@ A pose is the depth, the slides and the turns since first touch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -81,6 +81,12 @@ class Move:
     def duration_s(self) -> float:
         """Time that it takes, s."""
         return self.end.time_s - self.start.time_s
+
+    @property
+    def may_close_gaps(self) -> bool:
+        """Whether the object moves, and does not rise."""
+        at_rest = replace(self.end, time_s=self.start.time_s) == self.start
+        return self.end.depth_mm >= self.start.depth_mm and not at_rest
 
     def at(self, share: float) -> ObjectPose:
         """Return the pose a share of the way from the start to the end."""

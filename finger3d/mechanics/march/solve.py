@@ -97,24 +97,23 @@ class Press:
         cancel: Event | None = None,
         report: Progress = QUIET,
     ) -> None:
-        self.problem, self.formulation = problem, formulation_of(problem.model)
+        model, self.problem, self.formulation = problem.model, problem, formulation_of(problem.model)
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
-        self.has_failed = False
-        self._cancel, self._report = cancel, report
-        self._is_exact = has_exact_path(problem.model) and problem.contact_geometry is None
-        self._cuts = 0 if problem.model.rule in STEP_DEPENDENT_RULES else _CUTS
-        # in small strain without bulk relaxation, an increment of another duration costs a factorisation
-        model = problem.model
-        self._may_cut = not model.is_defined_by_increments and (model.finite_strain or model.relaxation is None)
+        self.has_failed, self._cancel, self._report = False, cancel, report
+        self._is_exact = has_exact_path(model) and problem.contact_geometry is None
+        self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS
+        # a part has a share of the depth, not of a prescribed force; without bulk relaxation it costs a factorisation
+        costs = any(leg.is_under_force for leg in model.legs) or (problem.dim == 3 and model.refactorises)
+        relaxes = model.relaxation is not None and not model.finite_strain
+        self._may_cut = not (model.is_defined_by_increments or (relaxes and costs))
         self._previous: tuple[Move, Float] | None = None
         self.path: ExactPath | None = None
         self._leg: tuple[ObjectPose, float | None] | None = None
-        self._share = 1.0
-        self._work = self._dissipation = 0.0
-        self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
+        self._share, self._work, self._dissipation = 1.0, 0.0, 0.0
         self._station: Station | None = None
-        self._left = np.zeros(2)  # slides at the start of the leg, less those of the path
+        self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
+        self._left: Float = np.zeros(2)  # slides at the start of the leg, less those of the path
         self._stiffness: Float | None = None  # of the last increment under tangential forces
         self._before: tuple[State[Any], float, float] | None = None
         body = problem.without_inclusions
@@ -192,7 +191,8 @@ class Press:
     def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
         """Return the motions in which an increment to a pose is solved: several where contact begins."""
         move = Move(self.pose, pose)
-        return move.cut(*_FIRST_PARTS) if self._may_cut and not self.state.contact.force.any() else (move,)
+        begins = self._may_cut and move.may_close_gaps and not self.state.contact.force.any()
+        return move.cut(*_FIRST_PARTS) if begins else (move,)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
         moves = self.moves_to(pose)

@@ -22,7 +22,7 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Prony, Step, relaxed
 
 _FACTORS_KEPT = 5
-"""Number of condensations kept; each holds a factor, and a path rarely has more than four lengths of step."""
+"""Number of condensations kept, each with a factor: few paths have more than two lengths of step beside three parts."""
 
 
 @dataclass
