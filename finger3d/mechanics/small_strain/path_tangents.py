@@ -65,17 +65,15 @@ class PathTangent:
     share: Float
     amplitude: Float
 
-    def changed(self, event: Event, k: int, t: float) -> Event:
-        """Return the place with parameter k changed by t."""
+    def changed(self, state: ContactState, k: int, t: float) -> ContactState:
+        """Return the state at the place with parameter k changed by t."""
         moved = t * self.displacement[k]
-        state = replace(
-            event.state,
-            force=event.state.force + t * self.force[k],
-            gap=event.state.gap + moved[:, 0],
-            tangential_displacement=event.state.tangential_displacement + moved[:, 1:],
+        return replace(
+            state,
+            force=state.force + t * self.force[k],
+            gap=state.gap + moved[:, 0],
+            tangential_displacement=state.tangential_displacement + moved[:, 1:],
         )
-        share, amplitude = event.share + t * self.share[k], event.amplitude + t * self.amplitude[k]
-        return event._replace(share=share, amplitude=amplitude, state=state)
 
 
 class RestTangent(NamedTuple):
@@ -190,9 +188,11 @@ class PathTangents:
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
             self._force_slopes = begin, np.array(at_end)
         self._motions = motion, end
-        self._events, self._tangents = [path.start], [start]
+        self._events, self._tangents, self._energies = [path.start], [start], [np.zeros((2, len(variations)))]
         for piece, event in enumerate(path.events):
-            self._tangents.append(self._at_event(piece, event))
+            tangent = self._at_event(piece, event)
+            self._energies.append(self._energies_at(piece, event, tangent))
+            self._tangents.append(tangent)
             self._events.append(event)
 
     def at_share(self, share: float, status: Status | None = None) -> PlaceOnPath:
@@ -201,17 +201,10 @@ class PathTangents:
         piece = done - 1 if place is self._events[done] else done
         if status is not None:
             place = place._replace(state=replace(place.state, status=status))
-        events = [*self._events[: piece + 1], place]
-        tangents = [*self._tangents[: piece + 1], self._solved(piece, place)]
-        out = np.zeros((2, len(self.variations)))
-        for k, one in enumerate(self.variations):
-            low, high = (
-                self._moved_path(k, t).energies([x.changed(e, k, t) for x, e in zip(tangents, events, strict=True)])
-                for t in (-one.step, one.step)
-            )
-            out[:, k] = one.difference(np.array(low), np.array(high))
+        tangent = self._solved(piece, place)
+        energies = self._energies_at(piece, place, tangent)
         start = next((i for i in range(piece, 0, -1) if self._events[i].share < share * (1.0 - _SHORT)), 0)
-        return PlaceOnPath(self._events[start], self._tangents[start], tangents[-1], out)
+        return PlaceOnPath(self._events[start], self._tangents[start], tangent, energies)
 
     def sides(
         self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
@@ -222,12 +215,12 @@ class PathTangents:
         """
         problem, contact, sides, ends = self.path.problem, step.meshed_state.contact, list[Side](), list[End]()
         contact = contact if status is None else replace(contact, status=status)
-        here, force = Event(0.0, 0.0, contact, 0.0, 0), problem.upright_force(contact).ravel()
+        force = problem.upright_force(contact).ravel()
         motion, total = self.motion(place.tangent, share), energies + place.energies
         for k, one in enumerate(self.variations):
             read = self._reading_changes[k] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
-                moved = place.tangent.changed(here, k, t).state
+                moved = place.tangent.changed(contact, k, t)
                 moved = replace(moved, bases=moved.own_bases + t * self._rest.bases[k])
                 side = Side(
                     end,
@@ -239,7 +232,7 @@ class PathTangents:
                 )
                 sides.append(side)
                 mu = np.full(len(force) // 2, end.model.friction.mu)
-                ends.append(End(place.first.changed(place.before, k, t).state, moved, mu))
+                ends.append(End(place.first.changed(place.before.state, k, t), moved, mu))
         return sides, ends
 
     def one_sided(self, step: StepResult, share: float, energies: Float) -> tuple[Sides, Sides] | None:
@@ -273,10 +266,25 @@ class PathTangents:
         half = np.einsum("cai,ciej,ebj->caeb", other, self.path.problem.delassus, own).reshape(2 * len(turn), -1)
         return np.asarray(half + half.T)
 
-    def _moved_path(self, k: int, t: float) -> ExactPath:
-        move = self.path.move
-        start, end = (moved_pose(p, t * m[k]) for p, m in zip((move.start, move.end), self._motions, strict=True))
-        return replace(self.path, move=Move(start, end), bases=self.path.bases + t * self._rest.bases[k])
+    def _energies_at(self, piece: int, event: Event, tangent: PathTangent) -> Float:
+        """Return the derivatives (2, p) of work and dissipation up to a place; see `ExactPath.energies`."""
+        path, before, first = self.path, self._events[piece], self._tangents[piece]
+        count, passed = path.count[:, None], event.share - before.share
+        mean = 0.5 * count * (before.state.force + event.state.force)
+        change = 0.5 * count * (first.force + tangent.force)
+        resultant = np.einsum("ca,cak->k", mean, path.bases)
+        turned = np.einsum("pca,cak->pk", change, path.bases) + np.einsum("ca,pcak->pk", mean, self._rest.bases)
+        if "x" in path.problem.axes:  # the halves of a mirrored finger cancel
+            resultant[0] = turned[:, 0] = 0.0
+        along = (path.move.end.displacement - path.move.start.displacement)[:2]
+        way = passed * along
+        way[1] -= event.amplitude - before.amplitude
+        moved = (tangent.share - first.share)[:, None] * along + passed * (self._motions[1] - self._motions[0])
+        moved[:, 1] -= tangent.amplitude - first.amplitude
+        slid = _relative(event.state) - _relative(before.state)
+        lost = np.einsum("pca,ca->p", change, slid)
+        lost += np.einsum("ca,pca->p", mean, tangent.displacement - first.displacement)
+        return self._energies[piece] + np.stack([turned @ way + moved @ resultant, -lost])
 
     def _at_event(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""
