@@ -133,6 +133,10 @@ class Simulation:
             If the press fails.
         """
         point, factor = self._point(values)
+        return _scaled(self._unscaled(point), factor)
+
+    def _unscaled(self, point: tuple[float, ...]) -> Curve:
+        """Return the curve of a press with the values that it is solved with."""
         if point not in self._known:
             row = self._solve(point)
             self.journal.append(row)
@@ -140,11 +144,12 @@ class Simulation:
         found = self._known[point]
         if isinstance(found, str):
             raise Finger3dError(found)
-        return _scaled(found, factor)
+        return found
 
     def at(self, values: Sequence[float] | Float, measured: MeasuredPress) -> dict[str, Float]:
         """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
-        curve = self.curve(values)
+        point, factor = self._point(values)
+        curve = self._unscaled(point)
         at = curve[measured.index]
         if (np.diff(at) <= 0.0).any():
             raise Finger3dError(_not_rising(measured))
@@ -152,7 +157,7 @@ class Simulation:
         offset = float(offset) if measured.index == "depth_mm" else 0.0
         if text := _beyond(measured, offset, float(at[-1])):
             raise Finger3dError(text)
-        return _at_rows(curve, measured, offset)
+        return dict(_scaled(_at_rows(curve, measured, offset), factor))
 
     def slopes(self, values: Float, measured: MeasuredPress) -> dict[str, Float] | None:
         """Return the derivatives (n, k) of the simulated values by the free keys.
@@ -279,7 +284,8 @@ def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, 
     """Return the values of every measured column at its rows."""
     at = curve[measured.index]
     where = np.clip(measured.at + offset, 0.0, at[-1])
-    return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
+    rows = PchipInterpolator(at, np.column_stack([curve[name] for name in measured.columns]))(where)
+    return dict(zip(measured.columns, np.asarray(rows).T, strict=True))
 
 
 def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[float] | Float, path: Path | None) -> Scene:
