@@ -56,6 +56,9 @@ _UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
 
+_ZONES = ("contact_", "stick_")
+"""First words of the names of lengths and areas of zones."""
+
 _MAX_STORED = 4  # bodies, and presses
 
 _STEP, _LEAST = 1e-5, 0.1
@@ -167,7 +170,8 @@ class Simulation:
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
         if point not in self._slopes:
-            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
+            keys = [f.numbered(self.given) for f in costly]
+            self._slopes[point] = self._derivatives(point, keys, any(n.startswith(_ZONES) for n in measured.columns))
         known = self._slopes[point]
         if known is None:
             return None
@@ -220,7 +224,7 @@ class Simulation:
 
         return _kept(self._presses, point, pressed)
 
-    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
+    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str], with_zones: bool) -> list[Curve] | None:
         """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
         if not keys:
             return []
@@ -231,7 +235,10 @@ class Simulation:
             return None
         try:
             variations = [varied(scene, problem, key) for key in keys]
-            rows = [derivatives(step, variations, sides) for step, _, sides in tangents(problem, variations, steps)]
+            rows = [
+                derivatives(step, variations, sides, with_zones=with_zones)
+                for step, _, sides in tangents(problem, variations, steps)
+            ]
         except Finger3dError:  # forces that jump have no derivatives; differences of presses have
             return None
         if not all(all(row) for row in rows):  # of a side of a kink that is not known

@@ -73,7 +73,9 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
         yield from _by_increments(problem, variations, steps)
 
 
-def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0) -> list[Numbers]:
+def derivatives(
+    step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0, with_zones: bool = True
+) -> list[Numbers]:
     """Return the derivatives (p,) of the numbers of an increment, per unit of each parameter; none if not known.
 
     The numbers are the columns of history.csv, by their names.  At points without friction the sum of its magnitudes
@@ -81,7 +83,8 @@ def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides,
     """
     friction = np.linalg.norm(step.meshed_state.contact.force[:, 1:], axis=1)
     starts = friction <= _NO_FRICTION * friction.max(initial=0.0)
-    found = [_of_numbers(step, *one) for one in zip(variations, sides[::2], sides[1::2], strict=True)]
+    pairs = zip(variations, sides[::2], sides[1::2], strict=True)
+    found = [_of_numbers(step, *one, with_zones) for one in pairs]
     for numbers, one, side in zip(found, variations, sides[1::2], strict=True):
         if way and side is not None:
             begun = np.linalg.norm(side.state.contact.force[:, 1:], axis=1) * starts
@@ -144,7 +147,9 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangent
             tangent = replace(tangent, amplitude=np.zeros(count))
 
 
-def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None) -> Numbers:
+def _of_numbers(
+    step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool
+) -> Numbers:
     """Return the derivatives of the numbers of an increment, by differences of their formulas."""
     if low is None or high is None:
         return {}
@@ -162,7 +167,7 @@ def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side |
             external_work_mJ=side.work_mJ,
             dissipation_mJ=side.dissipation_mJ,
         )
-        row = table_row(problem.points, changed)
+        row = table_row(problem.points, changed, with_zones)
         return {name: value for name, value in row.items() if isinstance(value, float) and name not in _NONE}
 
     below, above = numbers(low), numbers(high)

@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
@@ -357,25 +356,17 @@ class PathTangents:
             if change is not None:
                 free[k] += (change @ force.ravel()).reshape(c, 2)
         free += (base.reshape(count, -1) @ self._delassus.T).reshape(base.shape)
-        rows = np.concatenate([2 * touches, 2 * sticks + 1])
-        unknowns = sp.csr_array(
-            (
-                np.concatenate([np.ones(len(rows)), self.path.problem.model.friction.mu * sign[slips]]),
-                (
-                    np.concatenate([rows, 2 * slips + 1]),
-                    np.concatenate([np.arange(len(rows)), np.searchsorted(touches, slips)]),
-                ),
-            ),
-            shape=(2 * c, len(rows)),
-        )
-        through = self._delassus @ unknowns
+        rows, along = np.concatenate([2 * touches, 2 * sticks + 1]), self.path.problem.model.friction.mu * sign
+        through = self._delassus[:, rows]
+        through[:, : len(touches)] += along[touches] * self._delassus[:, 2 * touches + 1]
         target = np.zeros((count, c, 2))
         target[:, sticks, 1] = last.displacement[:, sticks, 1]
         matrix, right = through[rows], (target - free).reshape(count, -1)[:, rows]
         motion = np.zeros((2 * c, 0))
         if self._weights is not None:
             motion = self._closing[:, :, 1].reshape(-1, 1)
-            resultant = unknowns.T @ self._weights.ravel()
+            resultant = self._weights.ravel()[rows]
+            resultant[: len(touches)] += along[touches] * self._weights[touches, 1]
             wanted = (1.0 - share) * self._force_slopes[0] + share * self._force_slopes[1]
             wanted = wanted - np.einsum("ca,pca->p", self._weights, base)
             wanted -= np.einsum("pca,ca->p", self._turned_weights, force)
@@ -384,10 +375,10 @@ class PathTangents:
         solved = np.linalg.solve(matrix, right.T) if len(matrix) else np.zeros((0, count))
         own, amplitude = solved[: len(rows)], solved[len(rows) :]
         moved = free + (through @ own + motion @ amplitude).T.reshape(count, c, 2)
-        still = np.zeros(count)
-        return PathTangent(
-            base + (unknowns @ own).T.reshape(count, c, 2), moved, still, amplitude[0] if len(amplitude) else still
-        )
+        changed, still = base.reshape(count, -1), np.zeros(count)
+        changed[:, rows] += own.T
+        changed[:, 2 * touches + 1] += (along[touches, None] * own[: len(touches)]).T
+        return PathTangent(base, moved, still, amplitude[0] if len(amplitude) else still)
 
 
 def _relative(state: ContactState) -> Float:
