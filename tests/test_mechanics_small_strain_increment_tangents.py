@@ -17,7 +17,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.small_strain.variations import variation
 from finger3d.objects import Cylinder, Plane, Sphere
-from tests.differences import STEP, assert_equal_to_differences, object_parameters, parameters
+from tests.differences import STEP, assert_equal_to_differences, other_parameters, parameters
 from tests.models import block, fig9, small_section
 
 READINGS = {
@@ -84,19 +84,14 @@ WITH_FOILS = {
 @pytest.mark.parametrize(
     ("case", "some"),
     [
-        ("exact path", ("mu", "nu", "x", "foil thickness_mm")),
+        ("exact path", ("mu", "nu", "x", "inclusions thickness_mm")),
         *(pytest.param(name, (), marks=pytest.mark.slow) for name in ("exact path", "bar")),
-        pytest.param("solid", ("goal 1", "E", "nu", "x", "width_mm", "foil width_mm"), marks=pytest.mark.slow),
+        pytest.param("solid", ("goal 1", "E", "nu", "x", "width_mm", "inclusions width_mm"), marks=pytest.mark.slow),
     ],
 )
 def test_derivatives_beside_foils(case: str, some: tuple[str, ...]) -> None:
     model = WITH_FOILS[case]
-    ways = parameters(model)
-    for name in ("E_MPa", "thickness_mm", "width_mm"):
-        value = getattr(FOIL, name)
-        ways[f"foil {name}"] = lambda h, name=name, value=value: replace(
-            model, inclusions=replace(FOIL, **{name: value + h})
-        )
+    ways = parameters(model) | other_parameters(model)
     assert_equal_to_differences(build(model), {name: ways[name] for name in some or ways})
 
 
@@ -110,7 +105,7 @@ BESIDE = {
 @pytest.mark.parametrize("case", [pytest.param(n, marks=[pytest.mark.slow] * (n != "bar")) for n in BESIDE])
 def test_derivatives_beside_an_elastic_object(case: str) -> None:
     model = replace(BESIDE[case], object_compliance=ElasticObject(3.0, 0.3, 4.13 if case == "block" else None))
-    assert_equal_to_differences(build(model), parameters(model) | object_parameters(model))
+    assert_equal_to_differences(build(model), parameters(model) | other_parameters(model))
 
 
 def test_the_mesh_of_an_elastic_ball_is_another_each_time() -> None:

@@ -21,7 +21,6 @@ from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import (
-    AddedStiffness,
     CondensedBody,
     ContactSystem,
     Problem,
@@ -134,9 +133,9 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     condensed, active, count = problem.body.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
     readings = len(condensed.compliance) - len(active) - count
     compliance = condensed.compliance.copy()
-    subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
-    first = len(compliance) - len(subgrid)
-    compliance[first:, first:] += subgrid
+    added = bars.in_mesh(compliance[-count:, -count:])
+    first = len(compliance) - len(added.subgrid_compliance)
+    compliance[first:, first:] += added.subgrid_compliance
     delassus, reading_rows = contact_rows(
         stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, readings
     )
@@ -144,12 +143,7 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
         problem,
         condensed_body=replace(problem.body, condensed=replace(condensed, compliance=compliance)),
         system=replace(problem.system, delassus=delassus, reading_rows=reading_rows),
-        inclusions=AddedStiffness(
-            bars=bars.at_finite_strain(subgrid[-count:, -count:]),
-            gauge_weights=bars.gauge_weights,
-            bar_stiffness=bars.bar_stiffness,
-            subgrid_compliance=subgrid,
-        ),
+        inclusions=added,
         without_inclusions=problem,
     )
 

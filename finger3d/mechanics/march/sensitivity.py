@@ -134,9 +134,7 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Seq
             tangent = replace(tangent, amplitude=np.zeros(count))
 
 
-def _of_numbers(
-    step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool
-) -> Numbers:
+def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool) -> Numbers:
     """Return the derivatives of the numbers of an increment, by differences of their formulas."""
     if low is None or high is None:
         return {}

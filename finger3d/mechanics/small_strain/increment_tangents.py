@@ -224,15 +224,25 @@ class IncrementTangents:
 
     def _changes(self, forces: Float, count: int) -> list[FixedForces]:
         """Return what variations change in the body under each of several forces (k, c, d), for `count` parameters."""
-        columns = forces.reshape(len(forces), -1).T
-        displacement = np.zeros((*columns.shape, count))
-        readings = np.zeros((len(self.problem.system.reading_rows), len(forces), count))
+        problem, compliance = self.problem, self.problem.body.condensed.compliance
+        rows = problem.with_spring_forces(compliance, np.stack([problem.row_forces(force) for force in forces], axis=1))
+        moved = self._changes_of_rows(rows, count)
+        displacement = np.zeros((problem.surface.points.size, len(forces), count))
+        readings = np.zeros((len(problem.system.reading_rows), len(forces), count))
+        for k, one in enumerate(self._variations):
+            if one.body:
+                displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
+        return [FixedForces(displacement[:, i], readings[:, i]) for i in range(len(forces))]
+
+    def _changes_of_rows(self, forces: Float, count: int) -> Float:
+        """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""
+        moved = np.zeros((*forces.shape, count))
         if any(one.body for one in self._variations):
-            unknowns = np.column_stack(list(self.problem.unknowns_of(list(forces))))
+            unknowns = self.problem.body.condensed.unknowns(forces)
             for k, one in enumerate(self._variations):
                 if one.body:
-                    displacement[..., k], readings[..., k] = one.body.of(self.problem, unknowns, columns)
-        return [FixedForces(displacement[:, i], readings[:, i]) for i in range(len(forces))]
+                    moved[..., k] = one.body.moved(self.problem, forces, unknowns)
+        return moved
 
     def _reached(
         self,

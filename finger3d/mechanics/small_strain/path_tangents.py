@@ -110,22 +110,24 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
 
     They are in the directions of an upright object; None where a parameter changes nothing in the body.
     """
-    active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
+    condensed, active, size = problem.body.condensed, problem.system.active_dofs, problem.surface.points.size
     if not any(one.changes_compliance for one in variations):
         return [None] * len(variations)
-    unknowns = problem.unknowns_of_rows(np.eye(count, len(active)))
-    force = np.zeros((problem.surface.points.size, len(active)))
-    force[active, np.arange(len(active))] = 1.0
+    count = len(condensed.compliance)
+    unknowns = condensed.unknowns(np.eye(count)) if any(one.body for one in variations) else np.zeros((0, count))
+    forces = problem.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
+    on_points = np.eye(size)[:, active]
 
     def dense(rows: Float) -> Float:
-        out = np.zeros((len(rows), problem.surface.points.size))
+        out = np.zeros((len(rows), size))
         out[:, active] = rows
         return out
 
     def changes(one: Variation) -> tuple[Float, Float]:
-        none = np.zeros_like(force), np.zeros((len(problem.system.reading_rows), len(active)))
-        moved, read = one.body.of(problem, unknowns, force) if one.body else none
-        return dense(moved + one.object_displacement(force)), dense(read)
+        moved, read = np.zeros_like(on_points), np.zeros((len(problem.system.reading_rows), len(active)))
+        if one.body:
+            moved, read = one.body.of_points(problem, forces, one.body.compliance(unknowns) @ forces)
+        return dense(moved + one.object_displacement(on_points)), dense(read)
 
     return [changes(one) if one.changes_compliance else None for one in variations]
 
