@@ -23,6 +23,7 @@ from finger3d.analyses.sensitivity import has_derivative, varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
+from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
@@ -218,11 +219,19 @@ class Simulation:
             scene = self.scene(point)
             model = scene.model()
             key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
-            body = _kept(self._bodies, key, lambda: PressedBody(model))
+            body = _kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
             steps = body.steps(model.friction, model.rule)  # which may condense it again
             return under(body.problem, model.friction, rule=model.rule), steps
 
         return _kept(self._presses, point, pressed)
+
+    def _in_same_mesh(self, model: Model) -> Problem | None:
+        """Return the condensed body of a model in the mesh of one that differs in materials and friction, if any."""
+        for problem in (body.problem for body in self._bodies.values()):
+            own = replace(problem.model, material=model.material, parts=model.parts, friction=model.friction)
+            if own == model:
+                return with_material(problem, model)
+        return None
 
     def _derivatives(self, point: tuple[float, ...], keys: Sequence[str], with_zones: bool) -> list[Curve] | None:
         """Return the derivatives of a solved curve by keys of the scene; None where one has none."""

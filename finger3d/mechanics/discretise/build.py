@@ -75,11 +75,28 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
+    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
+    return _assembled(model, mesh, mesh_report, candidates, report)
+
+
+def with_material(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
+    """Return the problem of a model that differs from that of another one in materials and friction only.
+
+    It has the same mesh and candidate points.
+    """
+    return _assembled(model, problem.mesh, problem.body.report, problem.surface, report)
+
+
+def _assembled(
+    model: Model, mesh: Mesh, mesh_report: MeshReport, candidates: BoundarySurface, report: Progress
+) -> Problem:
+    """Assemble and condense a mesh of a model to its candidate points."""
+    contact, axes = model.first_contact, symmetry(model)
+    thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     report.say("assembling")
     start = time.perf_counter()
     elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
-    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)
     count = len(model.columns)
     check_rows(len(active), count)

@@ -37,7 +37,7 @@ from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.variations import Side, Variation
-from finger3d.objects import Move, ObjectPose, vertical_frame
+from finger3d.objects import ObjectPose, vertical_frame
 
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""

@@ -83,7 +83,7 @@ class BodyChange:
     bars: Float
 
     def moved(self, problem: Problem, forces: Float, unknowns: Float) -> Float:
-        """Return the derivatives (r, k) of the rows' displacements at fixed forces (r, k), which cause unknowns (N, k)."""
+        """Return the derivatives (r, k) of the rows' displacements at fixed forces (r, k) that cause unknowns (N, k)."""
         load = self.rows.T @ forces - self.stiffness @ unknowns
         moved = problem.body.condensed.eliminated(load).displacement + self.rows @ unknowns
         return self._with_subgrid(moved, forces)
