@@ -125,8 +125,8 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Seq
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
         follower = follower or PathTangents(step.path, variations, changes, rest, tangent, motion, number)
         place = follower.at_share(station.share)
-        sides: Sides = list(follower.sides(step, station.share, place, energies)[0])
-        both = follower.one_sided(step, station.share, energies) if step is steps[-1] else None
+        sides: Sides = list(follower.sides(step, station.share, place, energies))
+        both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None
         yield step, *(both or (sides, sides))
         if station.share == 1.0:
             tangent, energies = place.tangent, energies + place.energies

@@ -209,12 +209,12 @@ class PathTangents:
 
     def sides(
         self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
-    ) -> tuple[list[Side], list[End]]:
-        """Return the sides (2 p,) of an increment that ends at a place, and their contact since the event before.
+    ) -> list[Side]:
+        """Return the sides (2 p,) of an increment that ends at a place.
 
         The energies (2, p) are the derivatives of work and dissipation at the start of the path.
         """
-        problem, contact, sides, ends = self.path.problem, step.meshed_state.contact, list[Side](), list[End]()
+        problem, contact, sides = self.path.problem, step.meshed_state.contact, list[Side]()
         contact = contact if status is None else replace(contact, status=status)
         force = problem.upright_force(contact).ravel()
         motion, total = self.motion(place.tangent, share), energies + place.energies
@@ -232,19 +232,26 @@ class PathTangents:
                     step.dissipation_mJ + t * total[1, k],
                 )
                 sides.append(side)
-                mu = np.full(len(force) // 2, end.model.friction.mu)
-                ends.append(End(place.first.changed(place.before.state, k, t), moved, mu))
-        return sides, ends
+        return sides
 
-    def one_sided(self, step: StepResult, share: float, energies: Float) -> tuple[Sides, Sides] | None:
+    def one_sided(
+        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float
+    ) -> tuple[Sides, Sides] | None:
         """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
-        problem, contact, before = self.path.problem, step.meshed_state.contact, self.at_share(share).before
-        here = End(before.state, contact, np.full(len(contact.gap), problem.model.friction.mu))
+        count = len(self.path.bases)
+
+        def end(before: ContactState, after: ContactState, problem: Problem) -> End:
+            return End(before, after, np.full(count, problem.model.friction.mu))
 
         def solved(status: Status) -> tuple[list[Side], list[End]]:
-            return self.sides(step, share, self.at_share(share, status), energies, status)
+            there = self.at_share(share, status)
+            sides = self.sides(step, share, there, energies, status)
+            signed = [(k, t) for k, one in enumerate(self.variations) for t in (-one.step, one.step)]
+            begun = [there.first.changed(there.before.state, *by) for by in signed]
+            return sides, [end(a, side.state.contact, side.problem) for a, side in zip(begun, sides, strict=True)]
 
-        length = problem.model.largest_depth_mm
+        here = end(place.before.state, step.meshed_state.contact, self.path.problem)
+        length = self.path.problem.model.largest_depth_mm
         if not is_kink(here, length):
             return None
         return one_sided(here, length, solved, -1), one_sided(here, length, solved, 1)

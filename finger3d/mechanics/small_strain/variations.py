@@ -83,13 +83,13 @@ class BodyChange:
     bars: Float
 
     def moved(self, problem: Problem, forces: Float, unknowns: Float) -> Float:
-        """Return the derivatives (r, k) of the rows' displacements at fixed forces (r, k) that cause unknowns (N, k)."""
+        """Return the derivatives (r, k) of the rows at fixed forces (r, k) on them, which cause unknowns (N, k)."""
         load = self.rows.T @ forces - self.stiffness @ unknowns
         moved = problem.body.condensed.eliminated(load).displacement + self.rows @ unknowns
         return self._with_subgrid(moved, forces)
 
     def compliance(self, unknowns: Float) -> Float:
-        """Return the derivatives (r, r) of the rows' compliance; each row's force alone causes unknowns (N, r)."""
+        """Return the derivatives (r, r) of the rows under forces of 1 N on each, which cause unknowns (N, r)."""
         half = self.rows @ unknowns
         moved = half + half.T - unknowns.T @ (self.stiffness @ unknowns)
         return self._with_subgrid(moved, np.eye(len(moved)))
