@@ -245,12 +245,21 @@ def _object_compliance(problem: Problem, end: Problem) -> Float:
         return problem.system.object_compliance
     if not is_moved and replace(thing, E_MPa=own.E_MPa) == own:
         return own.E_MPa / thing.E_MPa * problem.system.object_compliance
-    held = model.object.held_body(model.design, problem.dim == 3)
-    if problem.dim == 3 and held is not None and held.mesher != "swept":
-        raise Finger3dError("it changes the mesh of an elastic object")
     zone = model.first_contact.contact_box
-    (mesh, whole), (other, _) = object_mesh(problem, own, zone, QUIET), object_mesh(end, thing, zone, QUIET)
-    return response_of(end, thing, _moved(mesh, other), whole).compliance
+    mesh, whole = object_mesh(problem, own, zone, QUIET)
+    moved = stretched_object(mesh, model, end.model) or _moved(mesh, object_mesh(end, thing, zone, QUIET)[0])
+    return response_of(end, thing, moved, whole).compliance
+
+
+def stretched_object(mesh: Mesh, model: Model, other: Model) -> Mesh | None:
+    """Return an unstructured mesh of the elastic object of a model with the dimensions of another; None for others."""
+    bodies = [one.object.held_body(one.design, mesh.dim == 3) for one in (model, other)]
+    if mesh.dim == 2 or bodies[0] is None or bodies[1] is None or bodies[0].mesher == "swept":
+        return None
+    own = replace(mesh, points=bodies[0].to_design(mesh.points))
+    if bodies[0].design != bodies[1].design:
+        own = stretched(own, bodies[0].design, bodies[1].design)
+    return replace(mesh, points=bodies[1].to_scene(own.points))
 
 
 class _Assembled(NamedTuple):
