@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.mesh.locate import locate
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
@@ -27,9 +28,10 @@ from finger3d.mechanics.discretise.elastic_object import object_mesh, response_o
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
+from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
 
@@ -38,6 +40,9 @@ _FARTHEST = 1e-2
 
 _VOLUME, _ROUND_OFF = 0.05, 1e-9
 """Relative errors of the growth of a stretched body, and of its volume, that are those of its mesh."""
+
+_CELLS_OF_SECTION = 40
+"""Edges along half the section in whose mesh the inside of a body of several parts moves."""
 
 _INSIDE = 1.0 - 1e-9
 """Share of their distance from the axis at which points on the rim are inside in spite of round-off."""
@@ -287,20 +292,29 @@ def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
     """Return an unstructured mesh of a design with the dimensions of another one of its kind.
 
     The footprint stretches along x and z, and every vertical line from the base to the contact face stretches as well.
+    A body of several parts moves along x and y as a structured mesh of its section does.
 
     Raises
     ------
     Finger3dError
-        If the body is not that between its base and its contact face, or has parts.
+        If the body is not that between its base and its contact face, or has parts and no section.
     """
     points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
-    heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
-    stands = mesh.points[:, 1] > 0.0
-    points[stands, 1] *= heights[1][stands] / heights[0][stands]
+    if design.part_labels:
+        size = design.half_length_mm / _CELLS_OF_SECTION
+        zone = (-design.half_length_mm, design.half_length_mm, 0.0, 0.0)
+        flat, end = (mesh_section(one, MeshOptions(size, size), zone)[0] for one in (design, other))
+        cells, places = locate(flat, mesh.points[:, :2])
+        motion = (_moved(flat, end).points - flat.points)[flat.cells[cells]]
+        points[:, :2] = mesh.points[:, :2] + np.einsum("pk,pkd->pd", flat.element.shape(places), motion)
+    else:
+        heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
+        stands = mesh.points[:, 1] > 0.0
+        points[stands, 1] *= heights[1][stands] / heights[0][stands]
     moved = replace(mesh, points=points)
     growth = curved_volume(moved) / curved_volume(mesh) - 1.0
     wanted = other.volume_mm3 / design.volume_mm3 - 1.0
-    if design.part_labels or not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
+    if not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
         raise Finger3dError("it changes the cells of the mesh")
     return moved
 
