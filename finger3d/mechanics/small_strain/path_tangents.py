@@ -292,7 +292,7 @@ class PathTangents:
         slid = _relative(event.state) - _relative(before.state)
         lost = np.einsum("pca,ca->p", change, slid)
         lost += np.einsum("ca,pca->p", mean, tangent.displacement - first.displacement)
-        return self._energies[piece] + np.stack([turned @ way + moved @ resultant, -lost])
+        return np.asarray(self._energies[piece] + np.stack([turned @ way + moved @ resultant, -lost]))
 
     def _at_event(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""

@@ -188,7 +188,8 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
     changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
     change = None
     if changed & {*_IN_BODY, "inclusions"}:
-        ends, change = _changed(problem, *(_assembled(problem, end) for end in ends), step)
+        below, above = (_assembled(problem, end) for end in ends)
+        ends, change = _changed(problem, below, above, step)
     if own.object_compliance is not None:
         ends = _beside_object(problem, ends, step, change)
     return Variation(ends[0], ends[1], step, change)
@@ -196,11 +197,9 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
 
 def _changed(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> tuple[list[Problem], BodyChange]:
     """Return the problems of two bodies, and what changes between these."""
-    ends, slopes = (
-        [below.problem, above.problem],
-        [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)],
-    )
-    change = BodyChange(slopes[0], slopes[1], np.zeros((0, 0)), np.zeros(0))
+    ends = [below.problem, above.problem]
+    both = zip(below.matrices, above.matrices, strict=True)
+    change = BodyChange(*((high - low) / (2.0 * step) for low, high in both), np.zeros((0, 0)), np.zeros(0))
     if below.bars is None or above.bars is None:
         return ends, change
     own, condensed = problem.inclusions, problem.body.condensed
@@ -208,12 +207,11 @@ def _changed(problem: Problem, below: _Assembled, above: _Assembled, step: float
     pulls = np.eye(size, count, count - size)
     slope = change.moved(problem, pulls, condensed.unknowns(pulls))[-count:]
     of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
-    low, high = (below.bars.in_mesh(of_mesh - step * slope), above.bars.in_mesh(of_mesh + step * slope))
-    return [replace(end, inclusions=one) for end, one in zip(ends, (low, high), strict=True)], replace(
-        change,
-        subgrid=(high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step),
-        bars=(high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness),
-    )
+    low, high = below.bars.in_mesh(of_mesh - step * slope), above.bars.in_mesh(of_mesh + step * slope)
+    ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
+    subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
+    bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
+    return ends, replace(change, subgrid=subgrid, bars=bars)
 
 
 def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | None) -> list[Problem]:
