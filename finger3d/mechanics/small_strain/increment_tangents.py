@@ -215,24 +215,21 @@ class IncrementTangents:
 
         Solutions for several forces at once cost less than one after another.
         """
+        problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
         contacts = [after.contact for step in self._results for _, after in step.parts]
-        found = list[FixedForces]()
         for start in range(0, len(contacts), _AT_ONCE):
-            forces = [self.problem.upright_force(contact) for contact in contacts[start : start + _AT_ONCE]]
-            found += self._changes(np.array(forces), len(self._variations))
-        return dict(zip((contact.force.tobytes() for contact in contacts), found, strict=True))
-
-    def _changes(self, forces: Float, count: int) -> list[FixedForces]:
-        """Return what variations change in the body under each of several forces (k, c, d), for `count` parameters."""
-        problem, compliance = self.problem, self.problem.body.condensed.compliance
-        rows = problem.with_spring_forces(compliance, np.stack([problem.row_forces(force) for force in forces], axis=1))
-        moved = self._changes_of_rows(rows, count)
-        displacement = np.zeros((problem.surface.points.size, len(forces), count))
-        readings = np.zeros((len(problem.system.reading_rows), len(forces), count))
-        for k, one in enumerate(self._variations):
-            if one.body:
-                displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
-        return [FixedForces(displacement[:, i], readings[:, i]) for i in range(len(forces))]
+            some = contacts[start : start + _AT_ONCE]
+            rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
+            rows = problem.with_spring_forces(problem.body.condensed.compliance, rows)
+            displacement = np.zeros((problem.surface.points.size, len(some), count))
+            readings = np.zeros((len(problem.system.reading_rows), len(some), count))
+            moved = self._changes_of_rows(rows, count)
+            for k, one in enumerate(self._variations):
+                if one.body:
+                    displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
+            for i, contact in enumerate(some):
+                found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
+        return found
 
     def _changes_of_rows(self, forces: Float, count: int) -> Float:
         """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""

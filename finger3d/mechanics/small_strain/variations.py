@@ -198,8 +198,8 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
 def _changed(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> tuple[list[Problem], BodyChange]:
     """Return the problems of two bodies, and what changes between these."""
     ends = [below.problem, above.problem]
-    both = zip(below.matrices, above.matrices, strict=True)
-    change = BodyChange(*((high - low) / (2.0 * step) for low, high in both), np.zeros((0, 0)), np.zeros(0))
+    slopes = [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)]
+    change = BodyChange(slopes[0], slopes[1], np.zeros((0, 0)), np.zeros(0))
     if below.bars is None or above.bars is None:
         return ends, change
     own, condensed = problem.inclusions, problem.body.condensed
