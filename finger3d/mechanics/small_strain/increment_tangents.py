@@ -52,7 +52,7 @@ _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
 
 _AT_ONCE = 32
-"""Increments that the body is solved for at once."""
+"""Increments that the body is solved for at once, which costs less than one after another."""
 
 
 @dataclass(frozen=True)
@@ -211,18 +211,15 @@ class IncrementTangents:
 
     @cached_property
     def _fixed(self) -> dict[bytes, FixedForces]:
-        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces.
-
-        Solutions for several forces at once cost less than one after another.
-        """
+        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
         problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
         contacts = [after.contact for step in self._results for _, after in step.parts]
         for start in range(0, len(contacts), _AT_ONCE):
             some = contacts[start : start + _AT_ONCE]
             rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
             rows = problem.with_spring_forces(problem.body.condensed.compliance, rows)
-            displacement = np.zeros((problem.surface.points.size, len(some), count))
-            readings = np.zeros((len(problem.system.reading_rows), len(some), count))
+            sizes = problem.surface.points.size, len(problem.system.reading_rows)
+            displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
             moved = self._changes_of_rows(rows, count)
             for k, one in enumerate(self._variations):
                 if one.body:
@@ -234,11 +231,10 @@ class IncrementTangents:
     def _changes_of_rows(self, forces: Float, count: int) -> Float:
         """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""
         moved = np.zeros((*forces.shape, count))
-        if any(one.body for one in self._variations):
-            unknowns = self.problem.body.condensed.unknowns(forces)
-            for k, one in enumerate(self._variations):
-                if one.body:
-                    moved[..., k] = one.body.moved(self.problem, forces, unknowns)
+        changed = [(k, one.body) for k, one in enumerate(self._variations) if one.body]
+        unknowns = self.problem.body.condensed.unknowns(forces) if changed else forces
+        for k, body in changed:
+            moved[..., k] = body.moved(self.problem, forces, unknowns)
         return moved
 
     def _reached(
