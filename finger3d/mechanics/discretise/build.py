@@ -76,7 +76,7 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
     candidates = candidate_points(model, free, contact.first_contact_mm, margin)
-    return _assembled(model, mesh, mesh_report, candidates, report)
+    return _condensed(model, mesh, mesh_report, candidates, report)
 
 
 def with_material(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
@@ -84,10 +84,10 @@ def with_material(problem: Problem, model: Model, report: Progress = QUIET) -> P
 
     It has the same mesh and candidate points.
     """
-    return _assembled(model, problem.mesh, problem.body.report, problem.surface, report)
+    return _condensed(model, problem.mesh, problem.body.report, problem.surface, report)
 
 
-def _assembled(
+def _condensed(
     model: Model, mesh: Mesh, mesh_report: MeshReport, candidates: BoundarySurface, report: Progress
 ) -> Problem:
     """Assemble and condense a mesh of a model to its candidate points."""
