@@ -69,10 +69,14 @@ def parameters(model: Model) -> dict[str, Callable[[float], Model]]:
     return found
 
 
-def object_parameters(model: Model) -> dict[str, Callable[[float], Model]]:
-    """The model with each dimension of its object, and each parameter of an elastic one, changed by h."""
+def other_parameters(model: Model) -> dict[str, Callable[[float], Model]]:
+    """The model with each dimension of its object, and each parameter of an elastic one and of foils, changed by h."""
     found = dict[str, Callable[[float], Model]]()
-    for part, names in (("object", ("radius_mm", "x_mm")), ("object_compliance", ("E_MPa", "nu", "height_mm"))):
+    for part, names in (
+        ("object", ("radius_mm", "x_mm")),
+        ("object_compliance", ("E_MPa", "nu", "height_mm")),
+        ("inclusions", ("E_MPa", "thickness_mm", "width_mm")),
+    ):
         thing = getattr(model, part)
         for name in names:
             if value := getattr(thing, name, None):

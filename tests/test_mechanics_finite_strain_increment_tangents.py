@@ -15,7 +15,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Taxel
 from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder, Plane, Sphere
-from tests.differences import assert_equal_to_differences, object_parameters, parameters
+from tests.differences import assert_equal_to_differences, other_parameters, parameters
 from tests.models import block, small_section
 from tests.viscous_cases import TWO
 
@@ -65,14 +65,14 @@ def test_every_derivative_is_that_of_presses(case: str) -> None:
 def test_derivatives_beside_an_elastic_object() -> None:
     bar = replace(CASES["bar"].object, x_mm=0.1)
     model = replace(CASES["bar"], object=bar, object_compliance=ElasticObject(3.0, 0.3, None))
-    ways = parameters(model) | object_parameters(model)
+    ways = parameters(model) | other_parameters(model)
     assert_equal_to_differences(build(model), ways, tolerance=1e-5, step=2e-5)
 
 
 @pytest.mark.slow
-def test_viscous_derivatives_beside_foils() -> None:
+@pytest.mark.parametrize("case", ["section", "viscous section"])
+def test_derivatives_beside_foils(case: str) -> None:
     foils = tuple(Gauge(g.name, g.x_mm, 1.4, angle=g.angle, length_mm=1.0) for g in GAUGES)
-    model = replace(CASES["viscous section"], inclusions=Foils(100.0, 0.05, 0.3), gauges=foils, taxels=())
-    ways = parameters(model)
-    names = ("mu", "goal 0", "slide 1", "g 0", "tau 1", "duration 1")
-    assert_equal_to_differences(build(model), {name: ways[name] for name in names}, tolerance=1e-5, step=2e-5)
+    model = replace(CASES[case], inclusions=Foils(100.0, 0.05, 0.3), gauges=foils, taxels=())
+    ways = parameters(model) | other_parameters(model)
+    assert_equal_to_differences(build(model), ways, tolerance=1e-5, step=2e-5)

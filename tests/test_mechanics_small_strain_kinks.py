@@ -12,9 +12,8 @@ from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.fem.laws import NeoHooke
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.sensitivity import derivatives, tangents
-from finger3d.mechanics.march.solve import Press, march
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.relaxation import Relaxation
@@ -86,10 +85,7 @@ def test_after_a_hold_points_slip_on_or_back(case: str) -> None:
 def test_a_path_that_ends_at_an_event(change: tuple[int, int]) -> None:
     model = small_section(legs=PRESS, **TILTED)
     problem = build(model)
-    press = Press(problem)
-    press.advance(stations(model.legs)[0])
-    assert press.path is not None
-    events = press.path.events
+    events = next(march(problem)).path.events
     found = next(
         before.share
         for before, after in zip(events[1:], events[2:], strict=False)

@@ -12,7 +12,7 @@ from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import Plane
-from tests.differences import assert_equal_to_differences, object_parameters, parameters
+from tests.differences import assert_equal_to_differences, other_parameters, parameters
 from tests.models import fig9, small_section
 
 TILTED = {"symmetry": (), "object": Plane(tilt=np.deg2rad(2.0))}
@@ -56,4 +56,4 @@ def test_derivatives_beside_an_elastic_plane(case: str) -> None:
     # the directions of the points follow the share of the object in the compliance
     thing = ElasticObject(3.0, 0.3, 4.13)
     model = small_section(object_compliance=thing, legs=BESIDE[case], symmetry=(), object=Plane(tilt=0.03))
-    assert_equal_to_differences(build(model), parameters(model) | object_parameters(model))
+    assert_equal_to_differences(build(model), parameters(model) | other_parameters(model))

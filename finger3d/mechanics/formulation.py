@@ -56,8 +56,9 @@ class Loads(NamedTuple):
     @property
     def moment(self) -> Float:
         """Moment (3,) N mm about the middle of the base."""
-        arms, forces = (np.pad(v, ((0, 0), (0, 3 - v.shape[1]))) for v in (self.places, self.force))
-        return np.asarray(np.cross(arms, forces).sum(axis=0))
+        products = np.zeros((3, 3))
+        products[: self.force.shape[1], : self.force.shape[1]] = self.places.T @ self.force
+        return np.array([products[i, j] - products[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
     def work_from(self, before: Loads) -> float:
         """Work (mJ) since other loads of the same points, by the trapezoidal rule."""

@@ -199,15 +199,18 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     own = np.array([f.key.startswith("friction.") for f in simulation.free])
     starts = [begin, *(np.where(own, share, begin) for share in _FRICTION if own.any())]
     tried = [_with_modulus(simulation, shares) for shares in starts]
-    _check_columns(simulation, scales, [shares for trials in tried for shares in trials], data)
+    curves = [[simulation.at(values_at(scales, shares), data) for shares in trials] for trials in tried]
+    _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
     stds = {
         n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
         for n, v in data.columns.items()
     }
 
-    def residuals(values: Float) -> Float:
-        simulated = simulation.at(values, data)
+    def residuals_of(simulated: Mapping[str, Float]) -> Float:
         return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
+
+    def residuals(values: Float) -> Float:
+        return residuals_of(simulation.at(values, data))
 
     def slopes(values: Float) -> Float | None:
         found = simulation.slopes(values, data)
@@ -217,7 +220,8 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
         report.stage(f"fitting, {simulation.solved} presses: {named}")
 
-    best = [min(trials, key=lambda s: float(np.sum(residuals(values_at(scales, s)) ** 2))) for trials in tried]
+    least = [int(np.argmin([np.sum(residuals_of(curve) ** 2) for curve in some])) for some in curves]
+    best = [trials[number] for trials, number in zip(tried, least, strict=True)]
     shares = min(best, key=lambda s: foretold(scales, s, residuals, slopes)) if len(best) > 1 else best[0]
     shares = fit(scales, shares, residuals, slopes, announce)
     weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
@@ -253,7 +257,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
 
 
 def _check_columns(
-    simulation: Simulation, scales: Sequence[Scale], tried: Sequence[Float], data: MeasuredPress
+    simulation: Simulation, scales: Sequence[Scale], curves: Sequence[Mapping[str, Float]], data: MeasuredPress
 ) -> None:
     """Check signs and units against presses that the fit needs anyway, and refuse them only if those at the bounds do.
 
@@ -263,19 +267,19 @@ def _check_columns(
         For a column of another sign or unit than the scene gives.
     """
 
-    def check(every: Sequence[Float]) -> None:
-        curves = [simulation.at(values_at(scales, shares), data) for shares in every]
-        data.check_signs(curves)
-        magnitudes = [largest(curve) for curve in curves]
+    def check(every: Sequence[Mapping[str, Float]]) -> None:
+        data.check_signs(every)
+        magnitudes = [largest(curve) for curve in every]
         data.check_units(
             {n: min(m[n] for m in magnitudes) for n in data.columns},
             {n: max(m[n] for m in magnitudes) for n in data.columns},
         )
 
     try:
-        check(tried)
+        check(curves)
     except Finger3dError:
-        check([*tried, np.zeros(len(scales)), np.ones(len(scales))])
+        ends = (np.zeros(len(scales)), np.ones(len(scales)))
+        check([*curves, *(simulation.at(values_at(scales, shares), data) for shares in ends)])
 
 
 def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:

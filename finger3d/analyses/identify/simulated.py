@@ -23,6 +23,7 @@ from finger3d.analyses.sensitivity import has_derivative, varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
+from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
@@ -55,6 +56,9 @@ _UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
 
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
+
+_ZONES = ("contact_", "stick_")
+"""First words of the names of lengths and areas of zones."""
 
 _MAX_STORED = 4  # bodies, and presses
 
@@ -133,6 +137,10 @@ class Simulation:
             If the press fails.
         """
         point, factor = self._point(values)
+        return _scaled(self._unscaled(point), factor)
+
+    def _unscaled(self, point: tuple[float, ...]) -> Curve:
+        """Return the curve of a press with the values that it is solved with."""
         if point not in self._known:
             row = self._solve(point)
             self.journal.append(row)
@@ -140,11 +148,12 @@ class Simulation:
         found = self._known[point]
         if isinstance(found, str):
             raise Finger3dError(found)
-        return _scaled(found, factor)
+        return found
 
     def at(self, values: Sequence[float] | Float, measured: MeasuredPress) -> dict[str, Float]:
         """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
-        curve = self.curve(values)
+        point, factor = self._point(values)
+        curve = self._unscaled(point)
         at = curve[measured.index]
         if (np.diff(at) <= 0.0).any():
             raise Finger3dError(_not_rising(measured))
@@ -152,7 +161,7 @@ class Simulation:
         offset = float(offset) if measured.index == "depth_mm" else 0.0
         if text := _beyond(measured, offset, float(at[-1])):
             raise Finger3dError(text)
-        return _at_rows(curve, measured, offset)
+        return dict(_scaled(_at_rows(curve, measured, offset), factor))
 
     def slopes(self, values: Float, measured: MeasuredPress) -> dict[str, Float] | None:
         """Return the derivatives (n, k) of the simulated values by the free keys.
@@ -162,7 +171,8 @@ class Simulation:
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
         if point not in self._slopes:
-            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
+            keys = [f.numbered(self.given) for f in costly]
+            self._slopes[point] = self._derivatives(point, keys, any(n.startswith(_ZONES) for n in measured.columns))
         known = self._slopes[point]
         if known is None:
             return None
@@ -209,13 +219,21 @@ class Simulation:
             scene = self.scene(point)
             model = scene.model()
             key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
-            body = _kept(self._bodies, key, lambda: PressedBody(model))
+            body = _kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
             steps = body.steps(model.friction, model.rule)  # which may condense it again
             return under(body.problem, model.friction, rule=model.rule), steps
 
         return _kept(self._presses, point, pressed)
 
-    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
+    def _in_same_mesh(self, model: Model) -> Problem | None:
+        """Return the condensed body of a model in the mesh of one that differs in materials and friction, if any."""
+        for problem in (body.problem for body in self._bodies.values()):
+            own = replace(problem.model, material=model.material, parts=model.parts, friction=model.friction)
+            if own == model:
+                return with_material(problem, model)
+        return None
+
+    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str], with_zones: bool) -> list[Curve] | None:
         """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
         if not keys:
             return []
@@ -226,7 +244,10 @@ class Simulation:
             return None
         try:
             variations = [varied(scene, problem, key) for key in keys]
-            rows = [derivatives(step, variations, sides) for step, _, sides in tangents(problem, variations, steps)]
+            rows = [
+                derivatives(step, variations, sides, with_zones=with_zones)
+                for step, _, sides in tangents(problem, variations, steps)
+            ]
         except Finger3dError:  # forces that jump have no derivatives; differences of presses have
             return None
         if not all(all(row) for row in rows):  # of a side of a kink that is not known
@@ -279,7 +300,8 @@ def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, 
     """Return the values of every measured column at its rows."""
     at = curve[measured.index]
     where = np.clip(measured.at + offset, 0.0, at[-1])
-    return {name: np.asarray(PchipInterpolator(at, curve[name])(where)) for name in measured.columns}
+    rows = PchipInterpolator(at, np.column_stack([curve[name] for name in measured.columns]))(where)
+    return dict(zip(measured.columns, np.asarray(rows).T, strict=True))
 
 
 def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[float] | Float, path: Path | None) -> Scene:

@@ -21,7 +21,6 @@ from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import (
-    AddedStiffness,
     CondensedBody,
     ContactSystem,
     Problem,
@@ -76,11 +75,28 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
+    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
+    return _condensed(model, mesh, mesh_report, candidates, report)
+
+
+def with_material(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
+    """Return the problem of a model that differs from that of another one in materials and friction only.
+
+    It has the same mesh and candidate points.
+    """
+    return _condensed(model, problem.mesh, problem.body.report, problem.surface, report)
+
+
+def _condensed(
+    model: Model, mesh: Mesh, mesh_report: MeshReport, candidates: BoundarySurface, report: Progress
+) -> Problem:
+    """Assemble and condense a mesh of a model to its candidate points."""
+    contact, axes = model.first_contact, symmetry(model)
+    thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     report.say("assembling")
     start = time.perf_counter()
     elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
     matrix = stiffness(mesh, elastic, thickness)
-    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     active = active_dofs(candidates, axes)
     count = len(model.columns)
     check_rows(len(active), count)
@@ -134,9 +150,9 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     condensed, active, count = problem.body.condensed, problem.system.active_dofs, len(bars.bar_stiffness)
     readings = len(condensed.compliance) - len(active) - count
     compliance = condensed.compliance.copy()
-    subgrid = bars.subgrid_compliance(compliance[-count:, -count:])
-    first = len(compliance) - len(subgrid)
-    compliance[first:, first:] += subgrid
+    added = bars.in_mesh(compliance[-count:, -count:])
+    first = len(compliance) - len(added.subgrid_compliance)
+    compliance[first:, first:] += added.subgrid_compliance
     delassus, reading_rows = contact_rows(
         stiffened(compliance, bars.bar_stiffness), active, problem.system.surface, readings
     )
@@ -144,12 +160,7 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
         problem,
         condensed_body=replace(problem.body, condensed=replace(condensed, compliance=compliance)),
         system=replace(problem.system, delassus=delassus, reading_rows=reading_rows),
-        inclusions=AddedStiffness(
-            bars=bars.at_finite_strain(subgrid[-count:, -count:]),
-            gauge_weights=bars.gauge_weights,
-            bar_stiffness=bars.bar_stiffness,
-            subgrid_compliance=subgrid,
-        ),
+        inclusions=added,
         without_inclusions=problem,
     )
 

@@ -27,6 +27,7 @@ from finger3d.fem.solids.bars import Bars
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.solids.material import Isotropic
 from finger3d.fem.surface.traces import displacement_rows
+from finger3d.mechanics.discretise.problem import AddedStiffness
 from finger3d.mechanics.model import Foils, Model
 from finger3d.mechanics.readings.gauges import Gauge
 
@@ -67,14 +68,16 @@ class EmbeddedBars:
         along = sp.csr_matrix((self.directions.ravel(), np.arange(count * d), np.arange(count + 1) * d))
         return sp.csr_matrix(along @ self.relative)
 
-    def at_finite_strain(self, yielding: Float) -> Bars:
-        """Return the bars at finite strain, with a compliance (s, s) of their surroundings that the mesh lacks."""
-        return Bars(self.directions, self.relative, self.bar_stiffness, yielding)
-
-    def subgrid_compliance(self, compliance: Float) -> Float:
-        """Return the compliance (g + s, g + s) of gauges and bars that the mesh lacks, from its compliance (s, s)."""
+    def in_mesh(self, compliance: Float) -> AddedStiffness:
+        """Return the stiffness of the bars in a mesh that has the compliance (s, s) at their places."""
+        lacking = self.self_compliance - compliance
         both = np.vstack([self.gauge_weights, np.eye(len(self.bar_stiffness))])
-        return both @ (self.self_compliance - compliance) @ both.T
+        return AddedStiffness(
+            bars=Bars(self.directions, self.relative, self.bar_stiffness, lacking),
+            gauge_weights=self.gauge_weights,
+            bar_stiffness=self.bar_stiffness,
+            subgrid_compliance=both @ lacking @ both.T,
+        )
 
 
 def foil_mirrors(model: Model) -> frozenset[str]:

@@ -266,10 +266,15 @@ class Problem:
 
     def unknowns_of_rows(self, rows: Float) -> Float:
         """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
-        condensed, bars = self.body.condensed, self.inclusions.bar_stiffness
-        if len(bars):
-            rows[-len(bars) :] = spring_forces(condensed.compliance, bars, condensed.compliance @ rows)
-        return condensed.unknowns(rows)
+        condensed = self.body.condensed
+        return condensed.unknowns(self.with_spring_forces(condensed.compliance, rows))
+
+    def with_spring_forces(self, compliance: Float, rows: Float, moved: Float | None = None) -> Float:
+        """Forces (r, ...) on the condensed rows with those of inclusions, for displacements (r, ...) without any."""
+        if len(springs := self.inclusions.bar_stiffness):
+            without = compliance @ rows if moved is None else moved + compliance @ rows
+            rows[-len(springs) :] = spring_forces(compliance, springs, without)
+        return rows
 
 
 def free_surface(model: Model, mesh: Mesh, thickness: float) -> BoundarySurface:

@@ -44,9 +44,6 @@ from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
 
-_IN_BODY = ("design", "material", "parts")
-"""What a parameter may change in the body."""
-
 
 @dataclass(frozen=True)
 class _Linear:
@@ -72,14 +69,8 @@ class FiniteIncrementTangents(IncrementTangents):
     @cached_property
     def _workspaces(self) -> list[FiniteStrainWorkspace]:
         """Workspaces (2 p,) with the bodies below and above each parameter; that of the press where it changes none."""
-        own, model = self._own, self.problem.model
-        return [
-            own
-            if all(getattr(end.model, name) == getattr(model, name) for name in _IN_BODY)
-            else FiniteStrainWorkspace()
-            for one in self._variations
-            for end in one.ends
-        ]
+        bodies = [one.body for one in self._variations for _ in one.ends]
+        return [FiniteStrainWorkspace() if body else self._own for body in bodies]
 
     @cached_property
     def _own(self) -> FiniteStrainWorkspace:

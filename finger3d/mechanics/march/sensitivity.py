@@ -17,12 +17,11 @@ import numpy as np
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import Station, stations
-from finger3d.mechanics.march.solve import Press
+from finger3d.mechanics.march.path import stations
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
 from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
@@ -58,7 +57,7 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
     ----------
     problem : of the press
     variations : of p parameters
-    steps : the increments, if the press is known; an exact path is followed again
+    steps : the increments, if the press is known
 
     Raises
     ------
@@ -67,13 +66,16 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
     """
     if text := refusal(problem.model):
         raise Finger3dError(text)
-    if has_exact_path(problem.model):
-        yield from _on_exact_path(problem, variations)
-    else:
-        yield from _by_increments(problem, variations, steps)
+    steps = steps or list(march(problem))
+    if not steps[-1].outcome.ok:
+        raise Finger3dError(f"at depth {steps[-1].target.depth_mm:.4g} mm: {steps[-1].outcome}")
+    along = _by_increments if any(step.path is None for step in steps) else _on_exact_path
+    yield from along(problem, variations, steps)
 
 
-def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0) -> list[Numbers]:
+def derivatives(
+    step: StepResult, variations: Sequence[Variation], sides: Sides, way: int = 0, with_zones: bool = True
+) -> list[Numbers]:
     """Return the derivatives (p,) of the numbers of an increment, per unit of each parameter; none if not known.
 
     The numbers are the columns of history.csv, by their names.  At points without friction the sum of its magnitudes
@@ -81,7 +83,8 @@ def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides,
     """
     friction = np.linalg.norm(step.meshed_state.contact.force[:, 1:], axis=1)
     starts = friction <= _NO_FRICTION * friction.max(initial=0.0)
-    found = [_of_numbers(step, *one) for one in zip(variations, sides[::2], sides[1::2], strict=True)]
+    pairs = zip(variations, sides[::2], sides[1::2], strict=True)
+    found = [_of_numbers(step, *one, with_zones) for one in pairs]
     for numbers, one, side in zip(found, variations, sides[1::2], strict=True):
         if way and side is not None:
             begun = np.linalg.norm(side.state.contact.force[:, 1:], axis=1) * starts
@@ -89,17 +92,7 @@ def derivatives(step: StepResult, variations: Sequence[Variation], sides: Sides,
     return found
 
 
-def _advanced(press: Press, station: Station) -> StepResult:
-    step = press.advance(station)
-    if press.has_failed:
-        raise Finger3dError(f"at depth {step.target.depth_mm:.4g} mm: {step.outcome}")
-    return step
-
-
 def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
-    if not steps:
-        press = Press(problem)
-        steps = [_advanced(press, station) for station in stations(problem.model.legs)]
     growing = falling = _increment_tangents(problem, variations, steps)
     for step in steps:
         if growing is falling and falling.is_at_kink(step):
@@ -122,21 +115,18 @@ def _increment_tangents(
     return FiniteIncrementTangents(problem, variations, steps)
 
 
-def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangents:
-    press, count = Press(problem), len(variations)
-    rest = RestTangent.of(variations, len(press.state.contact.gap))
+def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
+    count = len(variations)
+    rest = RestTangent.of(variations, len(problem.surface.nodes))
     moved = np.stack([rest.gap, np.zeros_like(rest.gap)], axis=2)
     tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
-    changes, way = compliance_changes(problem, variations), stations(problem.model.legs)
-    for station in way:
-        step = _advanced(press, station)
-        if press.path is None:
-            raise Finger3dError("the path of the press is not exact")
-        follower = follower or PathTangents(press.path, variations, changes, rest, tangent, motion, number)
+    changes = compliance_changes(problem, variations)
+    for station, step in zip(stations(problem.model.legs), steps, strict=True):
+        follower = follower or PathTangents(step.path, variations, changes, rest, tangent, motion, number)
         place = follower.at_share(station.share)
-        sides: Sides = list(follower.sides(step, station.share, place, energies)[0])
-        both = follower.one_sided(step, station.share, energies) if station is way[-1] else None
+        sides: Sides = list(follower.sides(step, station.share, place, energies))
+        both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None
         yield step, *(both or (sides, sides))
         if station.share == 1.0:
             tangent, energies = place.tangent, energies + place.energies
@@ -144,7 +134,7 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation]) -> Tangent
             tangent = replace(tangent, amplitude=np.zeros(count))
 
 
-def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None) -> Numbers:
+def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool) -> Numbers:
     """Return the derivatives of the numbers of an increment, by differences of their formulas."""
     if low is None or high is None:
         return {}
@@ -162,7 +152,7 @@ def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side |
             external_work_mJ=side.work_mJ,
             dissipation_mJ=side.dissipation_mJ,
         )
-        row = table_row(problem.points, changed)
+        row = table_row(problem.points, changed, with_zones)
         return {name: value for name, value in row.items() if isinstance(value, float) and name not in _NONE}
 
     below, above = numbers(low), numbers(high)

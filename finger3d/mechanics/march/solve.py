@@ -87,7 +87,6 @@ class Press:
     ----------
     state, pose : after the last increment, at first before any contact
     has_failed : whether the last increment did not converge
-    path : of the leg in progress, where it is exact
     """
 
     def __init__(
@@ -108,7 +107,7 @@ class Press:
         relaxes = model.relaxation is not None and not model.finite_strain
         self._may_cut = not (model.is_defined_by_increments or (relaxes and costs))
         self._previous: tuple[Move, Float] | None = None
-        self.path: ExactPath | None = None
+        self._path: ExactPath | None = None
         self._leg: tuple[ObjectPose, float | None] | None = None
         self._share, self._work, self._dissipation = 1.0, 0.0, 0.0
         self._station: Station | None = None
@@ -228,11 +227,11 @@ class Press:
     def _along_path(self, station: Station) -> Advanced:
         """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
         end, load = station.leg_end or station.pose, station.load
-        path, leg = self.path, (end, None if load is None else float(load.forces[0]))
+        path, leg = self._path, (end, None if load is None else float(load.forces[0]))
         if path is None or self._leg != leg or self._share == 1.0:
             force = NormalForce(self._normal_force(self.state), leg[1], self._deepest) if leg[1] is not None else None
             path = solve_path(self.problem, self.state, Move(self.pose, end), force, station.leg_shares)
-            self.path, self._leg, self._share = path, leg, 0.0
+            self._path, self._leg, self._share = path, leg, 0.0
         there = path.between(self._share, station.share)
         self._share = station.share
         part = Substep(self.state, there.solution.state, Move(self.pose, there.pose))
@@ -397,4 +396,5 @@ class Press:
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
             parts=tuple((part.move.end, part.after) for part in end.parts),
+            path=self._path,
         )

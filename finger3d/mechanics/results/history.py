@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -146,7 +146,8 @@ class StepResult:
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface
     (`finger3d.mechanics.results.penetration`); `detail` describes a failure.  `parts` are the pose and the state of the
-    meshed part at the end of every part that the increment was solved in, the last one included.
+    meshed part at the end of every part that the increment was solved in, the last one included; `path` is the exact
+    path of its leg (`finger3d.mechanics.small_strain.exact_path`), if it has one.
     """
 
     target: ObjectPose
@@ -164,6 +165,7 @@ class StepResult:
     penetration_mm: float
     detail: str = ""
     parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
+    path: Any = field(default=None, repr=False)
 
     @property
     def named_readings(self) -> dict[str, float]:
@@ -206,8 +208,8 @@ class History:
         return next((f.outcome for f in self.steps if not f.outcome.ok), Outcome.CONVERGED)
 
 
-def measure(points: ContactPoints, step: StepResult) -> Tree:
-    """Entry of `steps` in summary.json for one increment.
+def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) -> Tree:
+    """Entry of `steps` in summary.json for one increment; lengths and areas of zones take most of its time.
 
     ``contact_half_length_mm`` and ``stick_half_length_mm`` are half the extents of contact and stick on the line z = 0
     (`finger3d.mechanics.results.zones`).  The line has the vertices of the surface mesh on it and the intersections of
@@ -215,11 +217,8 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     rest.  Readings are sorted by the kind of their sensors, and displacements have three components.
     """
     state, target = step.state, step.target
-    contact, stick, middle = *points.zones(state), points.middle_line()
-    facets, area = points.facets, points.facet_area
-    half_contact, half_stick = _half_extent(middle, contact), _half_extent(middle, stick)
-    at_end = {"contact_half_length_end_mm": _half_extent(points.end_line(), contact)} if points.dim == 3 else {}
-    points = points.with_basis_of(state)  # below, what depends on directions
+    sizes = _sizes_of_zones(points, state) if with_zones else {}
+    points = points.with_basis_of(state)
     world = points.to_global(state.force)
     friction = points.friction(state.force)
     x, z = points.points[:, 0], points.points[:, 2]
@@ -239,11 +238,7 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
         **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
         "outward_friction_x_N": float(outward_x.sum()),
         "outward_friction_z_N": float(outward_z.sum()),
-        "contact_area_mm2": zone_area(facets, area, contact),
-        "stick_area_mm2": zone_area(facets, area, stick),
-        "contact_half_length_mm": half_contact,
-        "stick_half_length_mm": half_stick,
-        **at_end,
+        **sizes,
     }
     others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
     return numbers | {
@@ -261,14 +256,27 @@ def measure(points: ContactPoints, step: StepResult) -> Tree:
     }
 
 
+def _sizes_of_zones(points: ContactPoints, state: ContactState) -> dict[str, float]:
+    """Return areas and half lengths of contact and stick."""
+    (contact, stick), middle = points.zones(state), points.middle_line()
+    facets, area = points.facets, points.facet_area
+    return {
+        "contact_area_mm2": zone_area(facets, area, contact),
+        "stick_area_mm2": zone_area(facets, area, stick),
+        "contact_half_length_mm": _half_extent(middle, contact),
+        "stick_half_length_mm": _half_extent(middle, stick),
+        **({"contact_half_length_end_mm": _half_extent(points.end_line(), contact)} if points.dim == 3 else {}),
+    }
+
+
 def _half_extent(line: tuple[Float, NDArray[np.int64]], zone: Zone) -> float:
     low, high = zone_ends(*line, zone)
     return 0.5 * (high - low)
 
 
-def table_row(points: ContactPoints, step: StepResult) -> Tree:
+def table_row(points: ContactPoints, step: StepResult, with_zones: bool = True) -> Tree:
     """Return the row of history.csv for one increment: its numbers, and its readings by the names of their columns."""
-    return row_of_entry(measure(points, step), step)
+    return row_of_entry(measure(points, step, with_zones), step)
 
 
 def row_of_entry(entry: TreeView, step: StepResult) -> Tree:

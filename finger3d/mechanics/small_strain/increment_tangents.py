@@ -52,7 +52,7 @@ _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
 
 _AT_ONCE = 32
-"""Increments that the body is solved for at once."""
+"""Increments that the body is solved for at once, which costs less than one after another."""
 
 
 @dataclass(frozen=True)
@@ -211,28 +211,31 @@ class IncrementTangents:
 
     @cached_property
     def _fixed(self) -> dict[bytes, FixedForces]:
-        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces.
-
-        Solutions for several forces at once cost less than one after another.
-        """
+        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
+        problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
         contacts = [after.contact for step in self._results for _, after in step.parts]
-        found = list[FixedForces]()
         for start in range(0, len(contacts), _AT_ONCE):
-            forces = [self.problem.upright_force(contact) for contact in contacts[start : start + _AT_ONCE]]
-            found += self._changes(np.array(forces), len(self._variations))
-        return dict(zip((contact.force.tobytes() for contact in contacts), found, strict=True))
-
-    def _changes(self, forces: Float, count: int) -> list[FixedForces]:
-        """Return what variations change in the body under each of several forces (k, c, d), for `count` parameters."""
-        columns = forces.reshape(len(forces), -1).T
-        displacement = np.zeros((*columns.shape, count))
-        readings = np.zeros((len(self.problem.system.reading_rows), len(forces), count))
-        if any(one.body for one in self._variations):
-            unknowns = np.column_stack(list(self.problem.unknowns_of(list(forces))))
+            some = contacts[start : start + _AT_ONCE]
+            rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
+            rows = problem.with_spring_forces(problem.body.condensed.compliance, rows)
+            sizes = problem.surface.points.size, len(problem.system.reading_rows)
+            displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
+            moved = self._changes_of_rows(rows, count)
             for k, one in enumerate(self._variations):
                 if one.body:
-                    displacement[..., k], readings[..., k] = one.body.of(self.problem, unknowns, columns)
-        return [FixedForces(displacement[:, i], readings[:, i]) for i in range(len(forces))]
+                    displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
+            for i, contact in enumerate(some):
+                found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
+        return found
+
+    def _changes_of_rows(self, forces: Float, count: int) -> Float:
+        """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""
+        moved = np.zeros((*forces.shape, count))
+        changed = [(k, one.body) for k, one in enumerate(self._variations) if one.body]
+        unknowns = self.problem.body.condensed.unknowns(forces) if changed else forces
+        for k, body in changed:
+            moved[..., k] = body.moved(self.problem, forces, unknowns)
+        return moved
 
     def _reached(
         self,

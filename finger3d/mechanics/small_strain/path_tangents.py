@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
@@ -38,7 +37,7 @@ from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.variations import Side, Variation
-from finger3d.objects import Move, ObjectPose, vertical_frame
+from finger3d.objects import ObjectPose, vertical_frame
 
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
@@ -65,17 +64,15 @@ class PathTangent:
     share: Float
     amplitude: Float
 
-    def changed(self, event: Event, k: int, t: float) -> Event:
-        """Return the place with parameter k changed by t."""
+    def changed(self, state: ContactState, k: int, t: float) -> ContactState:
+        """Return the state at the place with parameter k changed by t."""
         moved = t * self.displacement[k]
-        state = replace(
-            event.state,
-            force=event.state.force + t * self.force[k],
-            gap=event.state.gap + moved[:, 0],
-            tangential_displacement=event.state.tangential_displacement + moved[:, 1:],
+        return replace(
+            state,
+            force=state.force + t * self.force[k],
+            gap=state.gap + moved[:, 0],
+            tangential_displacement=state.tangential_displacement + moved[:, 1:],
         )
-        share, amplitude = event.share + t * self.share[k], event.amplitude + t * self.amplitude[k]
-        return event._replace(share=share, amplitude=amplitude, state=state)
 
 
 class RestTangent(NamedTuple):
@@ -113,22 +110,24 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
 
     They are in the directions of an upright object; None where a parameter changes nothing in the body.
     """
-    active, count = problem.system.active_dofs, len(problem.body.condensed.compliance)
+    condensed, active, size = problem.body.condensed, problem.system.active_dofs, problem.surface.points.size
     if not any(one.changes_compliance for one in variations):
         return [None] * len(variations)
-    unknowns = problem.unknowns_of_rows(np.eye(count, len(active)))
-    force = np.zeros((problem.surface.points.size, len(active)))
-    force[active, np.arange(len(active))] = 1.0
+    count = len(condensed.compliance)
+    unknowns = condensed.unknowns(np.eye(count)) if any(one.body for one in variations) else np.zeros((0, count))
+    forces = problem.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
+    on_points = np.eye(size)[:, active]
 
     def dense(rows: Float) -> Float:
-        out = np.zeros((len(rows), problem.surface.points.size))
+        out = np.zeros((len(rows), size))
         out[:, active] = rows
         return out
 
     def changes(one: Variation) -> tuple[Float, Float]:
-        none = np.zeros_like(force), np.zeros((len(problem.system.reading_rows), len(active)))
-        moved, read = one.body.of(problem, unknowns, force) if one.body else none
-        return dense(moved + one.object_displacement(force)), dense(read)
+        moved, read = np.zeros_like(on_points), np.zeros((len(problem.system.reading_rows), len(active)))
+        if one.body:
+            moved, read = one.body.of_points(problem, forces, one.body.compliance(unknowns) @ forces)
+        return dense(moved + one.object_displacement(on_points)), dense(read)
 
     return [changes(one) if one.changes_compliance else None for one in variations]
 
@@ -190,9 +189,11 @@ class PathTangents:
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
             self._force_slopes = begin, np.array(at_end)
         self._motions = motion, end
-        self._events, self._tangents = [path.start], [start]
+        self._events, self._tangents, self._energies = [path.start], [start], [np.zeros((2, len(variations)))]
         for piece, event in enumerate(path.events):
-            self._tangents.append(self._at_event(piece, event))
+            tangent = self._at_event(piece, event)
+            self._energies.append(self._energies_at(piece, event, tangent))
+            self._tangents.append(tangent)
             self._events.append(event)
 
     def at_share(self, share: float, status: Status | None = None) -> PlaceOnPath:
@@ -201,33 +202,26 @@ class PathTangents:
         piece = done - 1 if place is self._events[done] else done
         if status is not None:
             place = place._replace(state=replace(place.state, status=status))
-        events = [*self._events[: piece + 1], place]
-        tangents = [*self._tangents[: piece + 1], self._solved(piece, place)]
-        out = np.zeros((2, len(self.variations)))
-        for k, one in enumerate(self.variations):
-            low, high = (
-                self._moved_path(k, t).energies([x.changed(e, k, t) for x, e in zip(tangents, events, strict=True)])
-                for t in (-one.step, one.step)
-            )
-            out[:, k] = one.difference(np.array(low), np.array(high))
+        tangent = self._solved(piece, place)
+        energies = self._energies_at(piece, place, tangent)
         start = next((i for i in range(piece, 0, -1) if self._events[i].share < share * (1.0 - _SHORT)), 0)
-        return PlaceOnPath(self._events[start], self._tangents[start], tangents[-1], out)
+        return PlaceOnPath(self._events[start], self._tangents[start], tangent, energies)
 
     def sides(
         self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
-    ) -> tuple[list[Side], list[End]]:
-        """Return the sides (2 p,) of an increment that ends at a place, and their contact since the event before.
+    ) -> list[Side]:
+        """Return the sides (2 p,) of an increment that ends at a place.
 
         The energies (2, p) are the derivatives of work and dissipation at the start of the path.
         """
-        problem, contact, sides, ends = self.path.problem, step.meshed_state.contact, list[Side](), list[End]()
+        problem, contact, sides = self.path.problem, step.meshed_state.contact, list[Side]()
         contact = contact if status is None else replace(contact, status=status)
-        here, force = Event(0.0, 0.0, contact, 0.0, 0), problem.upright_force(contact).ravel()
+        force = problem.upright_force(contact).ravel()
         motion, total = self.motion(place.tangent, share), energies + place.energies
         for k, one in enumerate(self.variations):
             read = self._reading_changes[k] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
-                moved = place.tangent.changed(here, k, t).state
+                moved = place.tangent.changed(contact, k, t)
                 moved = replace(moved, bases=moved.own_bases + t * self._rest.bases[k])
                 side = Side(
                     end,
@@ -238,19 +232,26 @@ class PathTangents:
                     step.dissipation_mJ + t * total[1, k],
                 )
                 sides.append(side)
-                mu = np.full(len(force) // 2, end.model.friction.mu)
-                ends.append(End(place.first.changed(place.before, k, t).state, moved, mu))
-        return sides, ends
+        return sides
 
-    def one_sided(self, step: StepResult, share: float, energies: Float) -> tuple[Sides, Sides] | None:
+    def one_sided(
+        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float
+    ) -> tuple[Sides, Sides] | None:
         """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
-        problem, contact, before = self.path.problem, step.meshed_state.contact, self.at_share(share).before
-        here = End(before.state, contact, np.full(len(contact.gap), problem.model.friction.mu))
+        count = len(self.path.bases)
+
+        def end(before: ContactState, after: ContactState, problem: Problem) -> End:
+            return End(before, after, np.full(count, problem.model.friction.mu))
 
         def solved(status: Status) -> tuple[list[Side], list[End]]:
-            return self.sides(step, share, self.at_share(share, status), energies, status)
+            there = self.at_share(share, status)
+            sides = self.sides(step, share, there, energies, status)
+            signed = [(k, t) for k, one in enumerate(self.variations) for t in (-one.step, one.step)]
+            begun = [there.first.changed(there.before.state, *by) for by in signed]
+            return sides, [end(a, side.state.contact, side.problem) for a, side in zip(begun, sides, strict=True)]
 
-        length = problem.model.largest_depth_mm
+        here = end(place.before.state, step.meshed_state.contact, self.path.problem)
+        length = self.path.problem.model.largest_depth_mm
         if not is_kink(here, length):
             return None
         return one_sided(here, length, solved, -1), one_sided(here, length, solved, 1)
@@ -273,10 +274,25 @@ class PathTangents:
         half = np.einsum("cai,ciej,ebj->caeb", other, self.path.problem.delassus, own).reshape(2 * len(turn), -1)
         return np.asarray(half + half.T)
 
-    def _moved_path(self, k: int, t: float) -> ExactPath:
-        move = self.path.move
-        start, end = (moved_pose(p, t * m[k]) for p, m in zip((move.start, move.end), self._motions, strict=True))
-        return replace(self.path, move=Move(start, end), bases=self.path.bases + t * self._rest.bases[k])
+    def _energies_at(self, piece: int, event: Event, tangent: PathTangent) -> Float:
+        """Return the derivatives (2, p) of work and dissipation up to a place; see `ExactPath.energies`."""
+        path, before, first = self.path, self._events[piece], self._tangents[piece]
+        count, passed = path.count[:, None], event.share - before.share
+        mean = 0.5 * count * (before.state.force + event.state.force)
+        change = 0.5 * count * (first.force + tangent.force)
+        resultant = np.einsum("ca,cak->k", mean, path.bases)
+        turned = np.einsum("pca,cak->pk", change, path.bases) + np.einsum("ca,pcak->pk", mean, self._rest.bases)
+        if "x" in path.problem.axes:  # the halves of a mirrored finger cancel
+            resultant[0] = turned[:, 0] = 0.0
+        along = (path.move.end.displacement - path.move.start.displacement)[:2]
+        way = passed * along
+        way[1] -= event.amplitude - before.amplitude
+        moved = (tangent.share - first.share)[:, None] * along + passed * (self._motions[1] - self._motions[0])
+        moved[:, 1] -= tangent.amplitude - first.amplitude
+        slid = _relative(event.state) - _relative(before.state)
+        lost = np.einsum("pca,ca->p", change, slid)
+        lost += np.einsum("ca,pca->p", mean, tangent.displacement - first.displacement)
+        return np.asarray(self._energies[piece] + np.stack([turned @ way + moved @ resultant, -lost]))
 
     def _at_event(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at an event, which ends a piece of the path and moves with the parameters."""
@@ -349,25 +365,17 @@ class PathTangents:
             if change is not None:
                 free[k] += (change @ force.ravel()).reshape(c, 2)
         free += (base.reshape(count, -1) @ self._delassus.T).reshape(base.shape)
-        rows = np.concatenate([2 * touches, 2 * sticks + 1])
-        unknowns = sp.csr_array(
-            (
-                np.concatenate([np.ones(len(rows)), self.path.problem.model.friction.mu * sign[slips]]),
-                (
-                    np.concatenate([rows, 2 * slips + 1]),
-                    np.concatenate([np.arange(len(rows)), np.searchsorted(touches, slips)]),
-                ),
-            ),
-            shape=(2 * c, len(rows)),
-        )
-        through = self._delassus @ unknowns
+        rows, along = np.concatenate([2 * touches, 2 * sticks + 1]), self.path.problem.model.friction.mu * sign
+        through = self._delassus[:, rows]
+        through[:, : len(touches)] += along[touches] * self._delassus[:, 2 * touches + 1]
         target = np.zeros((count, c, 2))
         target[:, sticks, 1] = last.displacement[:, sticks, 1]
         matrix, right = through[rows], (target - free).reshape(count, -1)[:, rows]
         motion = np.zeros((2 * c, 0))
         if self._weights is not None:
             motion = self._closing[:, :, 1].reshape(-1, 1)
-            resultant = unknowns.T @ self._weights.ravel()
+            resultant = self._weights.ravel()[rows]
+            resultant[: len(touches)] += along[touches] * self._weights[touches, 1]
             wanted = (1.0 - share) * self._force_slopes[0] + share * self._force_slopes[1]
             wanted = wanted - np.einsum("ca,pca->p", self._weights, base)
             wanted -= np.einsum("pca,ca->p", self._turned_weights, force)
@@ -376,10 +384,10 @@ class PathTangents:
         solved = np.linalg.solve(matrix, right.T) if len(matrix) else np.zeros((0, count))
         own, amplitude = solved[: len(rows)], solved[len(rows) :]
         moved = free + (through @ own + motion @ amplitude).T.reshape(count, c, 2)
-        still = np.zeros(count)
-        return PathTangent(
-            base + (unknowns @ own).T.reshape(count, c, 2), moved, still, amplitude[0] if len(amplitude) else still
-        )
+        changed, still = base.reshape(count, -1), np.zeros(count)
+        changed[:, rows] += own.T
+        changed[:, 2 * touches + 1] += (along[touches, None] * own[: len(touches)]).T
+        return PathTangent(base, moved, still, amplitude[0] if len(amplitude) else still)
 
 
 def _relative(state: ContactState) -> Float:

@@ -17,10 +17,10 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.mesh.locate import locate
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solvers.condense import spring_forces
 from finger3d.fem.surface.traces import local_rows, restrict
 from finger3d.geometry.design import Design
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
@@ -28,9 +28,10 @@ from finger3d.mechanics.discretise.elastic_object import object_mesh, response_o
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
+from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
 
@@ -39,6 +40,9 @@ _FARTHEST = 1e-2
 
 _VOLUME, _ROUND_OFF = 0.05, 1e-9
 """Relative errors of the growth of a stretched body, and of its volume, that are those of its mesh."""
+
+_CELLS_OF_SECTION = 40
+"""Edges along half the section in whose mesh the inside of a body of several parts moves."""
 
 _INSIDE = 1.0 - 1e-9
 """Share of their distance from the axis at which points on the rim are inside in spite of round-off."""
@@ -66,19 +70,6 @@ class Side(NamedTuple):
     dissipation_mJ: float
 
 
-class FoilChange(NamedTuple):
-    """Derivatives of foils by a parameter.
-
-    Attributes
-    ----------
-    subgrid_compliance : (g + s, s), of gauges and bars under forces of the bars, that the mesh lacks
-    stiffness : (s,), of the bars, over itself
-    """
-
-    subgrid_compliance: Float
-    stiffness: Float
-
-
 @dataclass(frozen=True)
 class BodyChange:
     """Derivatives of a body by a parameter.
@@ -86,48 +77,50 @@ class BodyChange:
     Attributes
     ----------
     stiffness : (N, N) sparse
-    contact : (c d, N) sparse, of the rows of the contact points
-    readings : (g, N) sparse, of the other rows: readings, then the bars of foils
-    foils : None without
+    rows : (r, N) sparse, of the condensed rows
+    subgrid : (k, k), of the compliance of the last rows, gauges and bars, that the mesh lacks; empty without foils
+    bars : (s,), of the stiffness of bars, over itself
     """
 
     stiffness: Any
-    contact: Any
-    readings: Any
-    foils: FoilChange | None
+    rows: Any
+    subgrid: Float
+    bars: Float
 
-    def of(self, problem: Problem, unknowns: Float, force: Float) -> tuple[Float, Float]:
-        """Return the derivatives of contact displacements (c d, k) and readings (g, k) in several solutions.
+    def moved(self, problem: Problem, forces: Float, unknowns: Float) -> Float:
+        """Return the derivatives (r, k) of the rows at fixed forces (r, k) on them, which cause unknowns (N, k)."""
+        load = self.rows.T @ forces - self.stiffness @ unknowns
+        moved = problem.body.condensed.eliminated(load).displacement + self.rows @ unknowns
+        return self._with_subgrid(moved, forces)
+
+    def compliance(self, unknowns: Float) -> Float:
+        """Return the derivatives (r, r) of the rows under forces of 1 N on each, which cause unknowns (N, r)."""
+        half = self.rows @ unknowns
+        moved = half + half.T - unknowns.T @ (self.stiffness @ unknowns)
+        return self._with_subgrid(moved, np.eye(len(moved)))
+
+    def _with_subgrid(self, moved: Float, forces: Float) -> Float:
+        first = len(moved) - len(self.subgrid)
+        moved[first:] += self.subgrid @ forces[first:]
+        return np.asarray(moved)
+
+    def of_points(self, problem: Problem, forces: Float, moved: Float) -> tuple[Float, Float]:
+        """Return the derivatives of contact displacements (c d, k) and readings (g, k) at fixed contact forces.
 
         Parameters
         ----------
-        unknowns : (N, k), of the body under each of k loads
-        force : (c d, k) N, contact forces that are these loads
+        forces : (r, k) N, on the rows, those of springs included
+        moved : (r, k), derivatives of the rows' displacements at these forces
         """
-        active, condensed = problem.system.active_dofs, problem.body.condensed
-        load, springs = self.contact.T @ force, problem.inclusions.bar_stiffness
-        if self.foils is None:
-            moved = self.moved(problem, load, unknowns)
-        else:
-            loads, through = (
-                np.zeros((len(condensed.compliance), force.shape[1])),
-                condensed.compliance[:, -len(springs) :],
-            )
-            loads[: len(active)] = force[active]
-            held = spring_forces(condensed.compliance, springs, condensed.compliance @ loads)
-            moved = self.moved(problem, load + self.readings[-len(springs) :].T @ held, unknowns)
-            moved[-len(self.foils.subgrid_compliance) :] += self.foils.subgrid_compliance @ held
-            moved += through @ (self.foils.stiffness[:, None] * held)
-            moved += through @ spring_forces(condensed.compliance, springs, moved)
-        displacement = np.zeros_like(force)
+        active, compliance = problem.system.active_dofs, problem.body.condensed.compliance
+        if count := len(self.bars):
+            own = np.zeros_like(moved)
+            own[-count:] = self.bars[:, None] * forces[-count:]
+            moved = moved + compliance @ own
+            moved += compliance @ problem.with_spring_forces(compliance, np.zeros_like(moved), moved)
+        displacement = np.zeros((problem.surface.points.size, moved.shape[1]))
         displacement[active] = moved[: len(active)]
         return displacement, moved[len(active) :][: len(problem.system.reading_rows)]
-
-    def moved(self, problem: Problem, load: Float, unknowns: Float) -> Float:
-        """Return the derivatives of the rows (r, k) under forces that change the loads (N, k) as their places move."""
-        moved = problem.body.condensed.eliminated(load - self.stiffness @ unknowns).displacement
-        rows = (self.contact @ unknowns)[problem.system.active_dofs], self.readings @ unknowns
-        return np.asarray(moved + np.concatenate(rows))
 
 
 @dataclass(frozen=True)
@@ -195,27 +188,30 @@ def variation(problem: Problem, low: Model, high: Model, step: float) -> Variati
     changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
     change = None
     if changed & {*_IN_BODY, "inclusions"}:
-        if own.inclusions is not None and not own.is_linear_elastic:
-            raise Finger3dError("it changes foils or the body beside them, at large deformation or with viscosity")
         below, above = (_assembled(problem, end) for end in ends)
-        ends, change = [below.problem, above.problem], _change(problem, below, above, step)
+        ends, change = _changed(problem, below, above, step)
     if own.object_compliance is not None:
         ends = _beside_object(problem, ends, step, change)
     return Variation(ends[0], ends[1], step, change)
 
 
-def _change(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> BodyChange:
-    """Return what changes between two bodies."""
-    matrices = [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)]
-    change = BodyChange(matrices[0], matrices[1], matrices[2], None)
+def _changed(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> tuple[list[Problem], BodyChange]:
+    """Return the problems of two bodies, and what changes between these."""
+    ends = [below.problem, above.problem]
+    slopes = [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)]
+    change = BodyChange(slopes[0], slopes[1], np.zeros((0, 0)), np.zeros(0))
     if below.bars is None or above.bars is None:
-        return change
-    whole = [one.subgrid_compliance(np.zeros(())) for one in (below.bars, above.bars)]
-    stiff = (above.bars.bar_stiffness - below.bars.bar_stiffness) / (2.0 * step * problem.inclusions.bar_stiffness)
-    count, rows = len(stiff), len(problem.body.condensed.compliance)
-    under_bars = problem.body.condensed.unknowns(np.eye(rows, count, count - rows))
-    of_mesh = change.moved(problem, change.readings[-count:].T.toarray(), under_bars)[-len(whole[0]) :]
-    return replace(change, foils=FoilChange((whole[1] - whole[0])[:, -count:] / (2.0 * step) - of_mesh, stiff))
+        return ends, change
+    own, condensed = problem.inclusions, problem.body.condensed
+    count, size = len(own.bar_stiffness), len(condensed.compliance)
+    pulls = np.eye(size, count, count - size)
+    slope = change.moved(problem, pulls, condensed.unknowns(pulls))[-count:]
+    of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
+    low, high = below.bars.in_mesh(of_mesh - step * slope), above.bars.in_mesh(of_mesh + step * slope)
+    ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
+    subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
+    bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
+    return ends, replace(change, subgrid=subgrid, bars=bars)
 
 
 def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | None) -> list[Problem]:
@@ -228,7 +224,9 @@ def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, chang
     yielding, slope = system.delassus - system.object_compliance, np.zeros(len(pressed))
     soft = np.einsum("idje,je->id", yielding, pressed)[:, 0]
     if change is not None:
-        slope = change.of(problem, problem.unknowns(pressed)[:, None], pressed.reshape(-1, 1))[0][:: problem.dim, 0]
+        forces = problem.with_spring_forces(problem.body.condensed.compliance, problem.row_forces(pressed)[:, None])
+        moved = change.moved(problem, forces, problem.body.condensed.unknowns(forces))
+        slope = change.of_points(problem, forces, moved)[0][:: problem.dim, 0]
     out = []
     for end, t in zip(ends, (-step, step), strict=True):
         thing, scale = _object_compliance(problem, end), 1.0 + t * slope / soft
@@ -250,19 +248,28 @@ def _object_compliance(problem: Problem, end: Problem) -> Float:
         return problem.system.object_compliance
     if not is_moved and replace(thing, E_MPa=own.E_MPa) == own:
         return own.E_MPa / thing.E_MPa * problem.system.object_compliance
-    held = model.object.held_body(model.design, problem.dim == 3)
-    if problem.dim == 3 and held is not None and held.mesher != "swept":
-        raise Finger3dError("it changes the mesh of an elastic object")
     zone = model.first_contact.contact_box
-    (mesh, whole), (other, _) = object_mesh(problem, own, zone, QUIET), object_mesh(end, thing, zone, QUIET)
-    return response_of(end, thing, _moved(mesh, other), whole).compliance
+    mesh, whole = object_mesh(problem, own, zone, QUIET)
+    moved = stretched_object(mesh, model, end.model) or _moved(mesh, object_mesh(end, thing, zone, QUIET)[0])
+    return response_of(end, thing, moved, whole).compliance
+
+
+def stretched_object(mesh: Mesh, model: Model, other: Model) -> Mesh | None:
+    """Return an unstructured mesh of the elastic object of a model with the dimensions of another; None for others."""
+    bodies = [one.object.held_body(one.design, mesh.dim == 3) for one in (model, other)]
+    if mesh.dim == 2 or bodies[0] is None or bodies[1] is None or bodies[0].mesher == "swept":
+        return None
+    own = replace(mesh, points=bodies[0].to_design(mesh.points))
+    if bodies[0].design != bodies[1].design:
+        own = stretched(own, bodies[0].design, bodies[1].design)
+    return replace(mesh, points=bodies[1].to_scene(own.points))
 
 
 class _Assembled(NamedTuple):
     """Problem with another body on the same cells, its matrices as in a `BodyChange`, and the bars of its foils."""
 
     problem: Problem
-    matrices: tuple[Any, Any, Any]
+    matrices: tuple[Any, Any]
     bars: EmbeddedBars | None
 
 
@@ -283,20 +290,29 @@ def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
     """Return an unstructured mesh of a design with the dimensions of another one of its kind.
 
     The footprint stretches along x and z, and every vertical line from the base to the contact face stretches as well.
+    A body of several parts moves along x and y as a structured mesh of its section does.
 
     Raises
     ------
     Finger3dError
-        If the body is not that between its base and its contact face, or has parts.
+        If the body is not that between its base and its contact face, or has parts and no section.
     """
     points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
-    heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
-    stands = mesh.points[:, 1] > 0.0
-    points[stands, 1] *= heights[1][stands] / heights[0][stands]
+    if design.part_labels:
+        size = design.half_length_mm / _CELLS_OF_SECTION
+        zone = (-design.half_length_mm, design.half_length_mm, 0.0, 0.0)
+        flat, end = (mesh_section(one, MeshOptions(size, size), zone)[0] for one in (design, other))
+        cells, places = locate(flat, mesh.points[:, :2])
+        motion = (_moved(flat, end).points - flat.points)[flat.cells[cells]]
+        points[:, :2] = mesh.points[:, :2] + np.einsum("pk,pkd->pd", flat.element.shape(places), motion)
+    else:
+        heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
+        stands = mesh.points[:, 1] > 0.0
+        points[stands, 1] *= heights[1][stands] / heights[0][stands]
     moved = replace(mesh, points=points)
     growth = curved_volume(moved) / curved_volume(mesh) - 1.0
     wanted = other.volume_mm3 / design.volume_mm3 - 1.0
-    if design.part_labels or not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
+    if not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
         raise Finger3dError("it changes the cells of the mesh")
     return moved
 
@@ -323,13 +339,13 @@ def _assembled(problem: Problem, end: Problem) -> _Assembled:
     if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
         raise Finger3dError("it changes which foils are mirror images of each other")
     meshed = MeshedBody(mesh, problem.axes, matrix, thickness, moduli_of(elastic))
-    rows = [local_rows(face, vertical_frame(mesh.dim)), *rows_of_readings(model, meshed, bars)]
-    contact, *readings = (widened(part, upper.shape[0]) for part in rows)
-    read = sp.vstack(readings, format="csr") if readings else sp.csr_matrix((0, upper.shape[0]))
+    contact = local_rows(face, vertical_frame(mesh.dim))[problem.system.active_dofs]
+    parts = (contact, *rows_of_readings(model, meshed, bars))
+    rows = sp.vstack([widened(part, upper.shape[0]) for part in parts], format="csr")
     points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
     if (share := end.system.object_share) is not None:
         points = replace(points, compliance=points.compliance / (1.0 - share[problem.symmetry.image_of]))
     system = replace(end.system, surface=face, points=points)
     changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-    matrices = (upper + sp.triu(upper, 1).T).tocsr(), contact, read
+    matrices = (upper + sp.triu(upper, 1).T).tocsr(), rows
     return _Assembled(replace(end, system=system, condensed_body=changed), matrices, bars)

@@ -90,7 +90,7 @@ class Viscoelastic:
         if solution.state is before:
             return solution.with_state(state)
         contact = problem.row_forces(problem.upright_force(solution.state.contact))
-        rows = with_spring_forces(problem, body.compliance, contact, body.moved)
+        rows = problem.with_spring_forces(body.compliance, contact, body.moved)
         after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
         return solution.with_state(State(solution.state.contact, after, solution.state.last))
 
@@ -143,10 +143,3 @@ class Viscoelastic:
         strain, _ = problem.strain_and_stress(unknowns)
         stress = self.body(problem).stress(self.relaxation.prony, state.body.memory)
         return displacement(problem.mesh, unknowns), strain, stress
-
-
-def with_spring_forces(problem: Problem, compliance: Float, rows: Float, moved: Float) -> Float:
-    """Return forces (r, ...) on contact rows with those of inclusions, for displacements (r, ...) without them."""
-    if len(springs := problem.inclusions.bar_stiffness):
-        rows[-len(springs) :] = spring_forces(compliance, springs, moved + compliance @ rows)
-    return rows

@@ -27,7 +27,7 @@ from finger3d.mechanics.small_strain.increment_tangents import FixedForces, Incr
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
 from finger3d.mechanics.small_strain.variations import Side, Variation
-from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody, with_spring_forces
+from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody
 from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
 from finger3d.objects import Move
 
@@ -75,37 +75,41 @@ class ViscousTangents(IncrementTangents):
         return State(state.contact, state.body.displacement, state.last)
 
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> _FixedForces:
-        problem, memory = self.problem, part.after.body.memory
+        problem, memory, response = self.problem, part.after.body.memory, part.linear.response
         body, active = self.formulation.body(problem), problem.system.active_dofs
-        force, pasts = problem.upright_force(part.after.contact), _pasts(sides, moves)
+        forces, pasts = problem.row_forces(problem.upright_force(part.after.contact)), _pasts(sides, moves)
+        own = np.zeros((len(forces), len(steps) // 2))  # of springs whose stiffness changes
+        if count := len(springs := problem.inclusions.bar_stiffness):
+            forces[-count:] = -springs * body.read(memory.elastic)[-count:]
+            for k, one in enumerate(self._variations):
+                if one.body:
+                    own[-count:, k] = one.body.bars * forces[-count:]
         held = relaxed(part.linear.step.prony, memory)
         variables = slopes([(held + step.history_load(past)) / step.alpha for step, past in pasts], steps)
         if isinstance(body, ConstantBulkModulus):
-            now = then = self._with_constant_bulk(body, part, sides, steps, pasts, variables)
+            now = then = self._with_constant_bulk(body, part, forces, sides, steps, pasts, variables)
         else:
-            elastic = np.zeros(force.size)
-            elastic[active] = memory.elastic[: len(active)]
-            now, then = self._changes(np.stack([elastic.reshape(force.shape), force]), len(steps) // 2)
-        moved = now.displacement
-        rows, compliance = body.read(variables), part.linear.response.compliance
-        rows[: len(active)] += moved[active]
-        rows[len(active) :][: len(now.readings)] += now.readings
-        springs = with_spring_forces(problem, compliance, np.zeros_like(rows), rows)
-        displacement = np.zeros_like(moved)
-        displacement[active] = (rows + compliance @ springs)[: len(active)]
-        return _FixedForces(displacement, then.readings, variables, rows)
+            both = self._changes_of_rows(np.stack([memory.elastic, forces], axis=1), len(steps) // 2)
+            now, then = both[:, 0], both[:, 1] + body.read(own)
+        variables += _variables_under(response, own)
+        rows = body.read(variables) + now
+        follow = problem.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
+        displacement = np.zeros((part.after.contact.force.size, len(steps) // 2))
+        displacement[active] = (rows + response.compliance @ follow)[: len(active)]
+        return _FixedForces(displacement, then[len(active) :][: len(self._columns)], variables, rows)
 
     def _with_constant_bulk(
         self,
         body: ConstantBulkModulus,
         part: Part,
+        forces: Float,
         sides: Sequence[Side],
         steps: Float,
         pasts: Sequence[_Past],
         variables: Float,
-    ) -> FixedForces:
-        """Enter the derivatives of displacements and dilatations (N, p); return what the rows change at fixed ones."""
-        now, force = part.after.body.memory.elastic, self.problem.upright_force(part.after.contact).ravel()
+    ) -> Float:
+        """Enter the derivatives of displacements and dilatations (N, p) under row forces (r,); return those of rows."""
+        now, rows = part.after.body.memory.elastic, np.zeros((len(forces), len(steps) // 2))
         workspaces = [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]
         bodies = [ConstantBulkModulus(side.problem) for side in sides]
         internal = [
@@ -113,12 +117,11 @@ class ViscousTangents(IncrementTangents):
             for one, past, workspace in zip(bodies, pasts, workspaces, strict=True)
         ]
         load = -slopes(internal, steps)
-        rows = FixedForces(np.zeros((len(force), len(steps) // 2)), np.zeros((len(self._columns), len(steps) // 2)))
         for k, one in enumerate(self._variations):
             if one.body:
-                load[:, k] += one.body.contact.T @ force
-                rows.displacement[:, k] = one.body.contact @ now[: len(load)]
-                rows.readings[:, k] = one.body.readings @ now[: len(load)]
+                load[:, k] += one.body.rows.T @ forces
+                rows[:, k] = one.body.rows @ now[: len(load)]
+                rows[len(rows) - len(one.body.subgrid) :, k] += one.body.subgrid @ now[len(load) :]
         alpha, condensed = body.condensed(part.linear.step, self._workspace)
         variables[: len(load)] = body.shape(condensed.solve(load), alpha)
         return rows
@@ -136,9 +139,8 @@ class ViscousTangents(IncrementTangents):
         problem, response, memory = self.problem, part.linear.response, part.after.body.memory
         body, first = self.formulation.body(problem), len(problem.system.active_dofs)
         rows = slopes([problem.row_forces(problem.upright_force(state.contact)) for state in states], steps)
-        rows = with_spring_forces(problem, response.compliance, rows, fixed.rows)
-        free = response.shape(np.zeros(len(rows)))
-        variables = fixed.variables + np.stack([response.shape(row) - free for row in rows.T], axis=-1)
+        rows = problem.with_spring_forces(response.compliance, rows, fixed.rows)
+        variables = fixed.variables + _variables_under(response, rows)
         read = (fixed.rows + response.compliance @ rows)[first:][: len(self._columns)]
         is_pressure = np.array([column.kind == "taxel" for column in self._columns], dtype=bool)
         if is_pressure.any() and not isinstance(body, ConstantBulkModulus):  # of the relaxed stress
@@ -161,6 +163,12 @@ class ViscousTangents(IncrementTangents):
     def _read(self, problem: Problem, state: State[ViscousBody]) -> Float:
         found = formulation_of(problem.model).readings(problem, state)
         return np.array([found[column] for column in self._columns])
+
+
+def _variables_under(response: Response, rows: Float) -> Float:
+    """Return the internal variables (q, p) that forces (r, p) on the rows cause."""
+    free = response.shape(np.zeros(len(rows)))
+    return np.stack([response.shape(row) - free for row in rows.T], axis=-1)
 
 
 def _pasts(sides: Sequence[Side], moves: Sequence[Move]) -> list[_Past]:
