@@ -46,7 +46,7 @@ def test_a_body_at_rest_is_expected_at_the_depth_of_small_strain() -> None:
     large = replace(problem, model=LargeDeformation().apply(problem.model))
     for forecast_mm in (0.05, 0.3, 1.5):
         move = Move(ObjectPose(0.0), ObjectPose(forecast_mm))
-        # the force grows at least in proportion to the depth, and is met to 1e-3 or by the last of two like trials, 0.1
+        # two increments by power laws, of which the second has the power between the two: an estimate
         assert expected_depth(large, None, move, (0.0, force)) == pytest.approx(0.3, rel=0.1)
         assert expected_depth(problem, None, move, (0.0, force)) == forecast_mm
 

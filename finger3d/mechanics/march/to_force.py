@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +13,6 @@ from finger3d.contact.state import ContactSolution
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import increment_to_force
-from finger3d.mechanics.march.force_control import DepthSearch, Trial, deepest
 from finger3d.mechanics.march.parts import Substep
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
@@ -26,8 +24,8 @@ _CUTS = 3
 _NEAR = 0.2
 """Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
 
-_NEAR_ENOUGH = 1e-3
-"""Relative error of the force in small strain at which the search for its depth ends."""
+_SMALL_STRAIN = 2
+"""Increments of small strain after which the depth of a force is near enough to begin with."""
 
 _HERTZ = 2.0 / 3.0
 """Power of the force with which the depth grows under a ball (Hertz 1881)."""
@@ -81,27 +79,25 @@ def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: t
     """
     force, wanted = forces
     if force <= 0.0 and problem.model.finite_strain:
-        found = _at_small_strain(problem, move.end, wanted)
-        if found.ok:
-            return found.depth
+        return _at_small_strain(problem, move.end, wanted)
     if last is None:
         return move.end.depth_mm
     before = last.move.start.depth_mm, normal_force(problem, last.before)
     return by_power_law(before, (move.start.depth_mm, force), wanted)
 
 
-def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float) -> Trial:
-    """Return the increment of small strain from rest that has a normal force (N), from a pose at another depth."""
-    small, obj, height = SmallStrain(), problem.model.object, problem.model.design.height_mm
+def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float) -> float:
+    """Return a depth (mm) near that of a normal force (N) in small strain, from increments to the pose and onwards."""
+    small, depth, known = SmallStrain(), pose.depth_mm, (0.0, 0.0)
     workspace, rest = small.workspace(), small.start(problem)
-
-    def pressed(depth: float, good: Sequence[Trial]) -> Trial:
-        guess = good[-1].solution.state.contact.force if good else None
-        found = small.increment(problem, rest, Move(problem.origin, replace(pose, depth_mm=depth)), guess, workspace)
-        return Trial(depth, found, normal_force(problem, found.state) if found.outcome.ok else math.nan)
-
-    most = deepest(obj, problem.system.first_contact_mm, height)
-    return DepthSearch(pressed, wanted, 0.0, most, target=_NEAR_ENOUGH).run(pose.depth_mm)
+    for _ in range(_SMALL_STRAIN):
+        move = Move(problem.origin, replace(pose, depth_mm=depth))
+        found = small.increment(problem, rest, move, None, workspace)
+        now = depth, normal_force(problem, found.state)
+        if not found.outcome.ok or now[1] <= 0.0:
+            break
+        depth, known = by_power_law(known, now, wanted), now
+    return depth
 
 
 def by_power_law(before: tuple[float, float], now: tuple[float, float], wanted: float) -> float:
