@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from finger3d._cost import PressSize
 from finger3d.accuracy.cost import AddedCost, forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
@@ -19,7 +20,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.objects import Plane, Sphere
+from finger3d.mechanics.small_strain.linear_contact import Increment
+from finger3d.objects import Plane, RigidObject, Sphere, Wave
 from finger3d.scene import load
 
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -71,6 +73,24 @@ def test_gauges_and_increments_are_counted() -> None:
     kept = 10_000 * 2 * 8 * 6 * without["contact_points"] / 1e6
     assert long["memory_MB"] - without["memory_MB"] > kept
     assert long["total_s"] > without["total_s"] + 20.0
+
+
+@pytest.mark.parametrize("obj", [Sphere(radius_mm=100.0), Wave(wavelength_mm=20.0, amplitude_mm=0.5)])
+def test_contact_under_a_curved_object_is_solved_as_often_as_foretold(
+    obj: RigidObject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, solutions = replace(baseline("solid"), object=obj), [0]
+    solve = Increment.solve_linearised
+
+    def counted(*arguments: Any) -> Any:
+        solutions[0] += 1
+        return solve(*arguments)
+
+    monkeypatch.setattr(Increment, "solve_linearised", counted)
+    increments = len(list(march(build(model))))
+    told = forecast(model)
+    once = PressSize(3, told["dofs"], told["contact_points"]).contact_s
+    assert told["contact_s"] / (increments * once) == pytest.approx(solutions[0] / increments, rel=0.6)
 
 
 @pytest.mark.parametrize("many", [{"gauges": tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))},

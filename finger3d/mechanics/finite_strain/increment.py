@@ -82,7 +82,8 @@ class FiniteIncrement(IncrementEquations):
         The increment that is returned has the motion that was found, if that is unknown.
         """
         first = increment, now, force = self, *self.initial(guess)
-        linearisation, factors, spent, error = self.last_linearisation(), 0, 0, math.inf
+        is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
+        linearisation, factors, spent, error = None if is_new else self.last_linearisation(), 0, 0, math.inf
         for _ in range(_ITERATIONS):
             if linearisation is None:
                 if factors == self.most_factors:

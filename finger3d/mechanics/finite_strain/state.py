@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from finger3d.objects import Move, ObjectPose
 
 TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to the tolerance that no longer falls."""
+
+_ROUGH = 1e-4
+"""Residual of a solution near which others begin."""
 
 _CURVATURE_STEP = 0.1
 """Step of the differences of the object's normals, over the edge length of the mesh."""
@@ -81,6 +85,10 @@ class FiniteStrainWorkspace(Workspace):
     ends: dict[Move, tuple[Float, Float]] | None = None
     bodies: dict[bool, FiniteBody] = field(default_factory=dict)
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
+
+    def rough(self) -> Self:
+        """Return a workspace for solutions near which others begin, with the same factors and a count of its own."""
+        return replace(super().rough(), target=_ROUGH, ends=None)
 
 
 def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:

@@ -41,13 +41,10 @@ _STIFFENING = 5.0
 _NEARER = (0.5, 0.25, 0.125)
 """Shares of the first stride at which contact is looked for if there is none at its end."""
 
-_LEAST_POWER = 2.0 / 3.0
-"""Power of the force with which the depth grows under a ball (Hertz 1881); a longer first trial is not taken."""
-
 _SIMILAR = 0.15
 """Relative change of the depth up to which increments are similar."""
 
-_SAME, _REPEATED, _CONTRACTION = 1e-7, 7, 0.5
+_SAME, _REPEATED, _CONTRACTION = 1e-6, 7, 0.5
 """Relative difference of the depths of an increment and of its parts at which these are not adapted any more, largest
 number of times, and change of the one with the other below which it is extrapolated."""
 
@@ -87,22 +84,6 @@ class Trial:
     def ok(self) -> bool:
         """Whether the increment converged."""
         return self.solution.outcome.ok
-
-
-def first_trial(start: float, stride: float, force: float, wanted: float) -> float:
-    """Return the depth (mm) of the first trial: one stride on, but no deeper than Hertz's law for a ball has it.
-
-    It is that of this law where the force is held or falls after an increment that went deeper.
-
-    Parameters
-    ----------
-    start, stride : mm, depth before the increment, and how much deeper it may go
-    force, wanted : before the increment, and prescribed, N
-    """
-    if not (start > 0.0 and force > 0.0):
-        return start + stride
-    by_hertz = float(start * (wanted / force) ** _LEAST_POWER)
-    return min(start + stride, by_hertz) if wanted > force or stride > 0.0 else start + stride
 
 
 def target(finite_strain: bool) -> float:

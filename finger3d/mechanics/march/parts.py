@@ -18,6 +18,10 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import Move, ObjectPose
 
+FIRST_PARTS = 1.0 / 16.0, 0.25
+"""Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
+ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
+
 
 @dataclass(frozen=True)
 class Substep:
@@ -53,18 +57,20 @@ def solved_in_turn(
     """Solve the parts of an increment one after another; the guess (c, d), N, of the forces is that of the last.
 
     A part that does not converge is halved and repeated from the same state, at most `cuts` times.  If as many parts of
-    a similar increment at finite strain are given, `near`, each begins its iteration at the end of its like.
+    a similar increment at finite strain are given, `near`, each begins its iteration at the end expected from its like.
     """
     found, parts, now = list[ContactSolution[State[Any]]](), list[Substep](), state
     for number, move in enumerate(moves):
         start = guess if move is moves[-1] else None
         if len(near) == len(moves):
-            end = near[number].after
-            now, start = expecting(now, move, (end, end), 0.0), end.contact.force
-        one, more = _solved(problem, workspace, now, move, cuts, start)
-        found, parts, now = [*found, one], parts + more, one.state
-        if not one.outcome.ok:
-            now = one.state if one.outcome.is_cycle else state
+            one, other = near[number].after, near[number].before
+            share = (move.length_ratio(near[number].move) or 1.0) - 1.0
+            now = expecting(now, move, (one, other), share)
+            start = one.contact.force + share * (one.contact.force - other.contact.force)
+        end, more = _solved(problem, workspace, now, move, cuts, start)
+        found, parts, now = [*found, end], parts + more, end.state
+        if not end.outcome.ok:
+            now = end.state if end.outcome.is_cycle else state
             break
     return replace(
         found[-1],

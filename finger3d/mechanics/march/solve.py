@@ -18,9 +18,10 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
-from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, deepest, first_trial, is_similar, target
-from finger3d.mechanics.march.parts import Advanced, Substep, energies, expecting, solved_in_turn
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, deepest, is_similar, target
+from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, expecting, solved_in_turn
 from finger3d.mechanics.march.path import Load, Station, stations
+from finger3d.mechanics.march.to_force import approached, expected_depth, forces_on, is_near, normal_force
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.slip_limit import largest_force
@@ -31,13 +32,6 @@ from finger3d.progress import QUIET, Progress
 
 _CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
-
-_FIRST_PARTS = 1.0 / 16.0, 0.25
-"""Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
-ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
-
-_NEAR = 0.2
-"""Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
 
 
 def march(
@@ -107,6 +101,7 @@ class Press:
         relaxes = model.relaxation is not None and not model.finite_strain
         self._may_cut = not (model.is_defined_by_increments or (relaxes and costs))
         self._previous: tuple[Move, Float] | None = None
+        self._last_part: Substep | None = None
         self._path: ExactPath | None = None
         self._leg: tuple[ObjectPose, float | None] | None = None
         self._share, self._work, self._dissipation = 1.0, 0.0, 0.0
@@ -154,6 +149,7 @@ class Press:
         self._before = self.state, self._work, self._dissipation
         self._add_energies(end)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
+        self._last_part = end.parts[-1] if end.parts else None
         self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
         return self._result(end, self._free_strain(station))
@@ -191,7 +187,7 @@ class Press:
         """Return the motions in which an increment to a pose is solved: several where contact begins."""
         move = Move(self.pose, pose)
         begins = self._may_cut and move.may_close_gaps and not self.state.contact.force.any()
-        return move.cut(*_FIRST_PARTS) if begins else (move,)
+        return move.cut(*FIRST_PARTS) if begins else (move,)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
         moves = self.moves_to(pose)
@@ -214,7 +210,7 @@ class Press:
 
     def _wanted(self, load: Load) -> tuple[Float, Float]:
         """Return the forces (3,) N now, and those prescribed at the end of the increment."""
-        forces = self._forces(self.state)
+        forces = forces_on(self.problem, self.state)
         if load.begins:
             self._leg_start_N = forces
         return forces, self._leg_start_N + load.share * (load.forces - self._leg_start_N)
@@ -226,11 +222,12 @@ class Press:
 
     def _along_path(self, station: Station) -> Advanced:
         """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
-        end, load = station.leg_end or station.pose, station.load
+        problem, end, load = self.problem, station.leg_end or station.pose, station.load
         path, leg = self._path, (end, None if load is None else float(load.forces[0]))
         if path is None or self._leg != leg or self._share == 1.0:
-            force = NormalForce(self._normal_force(self.state), leg[1], self._deepest) if leg[1] is not None else None
-            path = solve_path(self.problem, self.state, Move(self.pose, end), force, station.leg_shares)
+            now = normal_force(problem, self.state)
+            force = None if leg[1] is None else NormalForce(now, leg[1], self._deepest)
+            path = solve_path(problem, self.state, Move(self.pose, end), force, station.leg_shares)
             self._path, self._leg, self._share = path, leg, 0.0
         there = path.between(self._share, station.share)
         self._share = station.share
@@ -240,9 +237,9 @@ class Press:
     def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one.
 
-        Every trial begins at the end expected from those before it.  At finite strain the depth is an unknown of the
-        iteration, from a trial with a force of that size.  If the force is not reached, the solution says why, and
-        state and pose are those at the beginning.
+        The depth is an unknown of the iteration, at finite strain near a rough solution, see `approached`.  Where that
+        does not converge, depths are tried, each from the end expected from those before it.  If the force is not
+        reached, the solution says why, and state and pose are those at the beginning.
         """
         problem, state, parts, trials = self.problem, self.state, dict[float, list[Substep]](), list[Trial]()
         (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
@@ -268,16 +265,16 @@ class Press:
                 near = parts[good[-1].depth] if is_finite and is_similar(depth, good[-1].depth) else []
             moves = self.moves_to(there.end)
             found, its_parts = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess, near)
-            reached = self._normal_force(found.state) if found.outcome.ok else np.nan
+            reached = normal_force(problem, found.state) if found.outcome.ok else np.nan
             trial = noted(Trial(depth, found, reached), its_parts)
-            if not (is_finite and _NEAR * wanted < reached < wanted / _NEAR):
-                return trial
-            end = to_force_from_last(its_parts)
-            return trial if end is None else adapted(end, depth, repeated) if its_parts[:-1] else end
+            end = to_force_from_last(its_parts) if is_finite and is_near(reached, wanted) else None
+            return trial if end is None else adapted(end, depth, repeated)
 
         def repeated(trial: Trial, depth: float, near_last: bool) -> Trial | None:
             its_parts, (*earlier, last) = parts[trial.depth], self.moves_to(replace(move.end, depth_mm=depth))
-            whole = len(its_parts) == len(earlier) + 1
+            if not earlier:
+                return None
+            whole = len(its_parts) in (1, len(earlier) + 1)
             moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
             found, now = solved_in_turn(problem, self.workspace, state, moves, self._cuts, None, near)
             now += [Substep(found.state, trial.solution.state, last)] if whole else []
@@ -293,15 +290,25 @@ class Press:
             if found is None or found[0].end.depth_mm > self._deepest:
                 return None
             there, solution = found
-            trial = Trial(there.end.depth_mm, solution, self._normal_force(solution.state))
+            trial = Trial(there.end.depth_mm, solution, normal_force(problem, solution.state))
             return noted(trial, [*before, Substep(start, solution.state, there)])
 
+        def directly(depth: float) -> Trial | None:
+            there = Move(move.start, replace(move.end, depth_mm=depth))
+            guess = self.expected_force(there.end)
+            if not is_finite:
+                return to_force(state, there, guess, []) if force > 0.0 else None
+            near = approached(problem, self.workspace, (state, guess), there, (force, wanted))
+            if near is None:
+                return None
+            depth, one = near[0].end.depth_mm, [Substep(state, near[1].state, near[0])]
+            begun = noted(Trial(depth, near[1], normal_force(problem, near[1].state)), one)
+            end = repeated(begun, depth, False) if self.moves_to(near[0].end)[1:] else to_force_from_last(one)
+            return end and adapted(end, depth, repeated)
+
         search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target(is_finite))
-        stride = start_mm - self._previous[0].start.depth_mm if self._previous else move.end.depth_mm
-        first = first_trial(start_mm, stride, force, wanted)
-        there = Move(move.start, replace(move.end, depth_mm=first))
-        touching = force > 0.0 and to_force(state, there, self.expected_force(there.end), [])
-        last = touching or search.run(first)
+        first = expected_depth(problem, self._last_part, move, (force, wanted))
+        last = directly(first) or search.run(first)
         solution = replace(last.solution, iterations=sum(trial.solution.iterations for trial in trials))
         if not last.ok:
             return Advanced(replace(solution, state=state), [], move.start)
@@ -332,7 +339,7 @@ class Press:
                     start = expecting(state, there, (near.solution.state, near.solution.state), 0.0)
             moves = self.moves_to(there.end)
             found, parts[place.tobytes()] = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess)
-            reached = self._forces(found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
+            reached = forces_on(problem, found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
             return PoseTrial(place, found, reached)
 
         def largest(trial: PoseTrial) -> float:
@@ -358,14 +365,6 @@ class Press:
             return Advanced(replace(last.solution, state=state, iterations=search.iterations), [], move.start)
         pose = parts[last.place.tobytes()][-1].move.end
         return Advanced(replace(last.solution, iterations=search.iterations), parts[last.place.tobytes()], pose)
-
-    def _forces(self, state: State[Any]) -> Float:
-        """Normal force and forces along x and z (3,) N, as in a `Load`."""
-        x, y, z = self.problem.world_force(state.contact).sum(axis=0).tolist()
-        return np.array([0.0 - y, x, z])
-
-    def _normal_force(self, state: State[Any]) -> float:
-        return float(self._forces(state)[0])
 
     def _free_strain(self, station: Station) -> dict[Column, float]:
         """Strain of every gauge in the body without inclusions; NaN once it has failed."""

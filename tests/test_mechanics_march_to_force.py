@@ -1,0 +1,82 @@
+"""Where increments to a force begin: at the depth of small strain or of a power law, near a rough solution."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.formulations import formulation_of, increment_to_force
+from finger3d.mechanics.march.parts import Substep
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.to_force import (
+    approached,
+    by_power_law,
+    expected_depth,
+    forces_on,
+    is_near,
+    normal_force,
+)
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.results.history import measure
+from finger3d.objects import Move, ObjectPose
+from tests.models import block, ended, small_section
+
+
+@pytest.mark.parametrize("power", [0.5, 2.0 / 3.0, 1.0])  # a cylinder, a ball, and a flat punch
+def test_the_depth_follows_the_power_law_of_the_last_increment(power: float) -> None:
+    (d0, d1, d2), (f0, f1, f2) = (tuple(f**power for f in (1.0, 2.0, 7.0))), (1.0, 2.0, 7.0)
+    assert by_power_law((d0, f0), (d1, f1), f2) == pytest.approx(d2, rel=1e-14)
+    assert by_power_law((d2, f2), (d1, f1), f0) == pytest.approx(d0, rel=1e-14)
+
+
+def test_without_a_power_the_depth_is_that_of_a_ball_or_one_stride_on() -> None:
+    assert by_power_law((0.0, 0.0), (1.0, 1.0), 8.0) == pytest.approx(4.0)
+    assert by_power_law((0.9, 1.0), (1.0, 1.0), 1.0) == 1.0
+    assert by_power_law((0.9, 1.0), (1.0, 1.01), 2.02) == 2.0  # no softer than a punch
+    assert by_power_law((0.5, 2.0), (-0.25, 1.0), 2.0) == -1.0
+
+
+def test_a_body_at_rest_is_expected_at_the_depth_of_small_strain() -> None:
+    problem, last = ended(block(legs=(Leg(0.3, steps=1),), friction=Coulomb(0.0)))
+    force = measure(problem.points, last)["normal_force_N"]
+    large = replace(problem, model=LargeDeformation().apply(problem.model))
+    for forecast_mm in (0.05, 0.3, 1.5):
+        move = Move(ObjectPose(0.0), ObjectPose(forecast_mm))
+        # two increments by power laws, of which the second has the power between the two: an estimate
+        assert expected_depth(large, None, move, (0.0, force)) == pytest.approx(0.3, rel=0.1)
+        assert expected_depth(problem, None, move, (0.0, force)) == forecast_mm
+
+
+def test_a_later_depth_is_that_of_the_power_law() -> None:
+    problem, last = ended(block(legs=(Leg(0.1, steps=1),)))
+    (_, before), (pose, after) = last.parts[-2:]
+    part = Substep(before, after, Move(last.parts[-2][0], pose))
+    now = normal_force(problem, after)
+    assert forces_on(problem, after) == pytest.approx([now, 0.0, 0.0], abs=1e-12)
+    assert expected_depth(problem, part, Move(pose, ObjectPose(0.3)), (now, 2.0 * now)) == pytest.approx(
+        by_power_law((0.025, normal_force(problem, before)), (0.1, now), 2.0 * now), rel=1e-14
+    )
+
+
+def test_a_force_out_of_reach_of_one_increment_is_approached_in_parts() -> None:
+    problem = build(LargeDeformation().apply(small_section(legs=(Leg(1.2, steps=4),))))
+    deep = list(march(problem))[-1]
+    wanted, formulation = measure(problem.points, deep)["normal_force_N"], formulation_of(problem.model)
+    workspace, start = formulation.workspace(), (formulation.start(problem), None)
+    move = Move(ObjectPose(0.0), ObjectPose(1.2))
+    assert increment_to_force(problem, start, move, wanted, workspace) is None
+    before = workspace.factorizations
+    end = approached(problem, workspace, start, move, (0.0, wanted))
+    assert workspace.factorizations > before
+    assert end is not None
+    assert end[0].end.depth_mm == pytest.approx(1.2, rel=3e-3)  # 1.1e-3: it slips in other increments than the press
+    assert normal_force(problem, end[1].state) == pytest.approx(wanted, rel=1e-3)
+    assert approached(problem, workspace, start, move, (0.0, wanted), cuts=0) is None
+
+
+def test_an_iteration_to_a_force_begins_within_a_factor_of_five() -> None:
+    assert [is_near(force, 10.0) for force in (1.9, 2.1, 49.0, 51.0, float("nan"))] == [False, True, True, False, False]
