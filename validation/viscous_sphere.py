@@ -29,10 +29,10 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.discretise.problem import AddedStiffness
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.small_strain.elastic import SmallStrain

@@ -7,12 +7,13 @@ what the mesh resolves, so that ``e = T / k + S T`` (with S relaxing, see `BarRe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
+from finger3d.fem.solvers.condense import spring_forces
 from finger3d.fem.tensors import block_diagonal
 
 
@@ -93,3 +94,33 @@ class Bars:
         nodes = np.unique(self.relative.indices // self.directions.shape[1]).astype(np.int64)
         first, second = np.meshgrid(nodes, nodes, indexing="ij")
         return first.ravel(), second.ravel()
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddedStiffness:
+    """Stiffness of inclusions on the last rows of a condensed body.
+
+    Attributes
+    ----------
+    bars : the inclusions at finite strain; None without
+    gauge_weights : (g, s) strain of each gauge from those of the bars
+    bar_stiffness : (s,) N mm
+        Stiffness that the inclusions add to each of the last s rows.
+    subgrid_compliance : (g + s, g + s)
+        Compliance of the last rows, gauges and inclusions, that the mesh does not resolve.
+    """
+
+    bars: Bars | None = None
+    gauge_weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
+    subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def with_spring_forces(self, compliance: Float, rows: Float, moved: Float | None = None) -> Float:
+        """Return forces (r, ...) on condensed rows with those of inclusions, for displacements (r, ...) without these."""
+        if len(springs := self.bar_stiffness):
+            without = compliance @ rows if moved is None else moved + compliance @ rows
+            rows[-len(springs) :] = spring_forces(compliance, springs, without)
+        return rows

@@ -18,9 +18,9 @@ from finger3d.fem.assembly import Stiffness
 from finger3d.fem.mesh.parts import moduli_of
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.recovery.recover import strain_and_stress
-from finger3d.fem.solids.bars import Bars
+from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solids.material import LinearElasticity
-from finger3d.fem.solvers.condense import Condensation, spring_forces
+from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.traces import BoundarySurface, joined, surface
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
@@ -85,29 +85,6 @@ class ContactSystem:
     object_factorizations: int = 0
     object_compliance: Float | None = None
     object_share: Float | None = None
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class AddedStiffness:
-    """Stiffness of inclusions on the last rows of a condensed body.
-
-    Attributes
-    ----------
-    bars : the inclusions at finite strain; None without
-    gauge_weights : (g, s) strain of each gauge from those of the bars
-    bar_stiffness : (s,) N mm
-        Stiffness that the inclusions add to each of the last s rows.
-    subgrid_compliance : (g + s, g + s)
-        Compliance of the last rows, gauges and inclusions, that the mesh does not resolve.
-    """
-
-    bars: Bars | None = None
-    gauge_weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
-    bar_stiffness: Float = field(default_factory=lambda: np.zeros(0))
-    subgrid_compliance: Float = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -267,14 +244,7 @@ class Problem:
     def unknowns_of_rows(self, rows: Float) -> Float:
         """All unknowns (N, ...) under forces (r, ...) on the condensed rows; springs add theirs."""
         condensed = self.body.condensed
-        return condensed.unknowns(self.with_spring_forces(condensed.compliance, rows))
-
-    def with_spring_forces(self, compliance: Float, rows: Float, moved: Float | None = None) -> Float:
-        """Forces (r, ...) on the condensed rows with those of inclusions, for displacements (r, ...) without any."""
-        if len(springs := self.inclusions.bar_stiffness):
-            without = compliance @ rows if moved is None else moved + compliance @ rows
-            rows[-len(springs) :] = spring_forces(compliance, springs, without)
-        return rows
+        return condensed.unknowns(self.inclusions.with_spring_forces(condensed.compliance, rows))
 
 
 def free_surface(model: Model, mesh: Mesh, thickness: float) -> BoundarySurface:

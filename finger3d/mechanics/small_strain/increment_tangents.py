@@ -217,7 +217,7 @@ class IncrementTangents:
         for start in range(0, len(contacts), _AT_ONCE):
             some = contacts[start : start + _AT_ONCE]
             rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
-            rows = problem.with_spring_forces(problem.body.condensed.compliance, rows)
+            rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
             sizes = problem.surface.points.size, len(problem.system.reading_rows)
             displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
             moved = self._changes_of_rows(rows, count)

@@ -115,7 +115,7 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
         return [None] * len(variations)
     count = len(condensed.compliance)
     unknowns = condensed.unknowns(np.eye(count)) if any(one.body for one in variations) else np.zeros((0, count))
-    forces = problem.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
+    forces = problem.inclusions.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
     on_points = np.eye(size)[:, active]
 
     def dense(rows: Float) -> Float:

@@ -117,7 +117,7 @@ class BodyChange:
             own = np.zeros_like(moved)
             own[-count:] = self.bars[:, None] * forces[-count:]
             moved = moved + compliance @ own
-            moved += compliance @ problem.with_spring_forces(compliance, np.zeros_like(moved), moved)
+            moved += compliance @ problem.inclusions.with_spring_forces(compliance, np.zeros_like(moved), moved)
         displacement = np.zeros((problem.surface.points.size, moved.shape[1]))
         displacement[active] = moved[: len(active)]
         return displacement, moved[len(active) :][: len(problem.system.reading_rows)]
@@ -224,7 +224,9 @@ def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, chang
     yielding, slope = system.delassus - system.object_compliance, np.zeros(len(pressed))
     soft = np.einsum("idje,je->id", yielding, pressed)[:, 0]
     if change is not None:
-        forces = problem.with_spring_forces(problem.body.condensed.compliance, problem.row_forces(pressed)[:, None])
+        forces = problem.inclusions.with_spring_forces(
+            problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
+        )
         moved = change.moved(problem, forces, problem.body.condensed.unknowns(forces))
         slope = change.of_points(problem, forces, moved)[0][:: problem.dim, 0]
     out = []

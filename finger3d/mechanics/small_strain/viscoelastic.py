@@ -90,7 +90,7 @@ class Viscoelastic:
         if solution.state is before:
             return solution.with_state(state)
         contact = problem.row_forces(problem.upright_force(solution.state.contact))
-        rows = problem.with_spring_forces(body.compliance, contact, body.moved)
+        rows = problem.inclusions.with_spring_forces(body.compliance, contact, body.moved)
         after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
         return solution.with_state(State(solution.state.contact, after, solution.state.last))
 

@@ -93,7 +93,7 @@ class ViscousTangents(IncrementTangents):
             now, then = both[:, 0], both[:, 1] + body.read(own)
         variables += _variables_under(response, own)
         rows = body.read(variables) + now
-        follow = problem.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
+        follow = problem.inclusions.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
         displacement = np.zeros((part.after.contact.force.size, len(steps) // 2))
         displacement[active] = (rows + response.compliance @ follow)[: len(active)]
         return _FixedForces(displacement, then[len(active) :][: len(self._columns)], variables, rows)
@@ -139,7 +139,7 @@ class ViscousTangents(IncrementTangents):
         problem, response, memory = self.problem, part.linear.response, part.after.body.memory
         body, first = self.formulation.body(problem), len(problem.system.active_dofs)
         rows = slopes([problem.row_forces(problem.upright_force(state.contact)) for state in states], steps)
-        rows = problem.with_spring_forces(response.compliance, rows, fixed.rows)
+        rows = problem.inclusions.with_spring_forces(response.compliance, rows, fixed.rows)
         variables = fixed.variables + _variables_under(response, rows)
         read = (fixed.rows + response.compliance @ rows)[first:][: len(self._columns)]
         is_pressure = np.array([column.kind == "taxel" for column in self._columns], dtype=bool)
