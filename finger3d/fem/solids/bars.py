@@ -119,7 +119,13 @@ class AddedStiffness:
         freeze_arrays(self)
 
     def with_spring_forces(self, compliance: Float, rows: Float, moved: Float | None = None) -> Float:
-        """Return forces (r, ...) on condensed rows with those of inclusions, for displacements (r, ...) without these."""
+        """Set the forces of inclusions in forces (r, ...) N on condensed rows, and return these.
+
+        Parameters
+        ----------
+        compliance : (r, r) mm/N, of the body without inclusions
+        moved : (r, ...) mm, displacements due to other causes, if any
+        """
         if len(springs := self.bar_stiffness):
             without = compliance @ rows if moved is None else moved + compliance @ rows
             rows[-len(springs) :] = spring_forces(compliance, springs, without)
