@@ -41,9 +41,11 @@ GROWTH = {2: 1.2, 3: 1.6}
 PRESS_TO_ROUND = 1.3
 """Time of a press over that of its last round of refinement: contact is solved again, and drawn."""
 
-_NODES_PER_TET, _VERTICES_PER_TET = 1.55, 0.24
+_NODES_PER_TET, _VERTICES_PER_TET = (1.36, 4.0), (0.16, 1.25)
+"""Nodes and vertices of a quadratic mesh over its number of tets: inside, and on its surface times tets^(1/3).  Medians
+of 152 meshes of fTetWild with 600 to 20 000 tets lie within 3 % of it, unknowns of large swept meshes within 1 %."""
+
 _DOFS_PER_TRIANGLE = 4.1
-"""Sizes of quadratic meshes."""
 
 _ITERATIONS_AN_INCREMENT = 9
 """Iterations of an increment at finite strain, which has about one factorisation of the tangent."""
@@ -154,9 +156,10 @@ def tets_of_ftetwild(cells: float) -> float:
     return math.hypot(cells, _LEAST_TETS)
 
 
-def tet_mesh(cells: float, mixed: bool) -> tuple[float, float]:
-    """Return the nodes and the unknowns of a mesh of quadratic tets; a mixed one has pressures at its vertices."""
-    return _NODES_PER_TET * cells, (3.0 * _NODES_PER_TET + _VERTICES_PER_TET * mixed) * cells
+def tet_unknowns(cells: float, mixed: bool) -> float:
+    """Return the unknowns of a mesh of quadratic tets; a mixed one has pressures at its vertices."""
+    nodes, vertices = (a * cells + b * cells ** (2.0 / 3.0) for a, b in (_NODES_PER_TET, _VERTICES_PER_TET))
+    return 3.0 * nodes + vertices * mixed
 
 
 def factor_mb(dofs: float, dim: int) -> float:
@@ -166,7 +169,7 @@ def factor_mb(dofs: float, dim: int) -> float:
 
 def mesh_gb(cells: float, dim: int) -> float:
     """Return the memory of the factorised stiffness of a mesh, GB."""
-    return 1e-3 * factor_mb(tet_mesh(cells, False)[1] if dim == 3 else _DOFS_PER_TRIANGLE * cells, dim)
+    return 1e-3 * factor_mb(tet_unknowns(cells, False) if dim == 3 else _DOFS_PER_TRIANGLE * cells, dim)
 
 
 def rows_gb(rows: float) -> float:

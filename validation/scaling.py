@@ -34,8 +34,7 @@ UNKNOWNS = (Size(2.4, 9.6), Size(1.25, 5.0), Size(0.95, 3.8), Size(0.73, 2.92), 
 ROWS = (Size(2.4, 9.6), Size(1.3, 16.0), Size(0.77, 16.0), Size(0.52, 16.0), Size(0.385, 16.0))
 SWEPT = Size(1.45, 6.0)
 WORKER_TRIES = 3
-NEED_GB = {Size(0.95, 1.25): 10.0, Size(0.95, 0.98): 15.0, Size(0.9, 0.9): 26.5, Size(0.385, 16.0): 10.0}
-"""Memory of the machine; a press refuses a mesh whose forecast, 21 GB at a million unknowns, is over .8 of it."""
+NEED_GB = {Size(0.95, 1.25): 10.0, Size(0.95, 0.98): 15.0, Size(0.9, 0.9): 21.5, Size(0.385, 16.0): 10.0}
 COLOURS = dict(zip(STAGES, ("C7", "C0", "C1", "C3", "C2", "#c5b0d5"), strict=True))
 
 

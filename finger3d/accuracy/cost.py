@@ -23,7 +23,7 @@ from finger3d._cost import (
     PressSize,
     meshing_s,
     rows_gb,
-    tet_mesh,
+    tet_unknowns,
     tets_of_ftetwild,
 )
 from finger3d._types import Tree
@@ -211,7 +211,7 @@ def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
     field = sizing(model.design, model.mesh, zone, *box(model.design, axes))
     cells = count_cells(model.design, field)
     cells = int(tets_of_ftetwild(cells) if model.mesh.mesher == "ftetwild" else cells)
-    return cells, PressSize(3, tet_mesh(cells, model.mixed)[1], _candidates(model, field))
+    return cells, PressSize(3, tet_unknowns(cells, model.mixed), _candidates(model, field))
 
 
 def _with_borders(model: Model, axes: tuple[str, ...], cells: int, size: PressSize) -> tuple[int, PressSize]:
