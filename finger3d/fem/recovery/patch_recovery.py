@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,8 @@ of fewer samples overestimated the error of the force up to six times."""
 _SINGULAR = 1e-8
 """Least eigenvalue of the normal equations of a patch, over the largest, that is not round-off."""
 
-_CELLS_AT_ONCE, _PATCHES_AT_ONCE = 512, 256
+_CELLS_AT_ONCE, _PATCHES_AT_ONCE, _FIELDS_AT_ONCE = 512, 256, 3
+"""Cells and patches whose values fit into the cache, and fields whose samples take 0.15 GB of a million unknowns."""
 
 
 @dataclass(frozen=True)
@@ -162,13 +163,28 @@ class RecoveredErrors:
     @cached_property
     def _polynomials(self) -> Float:
         """Coefficients (v, n, k f): of the components of strain, then of the pressure of the mixed form."""
+        fields = self.unknowns.shape[1]
+        out = np.empty((len(self.recovery.centre), len(self.recovery.fits), self._count, fields))
+        for start in range(0, fields, _FIELDS_AT_ONCE):
+            some = slice(start, start + _FIELDS_AT_ONCE)
+            fitted = self.recovery.polynomials(replace(self, unknowns=self.unknowns[:, some])._samples)
+            out[..., some] = fitted.reshape(*out[..., some].shape)
+        return out.reshape(*out.shape[:2], -1)
+
+    @property
+    def _samples(self) -> Float:
+        """Strain and pressure (e q, k f) at the points of the fit."""
         mesh = self.recovery.mesh
         bary, _ = quadrature(mesh.dim, 2)
-        components = len(_components(mesh.dim)) + self.elastic.mixed
-        samples = np.empty((len(mesh.cells), len(bary), components * self.unknowns.shape[1]))
+        samples = np.empty((len(mesh.cells), len(bary), self._count * self.unknowns.shape[1]))
         for cells in self._portions:
             samples[cells] = self._sampled(cells, bary).reshape(len(cells), *samples.shape[1:])
-        return self.recovery.polynomials(samples.reshape(-1, samples.shape[2]))
+        return samples.reshape(-1, samples.shape[2])
+
+    @property
+    def _count(self) -> int:
+        """Number of components of strain, with the pressure of the mixed form."""
+        return len(_components(self.recovery.mesh.dim)) + self.elastic.mixed
 
     @property
     def _portions(self) -> Iterator[Int]:
