@@ -16,9 +16,10 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise import build as building
 from finger3d.mechanics.discretise.build import build, mesh_part
+from finger3d.mechanics.discretise.moved_mesh import stretched
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.small_strain.variations import stretched, variation
+from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.objects import Plane
 from tests.differences import assert_equal_to_differences, with_dimension
 from tests.models import half_cylinder
@@ -30,11 +31,11 @@ def test_a_modulus_changes_the_compliance_in_inverse_proportion() -> None:
     problem = build(model)
     e, nu, step = model.material.E_MPa, model.material.nu, 1e-3
     low, high = (replace(model, material=Isotropic(e + sign * step, nu)) for sign in (-1.0, 1.0))
-    found = variation(problem, low, high, step)
+    found = VariedBody(problem).variation(low, high, step)
     assert found.body is not None
     condensed = problem.body.condensed
     force = np.random.default_rng(0).normal(size=(len(condensed.compliance), 1))
-    moved = found.body.moved(problem, force, condensed.unknowns(force))
+    moved = found.body.moved(force, condensed.unknowns(force))
     whole = found.body.compliance(condensed.unknowns(np.eye(len(force))))
     assert moved == pytest.approx(-(condensed.compliance @ force) / e, rel=1e-5)
     assert whole == pytest.approx(-condensed.compliance / e, rel=1e-5, abs=1e-9)  # mm/N, round-off of 1e-10
@@ -44,7 +45,7 @@ def test_what_changes_the_mesh_has_none() -> None:
     model = half_cylinder(0.3)
     other = replace(model, mesh=replace(model.mesh, size_mm=0.25))
     with pytest.raises(Finger3dError, match="changes the mesh"):
-        variation(build(model), model, other, 1e-3)
+        VariedBody(build(model)).variation(model, other, 1e-3)
 
 
 CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)

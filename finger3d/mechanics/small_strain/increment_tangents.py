@@ -26,6 +26,7 @@ from finger3d._types import Array, Float
 from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import Substep, energies
@@ -34,44 +35,27 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
-from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
-from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.linearised import (
+    MOST,
+    Linear,
+    LinearisedIncrement,
+    Part,
+    are_converged,
+    derivative_scale,
+    slopes,
+    upright,
+)
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
-
-_CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
-"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
-and the largest number of iterations."""
 
 _MEMORY = 8
 """Iterations from which the next one is extrapolated."""
-
-_NEGLIGIBLE = 1e-7
-"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
 
 _AT_ONCE = 32
 """Increments that the body is solved for at once, which costs less than one after another."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """Part of an increment, linearised, between two shares of its motion."""
-
-    before: State[Any]
-    after: State[Any]
-    linear: Any
-    start: float
-    end: float
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Equations of the active set of an increment in small strain, and the compliance (c, d, c, d) mm/N within it."""
-
-    active: LinearisedIncrement
-    delassus: Float
 
 
 @dataclass(frozen=True)
@@ -84,22 +68,38 @@ class FixedForces:
 
 @dataclass(frozen=True)
 class _End:
-    """Side at the end of a part of an increment, with gap and slip (c, d) mm and forces (c, d) N in its directions."""
+    """Side at the end of a part of an increment, at displacements (c, d) mm."""
 
-    state: State[Float]
-    relative: Float
-    turned_force: Float
+    increment: Increment
+    geometry: ContactGeometry
+    expansion_point: Float
+    place: Float
 
     @classmethod
-    def of(cls, increment: Increment, contact: ContactState, force: Float, place: Float) -> _End:
-        """Return the end at displacements (c, d), with contact forces that differ by (c, d) from those of a state."""
+    def of(cls, increment: Increment, place: Float) -> _End:
+        """Return the end at displacements (c, d)."""
         # as in the solution of the increment, whose geometry is linear under a flat object
         expansion_point = np.zeros_like(place) if increment.problem.model.object.is_flat else place
-        geometry = increment.geometry(expansion_point, np.inf)
+        return cls(increment, increment.geometry(expansion_point, np.inf), expansion_point, place)
+
+    def at(self, place: Float) -> _End:
+        """Return the end at other displacements (c, d)."""
+        is_flat = self.increment.problem.model.object.is_flat
+        return replace(self, place=place) if is_flat else _End.of(self.increment, place)
+
+    @property
+    def relative(self) -> Float:
+        """Gap and slip (c, d) mm."""
+        return self.increment.relative(self.geometry, self.expansion_point, self.place)
+
+    def turned(self, force: Float) -> Float:
+        """Return forces (c, d) N in the directions of the end in those of the scene."""
+        return np.asarray(np.einsum("ca,cak->ck", force, self.geometry.bases))
+
+    def state(self, contact: ContactState, force: Float) -> State[Float]:
+        """Return the state with contact forces that differ by (c, d) from those of another."""
         changed = replace(contact, force=contact.force + force)
-        state = increment.reached(geometry, expansion_point, place, changed, None)
-        turned = np.einsum("ca,cak->ck", contact.force, geometry.bases)
-        return cls(state, increment.relative(geometry, expansion_point, place), turned)
+        return self.increment.reached(self.geometry, self.expansion_point, self.place, changed, None)
 
 
 class IncrementTangents:
@@ -210,17 +210,21 @@ class IncrementTangents:
         return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
 
     @cached_property
+    def _contacts(self) -> list[list[ContactState]]:
+        """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
+        contacts = [after.contact for step in self._results for _, after in step.parts]
+        return [contacts[start : start + _AT_ONCE] for start in range(0, len(contacts), _AT_ONCE)]
+
+    @cached_property
     def _fixed(self) -> dict[bytes, FixedForces]:
         """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
         problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
-        contacts = [after.contact for step in self._results for _, after in step.parts]
-        for start in range(0, len(contacts), _AT_ONCE):
-            some = contacts[start : start + _AT_ONCE]
+        for some in self._contacts:
             rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
             rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
             sizes = problem.surface.points.size, len(problem.system.reading_rows)
             displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
-            moved = self._changes_of_rows(rows, count)
+            moved = changes_of_rows([one.body for one in self._variations], rows)
             for k, one in enumerate(self._variations):
                 if one.body:
                     displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
@@ -228,14 +232,17 @@ class IncrementTangents:
                 found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
         return found
 
-    def _changes_of_rows(self, forces: Float, count: int) -> Float:
-        """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""
-        moved = np.zeros((*forces.shape, count))
-        changed = [(k, one.body) for k, one in enumerate(self._variations) if one.body]
-        unknowns = self.problem.body.condensed.unknowns(forces) if changed else forces
-        for k, body in changed:
-            moved[..., k] = body.moved(self.problem, forces, unknowns)
-        return moved
+    @cached_property
+    def _of_object(self) -> dict[bytes, Float]:
+        """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
+        active, found = self.problem.system.active_dofs, dict[bytes, Float]()
+        changes = [one.thing for one in self._variations]
+        for some in self._contacts:
+            forces = np.stack([self.problem.upright_force(contact).ravel() for contact in some], axis=1)
+            moved = np.zeros((*forces.shape, len(changes)))
+            moved[active] = changes_of_rows(changes, forces[active])
+            found |= {contact.force.tobytes(): moved[:, i] for i, contact in enumerate(some)}
+        return found
 
     def _reached(
         self,
@@ -304,12 +311,12 @@ class IncrementTangents:
         delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
-        at_fixed_forces, force = fixed.displacement.copy(), self.problem.upright_force(contact).reshape(-1, 1)
-        for k, one in enumerate(self._variations):
-            at_fixed_forces[:, k] += one.object_displacement(force)[:, 0]
+        at_fixed_forces = fixed.displacement.copy()
+        if any(one.thing for one in self._variations):
+            at_fixed_forces[:, : len(self._variations)] += self._of_object[contact.force.tobytes()]
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
-        increments = [
-            Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker())
+        ends = [
+            _End.of(Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker()), there)
             for side, move in zip(sides, moves, strict=True)
         ]
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
@@ -321,17 +328,16 @@ class IncrementTangents:
             moved = delassus @ (fixed_basis + turned) + at_fixed_forces
             force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
             place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
-            ends = [
-                _End.of(replace(one, tracker=DistanceTracker()), contact, t * force[k // 2], there + t * place[k // 2])
-                for k, (one, t) in enumerate(zip(increments, steps, strict=True))
-            ]
-            turns = slopes([end.turned_force @ frame.T for end in ends], steps)
+            ends = [end.at(there + t * place[k // 2]) for k, (end, t) in enumerate(zip(ends, steps, strict=True))]
+            turns = slopes([end.turned(contact.force) @ frame.T for end in ends], steps)
             change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
             results.append(np.concatenate([unknowns - change, turns]))
             error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
             errors.append(error / derivative_scale(unknowns - change, largest, size))
             if are_converged(errors):
-                reached = self._reached(part, fixed, [end.state for end in ends], sides, steps, moves)
+                changed = [t * force[k // 2] for k, t in enumerate(steps)]
+                states = [end.state(contact, by) for end, by in zip(ends, changed, strict=True)]
+                reached = self._reached(part, fixed, states, sides, steps, moves)
                 return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
             columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]
             tried.append(np.column_stack([extrapolated(*both) for both in columns]))
@@ -346,27 +352,6 @@ def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:
     state, readings = reached
     work, lost = energies(before.problem, [Substep(before.state, state, move)])
     return Side(before.problem, state, move.end, readings, before.work_mJ + work, before.dissipation_mJ + lost)
-
-
-def slopes(values: Sequence[Float], steps: Float) -> Float:
-    """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
-    array = np.reshape(values, (len(steps), -1))
-    return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))
-
-
-def derivative_scale(derivatives: Float, value: float, size: Float) -> Float:
-    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
-    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
-    return np.where(scale > 0.0, scale, 1.0)
-
-
-def are_converged(errors: Sequence[Float]) -> bool:
-    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
-
-    Unknowns and directions are corrected in turn, so that errors fall every second time.
-    """
-    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
-    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:

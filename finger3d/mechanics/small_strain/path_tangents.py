@@ -36,7 +36,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.variations import BodyChange, Side, Variation
 from finger3d.objects import ObjectPose, vertical_frame
 
 _SAME_PLACE = 1e-12
@@ -110,13 +110,10 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
 
     They are in the directions of an upright object; None where a parameter changes nothing in the body.
     """
-    condensed, active, size = problem.body.condensed, problem.system.active_dofs, problem.surface.points.size
-    if not any(one.changes_compliance for one in variations):
-        return [None] * len(variations)
-    count = len(condensed.compliance)
-    unknowns = condensed.unknowns(np.eye(count)) if any(one.body for one in variations) else np.zeros((0, count))
-    forces = problem.inclusions.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
-    on_points = np.eye(size)[:, active]
+    compliance, active = problem.body.condensed.compliance, problem.system.active_dofs
+    size = problem.surface.points.size
+    forces = problem.inclusions.with_spring_forces(compliance, np.eye(len(compliance), len(active)))
+    of_finger, of_object = (_unknowns([getattr(one, name) for one in variations]) for name in ("body", "thing"))
 
     def dense(rows: Float) -> Float:
         out = np.zeros((len(rows), size))
@@ -124,12 +121,20 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
         return out
 
     def changes(one: Variation) -> tuple[Float, Float]:
-        moved, read = np.zeros_like(on_points), np.zeros((len(problem.system.reading_rows), len(active)))
+        moved, read = np.zeros((size, len(active))), np.zeros((len(problem.system.reading_rows), len(active)))
         if one.body:
-            moved, read = one.body.of_points(problem, forces, one.body.compliance(unknowns) @ forces)
-        return dense(moved + one.object_displacement(on_points)), dense(read)
+            moved, read = one.body.of_points(problem, forces, one.body.compliance(of_finger) @ forces)
+        if one.thing:
+            moved[active] += one.thing.compliance(of_object)
+        return dense(moved), dense(read)
 
     return [changes(one) if one.changes_compliance else None for one in variations]
+
+
+def _unknowns(changes: Sequence[BodyChange | None]) -> Float:
+    """Return all unknowns (N, r) of a body under forces of 1 N on each row; none if it does not change."""
+    changed = next((one for one in changes if one), None)
+    return changed.condensed.unknowns(np.eye(len(changed.condensed.compliance))) if changed else np.zeros((0, 0))
 
 
 class PathTangents:
@@ -341,11 +346,7 @@ class PathTangents:
         amplitude = -last.displacement[:, point, 0] / closing[point, 0]
         moved = last.displacement + amplitude[:, None, None] * closing
         moved[:, :, 1] += (event.amplitude - before.amplitude) * self._rest.bases[:, :, 1, 1]
-        return replace(
-            last,
-            displacement=moved,
-            amplitude=last.amplitude + amplitude,
-        )
+        return replace(last, displacement=moved, amplitude=last.amplitude + amplitude)
 
     def _solved(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at a place within a piece of the path that itself does not move."""
