@@ -22,17 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._types import Array, Float
+from finger3d._types import Array, Float, Int
 from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, influence_of
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
 from finger3d.mechanics.small_strain.linearised import (
@@ -64,42 +64,6 @@ class FixedForces:
 
     displacement: Float
     readings: Float
-
-
-@dataclass(frozen=True)
-class _End:
-    """Side at the end of a part of an increment, at displacements (c, d) mm."""
-
-    increment: Increment
-    geometry: ContactGeometry
-    expansion_point: Float
-    place: Float
-
-    @classmethod
-    def of(cls, increment: Increment, place: Float) -> _End:
-        """Return the end at displacements (c, d)."""
-        # as in the solution of the increment, whose geometry is linear under a flat object
-        expansion_point = np.zeros_like(place) if increment.problem.model.object.is_flat else place
-        return cls(increment, increment.geometry(expansion_point, np.inf), expansion_point, place)
-
-    def at(self, place: Float) -> _End:
-        """Return the end at other displacements (c, d)."""
-        is_flat = self.increment.problem.model.object.is_flat
-        return replace(self, place=place) if is_flat else _End.of(self.increment, place)
-
-    @property
-    def relative(self) -> Float:
-        """Gap and slip (c, d) mm."""
-        return self.increment.relative(self.geometry, self.expansion_point, self.place)
-
-    def turned(self, force: Float) -> Float:
-        """Return forces (c, d) N in the directions of the end in those of the scene."""
-        return np.asarray(np.einsum("ca,cak->ck", force, self.geometry.bases))
-
-    def state(self, contact: ContactState, force: Float) -> State[Float]:
-        """Return the state with contact forces that differ by (c, d) from those of another."""
-        changed = replace(contact, force=contact.force + force)
-        return self.increment.reached(self.geometry, self.expansion_point, self.place, changed, None)
 
 
 class IncrementTangents:
@@ -185,10 +149,10 @@ class IncrementTangents:
                 after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
-                linear = self._linearised(before, after, Move(place, pose))
+                linear = self._linearised(before, after, move := Move(place, pose))
             except np.linalg.LinAlgError:
                 raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
-            parts.append(Part(before, after, linear, start, share))
+            parts.append(Part(before, after, linear, move, start, share))
             before, place, start = after, pose, share
         return parts
 
@@ -208,6 +172,10 @@ class IncrementTangents:
         found = self._fixed[part.after.contact.force.tobytes()]
         more = ((0, 0), (0, len(steps) // 2 - len(self._variations)))  # by poses, which change nothing in the body
         return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
+
+    @cached_property
+    def _influence(self) -> tuple[Any, Int]:
+        return influence_of(self.problem.surface, self.problem.model.object.is_flat)
 
     @cached_property
     def _contacts(self) -> list[list[ContactState]]:
@@ -315,10 +283,15 @@ class IncrementTangents:
         if any(one.thing for one in self._variations):
             at_fixed_forces[:, : len(self._variations)] += self._of_object[contact.force.tobytes()]
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
-        ends = [
-            _End.of(Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker()), there)
-            for side, move in zip(sides, moves, strict=True)
-        ]
+
+        def increment(problem: Problem, state: State[Any], move: Move) -> Increment:
+            return Increment(problem, self._displaced(state), move, body, DistanceTracker())
+
+        own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
+        of_conditions, of_geometry = own.slopes(contact, self._influence)
+        pairs = zip(sides, moves, strict=True)
+        ends = [own.beside(increment(side.problem, side.state, move)) for side, move in pairs]
+        conditions = slopes([end.conditions(contact) for end in ends], steps)
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
         count = linear.forces.shape[1]
         tried, results, errors = [np.zeros((count + c * d, p))], list[Float](), list[Float]()
@@ -326,17 +299,19 @@ class IncrementTangents:
             unknowns, turned = tried[-1][:count], tried[-1][count:]
             fixed_basis = linear.forces @ unknowns + direct
             moved = delassus @ (fixed_basis + turned) + at_fixed_forces
-            force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
-            place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
-            ends = [end.at(there + t * place[k // 2]) for k, (end, t) in enumerate(zip(ends, steps, strict=True))]
-            turns = slopes([end.turned(contact.force) @ frame.T for end in ends], steps)
-            change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
-            results.append(np.concatenate([unknowns - change, turns]))
+            place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame).reshape(-1, p)
+            relative, turns = np.moveaxis((conditions + of_conditions @ place).reshape(c, 2, d, p), 1, 0)
+            change = linear.correction(relative.reshape(-1, p), unknowns)
+            results.append(np.concatenate([unknowns - change, turns.reshape(-1, p)]))
             error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
             errors.append(error / derivative_scale(unknowns - change, largest, size))
             if are_converged(errors):
-                changed = [t * force[k // 2] for k, t in enumerate(steps)]
-                states = [end.state(contact, by) for end, by in zip(ends, changed, strict=True)]
+                force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
+                changes = [array.reshape(c, -1, p) for array in (place, of_geometry @ place)]
+                states = [
+                    end.moved(*(t * array[..., k // 2] for array in changes)).state(contact, t * force[k // 2])
+                    for k, (end, t) in enumerate(zip(ends, steps, strict=True))
+                ]
                 reached = self._reached(part, fixed, states, sides, steps, moves)
                 return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
             columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]

@@ -19,7 +19,7 @@ from finger3d.fem.tensors import block_diagonal, rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
-from finger3d.objects import vertical_frame
+from finger3d.objects import Move, vertical_frame
 
 _CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
 """Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
@@ -108,11 +108,12 @@ def upright(state: ContactState, local: Float) -> Float:
 
 @dataclass(frozen=True)
 class Part:
-    """Part of an increment, linearised, between two shares of its motion."""
+    """Part of an increment, linearised, with its motion, between two shares of that of the increment."""
 
     before: State[Any]
     after: State[Any]
     linear: Any
+    move: Move
     start: float
     end: float
 

@@ -134,7 +134,8 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
 def _unknowns(changes: Sequence[BodyChange | None]) -> Float:
     """Return all unknowns (N, r) of a body under forces of 1 N on each row; none if it does not change."""
     changed = next((one for one in changes if one), None)
-    return changed.condensed.unknowns(np.eye(len(changed.condensed.compliance))) if changed else np.zeros((0, 0))
+    count = len(changed.condensed.compliance) if changed else 0
+    return np.ascontiguousarray(changed.condensed.unknowns(np.eye(count))) if changed else np.zeros((0, 0))
 
 
 class PathTangents:
@@ -163,10 +164,10 @@ class PathTangents:
     ) -> None:
         self.path, self.variations, self._rest = path, variations, rest
         self._delassus = self._local(path.problem.delassus)
-        self._changes = [
-            change and self._local(change[0].reshape(path.problem.delassus.shape)) + self._turned(turn)
-            for change, turn in zip(changes, rest.bases, strict=True)
-        ]
+        self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
+        for change, turn in zip(self._changes, rest.bases, strict=True):
+            if change is not None and turn.any():
+                change += self._turned(turn)
         # gaps close along the normal of the object, which is not that of the points if it is elastic
         self._closing = path.bases.copy()
         self._closing[:, 0] = (

@@ -102,10 +102,10 @@ class BodyChange:
     def compliance(self, unknowns: Float) -> Float:
         """Return the derivatives (r, r) of the rows under forces of 1 N on each, which cause unknowns (N, r)."""
         half = self.rows @ unknowns
-        moved = half + half.T
-        if self.stiffness.nnz:
-            moved -= unknowns.T @ times(self.stiffness, unknowns)
-        return self._with_subgrid(moved, np.eye(len(moved)))
+        if self.stiffness.nnz:  # each half of the symmetric matrix has half of the diagonal
+            upper = self.stiffness - sp.diags_array(0.5 * self.stiffness.diagonal())
+            half -= unknowns.T @ (upper @ unknowns)
+        return self._with_subgrid(half + half.T, np.eye(len(half)))
 
     def _with_subgrid(self, moved: Float, forces: Float) -> Float:
         first = len(moved) - len(self.subgrid)
@@ -251,7 +251,7 @@ class VariedBody:
         pressed = np.zeros(problem.surface.points.shape)
         pressed[:, 0] = problem.surface.area
         normal = [one[:, :1, :, :1] for one in (system.delassus, compliance)]
-        both, slopes = (normal[0] - normal[1], normal[1]), np.zeros((2, *pressed.shape))
+        both, slopes = (normal[0] - normal[1], normal[1]), [np.zeros_like(pressed), np.zeros_like(pressed)]
         if change is not None:
             forces = problem.inclusions.with_spring_forces(
                 problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
@@ -260,7 +260,7 @@ class VariedBody:
             slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
         if thing is not None:
             slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
-        soft = [np.asarray(one[:, 0, :, 0] @ pressed[:, 0]) for one in both]
+        soft = [one[:, 0, :, 0] @ pressed[:, 0] for one in both]
         growth = [
             np.divide(by[:, 0], of, out=np.zeros(len(of)), where=of > 0.0) for by, of in zip(slopes, soft, strict=True)
         ]
