@@ -18,9 +18,9 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Pattern, stiffness, times
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.solvers.condense import Condensation
-from finger3d.fem.surface.traces import local_rows, restrict
+from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, restrict, surface
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
 from finger3d.mechanics.discretise.elastic_object import (
     assembled_object,
@@ -30,7 +30,7 @@ from finger3d.mechanics.discretise.elastic_object import (
 )
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object, with_points_of
-from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
+from finger3d.mechanics.discretise.problem import Problem, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
@@ -291,7 +291,7 @@ class VariedBody:
             else:
                 mesh = with_points_of(mesh, mesh_part(model, own.first_contact.contact_box, axes)[0])
             thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
-            face = restrict(free_surface(own, mesh, thickness), self._places)
+            face = restrict(self._faces(mesh, thickness), self._places)
         if is_other or (model.material, model.parts) != (own.material, own.parts):
             is_other = True
             elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
@@ -324,11 +324,14 @@ class VariedBody:
             first += count
         return parts
 
+    def _faces(self, mesh: Mesh, thickness: float) -> BoundarySurface:
+        """Return the points of a mesh on the faces that contact points belong to."""
+        return joined([surface(mesh, FREE_FACES[k], thickness) for k in np.unique(self.problem.surface.face)])
+
     @cached_property
     def _places(self) -> Int:
-        """Numbers of the contact points among those of all free faces."""
-        problem, face = self.problem, self.problem.surface
-        free = free_surface(problem.model, problem.mesh, problem.body.thickness)
+        """Numbers of the contact points among those of their faces."""
+        face, free = self.problem.surface, self._faces(self.problem.mesh, self.problem.body.thickness)
         place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(free.nodes, free.face, strict=True))}
         return np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)])
 
