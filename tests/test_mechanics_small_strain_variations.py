@@ -13,16 +13,18 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise import build as building
+from finger3d.mechanics.discretise import elastic_object
 from finger3d.mechanics.discretise.build import build, mesh_part
 from finger3d.mechanics.discretise.moved_mesh import stretched
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.objects import Plane
-from tests.differences import assert_equal_to_differences, with_dimension
-from tests.models import half_cylinder
+from tests.differences import STEP, assert_equal_to_differences, other_parameters, parameters, with_dimension
+from tests.models import half_cylinder, small_section
 
 
 def test_a_modulus_changes_the_compliance_in_inverse_proportion() -> None:
@@ -46,6 +48,21 @@ def test_what_changes_the_mesh_has_none() -> None:
     other = replace(model, mesh=replace(model.mesh, size_mm=0.25))
     with pytest.raises(Finger3dError, match="changes the mesh"):
         VariedBody(build(model)).variation(model, other, 1e-3)
+
+
+def test_an_elastic_object_is_condensed_once_for_all_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = small_section(object_compliance=ElasticObject(3.0, 0.3, 4.13), symmetry=(), object=Plane(tilt=0.03))
+    body, condensed = VariedBody(build(model)), list[object]()
+
+    def counted(*given: Any) -> Condensation:
+        condensed.append(given)
+        return condense(*given)
+
+    monkeypatch.setattr(elastic_object, "condense", counted)
+    ways = parameters(model) | other_parameters(model)
+    changed = [body.variation(way(-STEP), way(STEP), STEP).thing for way in ways.values()]
+    assert len(condensed) == 1
+    assert sum(thing is not None for thing in changed) > 3
 
 
 CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)

@@ -7,8 +7,10 @@ geometry of the contact, and on the parameters through the state before and the 
     D w + E x = 0,   dU = W (B^T (P dx + dmu e r_n) + dB^T r) + dW B^T r
 
 (`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
-parameter less and plus its step to first order.  They hold the curvature of the object, and where points touch within
-the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson 1965).
+parameter less and plus its step to first order, and those by U are the same for all parameters
+(`finger3d.mechanics.small_strain.contact_slopes`).  They hold the curvature of the object, and where points touch
+within the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson
+1965).
 
 Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
@@ -22,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._types import Array, Float, Int
+from finger3d._types import Float, Int
 from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
@@ -233,7 +235,7 @@ class IncrementTangents:
             planned = [station.pose.coordinates[1:3] for station in before]
             self._left = np.array([side.pose.coordinates[1:3] for side in self.sides]) - planned
         change = (1.0 - targets[0].share) * self._left
-        return [_moved(target.pose, [1, 2], by) for target, by in zip(targets, change, strict=True)]
+        return [target.pose.changed([1, 2], by) for target, by in zip(targets, change, strict=True)]
 
     def _in_equilibrium(
         self, step: StepResult, parts: Sequence[Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
@@ -242,8 +244,8 @@ class IncrementTangents:
         loads = [target.load for target in targets if target.load]
         free = np.flatnonzero(~np.isnan(loads[0].forces))
         reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
-        held = [_moved(pose, free, (reached - pose.coordinates)[free]) for pose in poses]
-        moved = [_moved(step.target, [k], [t]) for k in free.tolist() for t in (-h, h)]
+        held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
+        moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
         here = self._begun(self.problem)._replace(state=self._state, pose=self._pose)
         found = self._through(
             parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
@@ -260,7 +262,7 @@ class IncrementTangents:
         except np.linalg.LinAlgError:
             raise Finger3dError("forces do not determine the pose of the object: numbers have no derivatives") from None
         both = np.stack([-change, change], axis=1).reshape(-1, len(free))
-        return [_moved(pose, free, by) for pose, by in zip(held, both, strict=True)]
+        return [pose.changed(free, by) for pose, by in zip(held, both, strict=True)]
 
     def _through(
         self, parts: Sequence[Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
@@ -345,13 +347,6 @@ def _forces(side: Side) -> Float:
     """Return the normal force and the forces along x and z (3,) N."""
     x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
     return np.array([-y, x, z])
-
-
-def _moved(pose: ObjectPose, numbers: Sequence[int] | Array, change: Sequence[float] | Float) -> ObjectPose:
-    """Return a pose with some of its coordinates changed."""
-    coordinates = pose.coordinates
-    coordinates[numbers] += change
-    return ObjectPose(*coordinates.tolist())
 
 
 def _coefficients(side: Side, status: Status) -> Float:

@@ -37,7 +37,7 @@ from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.variations import BodyChange, Side, Variation
-from finger3d.objects import ObjectPose, vertical_frame
+from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
@@ -232,7 +232,7 @@ class PathTangents:
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
-                    moved_pose(step.target, t * motion[k]),
+                    step.target.changed([1, 0], t * motion[k] * [1.0, -1.0]),
                     t * read + problem.system.reading_rows @ problem.upright_force(moved).ravel(),
                     step.external_work_mJ + t * total[0, k],
                     step.dissipation_mJ + t * total[1, k],
@@ -395,7 +395,3 @@ class PathTangents:
 def _relative(state: ContactState) -> Float:
     """Return gap and tangential displacement (c, 2)."""
     return np.column_stack([state.gap, state.tangential_displacement])
-
-
-def moved_pose(pose: ObjectPose, motion: Float) -> ObjectPose:
-    return replace(pose, slide_x_mm=pose.slide_x_mm + float(motion[0]), depth_mm=pose.depth_mm - float(motion[1]))
