@@ -339,7 +339,7 @@ def _degrees(hint: Any) -> tuple[Any, ...] | None:
 
 def record_of(record: type[Record], settings: TomlTable) -> Record:
     """Return the dataclass that a table stands for, which has its fields as keys; its angles in radians."""
-    hints = _hints(record)
+    hints = _hints(record)  # type: ignore[arg-type]
     return record(
         **{
             f.name: math.radians(getattr(settings, f"{f.name}_deg"))
