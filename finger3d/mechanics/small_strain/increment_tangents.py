@@ -56,7 +56,7 @@ _MEMORY = 8
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
 
-_AT_ONCE = 32
+AT_ONCE = 32
 """Increments that the body is solved for at once, which costs less than one after another."""
 
 
@@ -183,7 +183,7 @@ class IncrementTangents:
     def _contacts(self) -> list[list[ContactState]]:
         """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
         contacts = [after.contact for step in self._results for _, after in step.parts]
-        return [contacts[start : start + _AT_ONCE] for start in range(0, len(contacts), _AT_ONCE)]
+        return [contacts[start : start + AT_ONCE] for start in range(0, len(contacts), AT_ONCE)]
 
     @cached_property
     def _fixed(self) -> dict[bytes, FixedForces]:

@@ -38,7 +38,8 @@ from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
 
-_IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
+_READINGS = {"gauges", "markers", "taxels"}
+_IN_BODY = ("design", "material", "parts", *_READINGS)
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
 
@@ -140,6 +141,7 @@ class Variation:
     low, high : with the compliance of the press itself
     step : of the parameter
     body, thing : what changes in the finger's body, and in that of an elastic object; None if nothing does
+    of_readings : whether it changes readings only, and nothing in the contact
     """
 
     low: Problem
@@ -147,6 +149,7 @@ class Variation:
     step: float
     body: BodyChange | None
     thing: BodyChange | None
+    of_readings: bool = False
 
     @property
     def ends(self) -> tuple[Problem, Problem]:
@@ -203,7 +206,8 @@ class VariedBody:
             thing = BodyChange.between(self._object.condensed, softer, stiffer, step)
         if own.object_compliance is not None and (change or thing):
             ends = self._beside_object(ends, step, change, thing)
-        return Variation(ends[0], ends[1], step, change, thing)
+        of_readings = changed <= _READINGS and own.inclusions is None and own.relaxation is None
+        return Variation(ends[0], ends[1], step, change, thing, of_readings)
 
     @cached_property
     def _pattern(self) -> Pattern:
