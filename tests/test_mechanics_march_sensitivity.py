@@ -31,6 +31,22 @@ def test_forces_are_proportional_to_the_modulus_and_places_are_not() -> None:
         assert slope[name] == pytest.approx(0.0, abs=1e-8 * abs(value[name]))
 
 
+def test_places_of_gauges_move_readings_only() -> None:
+    model = fig9(domain="plane-strain", mesh=MeshOptions(4.0, 10.0), friction=Coulomb(0.4), legs=PRESS, **READINGS)
+    problem, gauge = build(model), model.gauges[0]
+    places = [replace(model, gauges=(replace(gauge, x_mm=gauge.x_mm + h), *model.gauges[1:])) for h in (-STEP, STEP)]
+    rubs = [replace(model, friction=Coulomb(0.4 + h)) for h in (-STEP, STEP)]
+    moved, rubbed = (VariedBody(problem).variation(*ends, STEP) for ends in (places, rubs))
+    assert moved.of_readings
+    assert not rubbed.of_readings
+    _, alone = differentiated(problem, [moved])
+    _, both = differentiated(problem, [rubbed, moved])
+    for (first,), (_, second) in zip(alone, both, strict=True):
+        assert first == second
+        assert first["gauge_g36"] != 0.0
+        assert {first[name] for name in ("normal_force_N", "stick_area_mm2", "gauge_g20", "dissipation_mJ")} == {0.0}
+
+
 def test_what_changes_the_mesh_and_what_increments_define_is_refused() -> None:
     model = fig9(domain="plane-strain", mesh=MeshOptions(4.0, 10.0), friction=Coulomb(0.4), legs=PRESS)
     problem = build(model)

@@ -70,8 +70,8 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
     if not steps[-1].outcome.ok:
         raise Finger3dError(f"at depth {steps[-1].target.depth_mm:.4g} mm: {steps[-1].outcome}")
     along = _by_increments if any(step.path is None for step in steps) else _on_exact_path
-    others = [one for one in variations if not one.of_readings]
-    found = along(problem, others, steps) if others else ((step, list[Side | None](), []) for step in steps)
+    others, none = [one for one in variations if not one.of_readings], list[Side | None]()
+    found = along(problem, others, steps) if others else ((step, none, none) for step in steps)
     own = _of_readings(problem, [one for one in variations if one.of_readings], steps)
     for (step, falling, growing), read in zip(found, own, strict=True):
         below = above = _in_turn(variations, falling, read)
