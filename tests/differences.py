@@ -16,7 +16,7 @@ from finger3d.mechanics.march.sensitivity import Numbers, derivatives, tangents
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.variations import Variation, variation
+from finger3d.mechanics.small_strain.variations import Variation, VariedBody
 
 STEP, DIFFERENCE = 1e-6, 2e-6
 
@@ -101,12 +101,13 @@ def assert_equal_to_differences(
 ) -> None:
     """Compare all derivatives with central differences of presses, whose bodies are condensed again if they change."""
     h = step if problem.model.object.is_flat else max(step, 10.0 * DIFFERENCE)  # curved contact is solved to 1e-9
-    variations = [variation(problem, way(-STEP), way(STEP), STEP) for way in ways.values()]
+    body = VariedBody(problem)
+    variations = [body.variation(way(-STEP), way(STEP), STEP) for way in ways.values()]
     steps, slopes = differentiated(problem, variations)
     values = [table_row(problem.points, step) for step in steps]
     for k, (name, way) in enumerate(ways.items()):
         ends = []
-        near = variation(problem, way(-h), way(h), h)
+        near = body.variation(way(-h), way(h), h)
         for end, t in zip(near.ends, (-h, h), strict=True):
             other = build(way(t)) if near.changes_compliance else end
             ends.append((other, list(march(other))))

@@ -8,6 +8,8 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.laws import NeoHooke
+from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.parts import Substep
@@ -22,8 +24,10 @@ from finger3d.mechanics.march.to_force import (
 )
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import Move, ObjectPose
+from finger3d.mechanics.small_strain.relaxation import Relaxation
+from finger3d.objects import Cylinder, Move, ObjectPose
 from tests.models import block, ended, small_section
+from tests.viscous_cases import TWO
 
 
 @pytest.mark.parametrize("power", [0.5, 2.0 / 3.0, 1.0])  # a cylinder, a ball, and a flat punch
@@ -73,9 +77,26 @@ def test_a_force_out_of_reach_of_one_increment_is_approached_in_parts() -> None:
     end = approached(problem, workspace, start, move, (0.0, wanted))
     assert workspace.factorizations > before
     assert end is not None
+    assert end[0].start == move.start
     assert end[0].end.depth_mm == pytest.approx(1.2, rel=3e-3)  # 1.1e-3: it slips in other increments than the press
     assert normal_force(problem, end[1].state) == pytest.approx(wanted, rel=1e-3)
     assert approached(problem, workspace, start, move, (0.0, wanted), cuts=0) is None
+
+
+def test_a_relaxing_body_has_the_force_at_the_depth_where_it_is_reached() -> None:
+    # the rough solution of the second leg is found in halves, and the increment takes all of its time
+    first = Leg(0.3, steps=2, duration_s=1.0)
+    model = small_section(
+        symmetry=(), hyperelastic_law=NeoHooke(1.0), object=Cylinder(radius_mm=3.0, axis="z"),
+        material=Isotropic(1.0, 0.49), relaxation=Relaxation(TWO, False),
+        legs=(first, Leg(0.3, force_N=0.5, steps=2, duration_s=0.3)),
+    )  # fmt: skip
+    *_, under_force, _ = march(build(model))
+    depth = under_force.target.depth_mm
+    problem, last = ended(replace(model, legs=(first, Leg(depth, steps=1, duration_s=0.15))))
+    pair = (measure(problem.points, step) for step in (under_force, last))
+    one, other = (entry["normal_force_N"] for entry in pair)
+    assert one == pytest.approx(other, rel=1e-6)
 
 
 def test_an_iteration_to_a_force_begins_within_a_factor_of_five() -> None:

@@ -12,13 +12,14 @@ from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise import elastic_object
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.moved_mesh import stretched_object
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.sensitivity import derivatives, tangents
 from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.small_strain import variations
-from finger3d.mechanics.small_strain.variations import stretched_object, variation
+from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.objects import Cylinder, Plane, Sphere
 from finger3d.progress import QUIET
 from tests.differences import STEP, assert_equal_to_differences, other_parameters, parameters
@@ -148,7 +149,7 @@ def test_a_hold_changes_no_derivative() -> None:
         model = replace(TILTED, legs=legs)
         problem = build(model)
         own = [replace(ways["mu"](h), legs=legs) for h in (-STEP, STEP)]
-        one = [variation(problem, *own, STEP)]
+        one = [VariedBody(problem).variation(*own, STEP)]
         *_, (step, _, growing) = tangents(problem, one)
         (slopes,) = derivatives(step, one, growing)
         found.append({n: slope for n, slope in slopes.items() if not n.startswith("stick")})  # what slipped now sticks

@@ -17,7 +17,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.relaxation import Relaxation
-from finger3d.mechanics.small_strain.variations import variation
+from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.objects import Cylinder, Plane
 from tests.differences import STEP, parameters, with_leg
 from tests.models import small_section
@@ -48,7 +48,8 @@ def assert_both_are_one_sided_differences(problem: Problem, names: Sequence[str]
     exact = model.object.is_flat and not model.finite_strain
     # presses are solved to round-off, or to 5e-9, which a longer step divides, as the term of third order allows
     h, close = (1e-6, 1e-6) if exact else (3e-4, 1e-5)
-    variations = [variation(problem, ways[name](-STEP), ways[name](STEP), STEP) for name in names]
+    body = VariedBody(problem)
+    variations = [body.variation(ways[name](-STEP), ways[name](STEP), STEP) for name in names]
     *_, (step, *both) = tangents(problem, variations)
     assert both[0] is not both[1]
     here = table_row(problem.points, step)
@@ -98,5 +99,5 @@ def test_a_path_that_ends_at_an_event(change: tuple[int, int]) -> None:
 def test_between_events_there_is_no_kink() -> None:
     model = replace(SECTION, legs=PRESS)
     problem, way = build(model), parameters(model)["mu"]
-    *_, (_, falling, growing) = tangents(problem, [variation(problem, way(-STEP), way(STEP), STEP)])
+    *_, (_, falling, growing) = tangents(problem, [VariedBody(problem).variation(way(-STEP), way(STEP), STEP)])
     assert falling is growing

@@ -21,7 +21,7 @@ from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, 
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
-from finger3d.mechanics.small_strain.variations import Variation, variation
+from finger3d.mechanics.small_strain.variations import Variation, VariedBody
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 
@@ -151,11 +151,11 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
-    keys, variations = dict[str, float](), list[Variation]()
+    keys, variations, varying = dict[str, float](), list[Variation](), VariedBody(problem)
     for key, value in _numbers_of(scene.as_dict()):
         if has_derivative(key, value, problem):
             try:
-                variations.append(varied(scene, problem, key))
+                variations.append(varied(scene, varying, key))
             except Finger3dError:  # such as dimensions that change the cells of the mesh; it is named with the result
                 continue
             keys[key] = value
@@ -171,7 +171,7 @@ def sensitivity(
     return found
 
 
-def varied(scene: Scene, problem: Problem, key: str) -> Variation:
+def varied(scene: Scene, body: VariedBody, key: str) -> Variation:
     """Return the variation of a condensed body with a key of its scene; one-sided where a bound is nearer than a step.
 
     Raises
@@ -179,16 +179,16 @@ def varied(scene: Scene, problem: Problem, key: str) -> Variation:
     Finger3dError
         If numbers have no derivative by the key.
     """
-    given = scene.as_dict()
+    given, own = scene.as_dict(), body.problem.model
     value = float(str(tree.value_at(given, key)))
     step = (_NU_STEP if key.endswith(".nu") else _STEP) * max(abs(value), _LEAST)
-    count = len(stations(problem.model.legs))
+    count = len(stations(own.legs))
     problems = []
     for low in (value - step, value, value - 2.0 * step):
         try:
             models = [scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step)]
-            first, last = (replace(m, legs=with_increments_of(m.legs, count), mesh=problem.model.mesh) for m in models)
-            return variation(problem, first, last, step)
+            first, last = (replace(m, legs=with_increments_of(m.legs, count), mesh=own.mesh) for m in models)
+            return body.variation(first, last, step)
         except Finger3dError as error:
             problems.append(str(error))
     raise Finger3dError(f"{key} = {value:g}: numbers have no derivative here: {problems[0]}")

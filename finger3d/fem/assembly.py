@@ -209,7 +209,9 @@ def _outer_products(gradients: Float, weights: Float) -> Float:
     return np.asarray(np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d))
 
 
-def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> Stiffness:
+def stiffness(
+    mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0, pattern: Pattern | None = None
+) -> Stiffness:
     """Assemble the upper triangle.
 
     Parameters
@@ -218,10 +220,11 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
     elastic : the law; the mixed form needs a quadratic mesh
     thickness : mm
         Width of a 2D section (1 for a solid), so that forces are N.
+    pattern : of a mesh with the same cells, if it is known
     """
     d = mesh.dim
     bary, w = quadrature(d, 2 if mesh.element.is_quadratic else 1)
-    pattern = Pattern.of(mesh, elastic.mixed)
+    pattern = pattern or Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
     hats = bary  # the linear shape functions
     scale = pressure_scale(mesh, elastic.shear_modulus) if elastic.mixed else 1.0
@@ -245,6 +248,6 @@ def pressure_scale(mesh: Mesh, shear: float) -> float:
     return float(shear * len(mesh.cells) ** (1.0 / mesh.dim) / np.ptp(mesh.points, axis=0).max())
 
 
-def times(upper: sp.csr_matrix, vector: Float) -> Float:
-    """Return the product of a symmetric matrix, given by its upper triangle, and a vector."""
-    return np.asarray(upper @ vector + upper.T @ vector - upper.diagonal() * vector)
+def times(upper: sp.csr_matrix, vectors: Float) -> Float:
+    """Return the product (N, ...) of a symmetric matrix, given by its upper triangle, and vectors (N, ...)."""
+    return np.asarray(upper @ vectors + upper.T @ vectors - (upper.diagonal() * vectors.T).T)

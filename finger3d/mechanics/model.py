@@ -21,11 +21,13 @@ from finger3d.meshing.options import Mesher
 from finger3d.meshing.refinement.grading import Grading, SizedPlaces
 from finger3d.objects import (
     ContactPath,
+    FirstTouch,
     InitialContact,
     Move,
     ObjectPose,
     Plane,
     RigidObject,
+    first_touch,
     initial_contact,
 )
 
@@ -273,11 +275,16 @@ def first_contact(
     return _first_contact(design, obj, tuple(replace(leg, steps=1, duration_s=None) for leg in legs), domain, rigid)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _first_contact(
     design: Design, obj: RigidObject, legs: tuple[Leg, ...], domain: Domain, rigid: bool
 ) -> InitialContact:
-    return initial_contact(contact_path(design, obj, legs, domain, rigid))
+    return initial_contact(contact_path(design, obj, legs, domain, rigid), _first_touch(design, obj, domain))
+
+
+@lru_cache(maxsize=64)
+def _first_touch(design: Design, obj: RigidObject, domain: Domain) -> FirstTouch:
+    return first_touch(contact_path(design, obj, (), domain))
 
 
 def contact_path(

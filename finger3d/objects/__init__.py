@@ -3,7 +3,14 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from finger3d.objects.first_contact import ContactPath, InitialContact, first_contact_height, initial_contact
+from finger3d.objects.first_contact import (
+    ContactPath,
+    FirstTouch,
+    InitialContact,
+    first_contact_height,
+    first_touch,
+    initial_contact,
+)
 from finger3d.objects.placed import DistanceTracker, Move, ObjectPose, PlacedObject
 from finger3d.objects.rigid import Axis, HeldBody, RigidObject, vertical_frame
 from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wave, Wedge
@@ -20,6 +27,7 @@ __all__ = [
     "ContactPath",
     "Cylinder",
     "DistanceTracker",
+    "FirstTouch",
     "HeldBody",
     "InitialContact",
     "MeshObject",
@@ -32,6 +40,7 @@ __all__ = [
     "Wave",
     "Wedge",
     "first_contact_height",
+    "first_touch",
     "initial_contact",
     "vertical_frame",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,13 @@ class ContactPath:
         freeze_arrays(self)
 
 
+class FirstTouch(NamedTuple):
+    """Height (mm) of an object's lowest point at first touch, and its place (x, z) mm."""
+
+    height_mm: float
+    place: Float
+
+
 @dataclass(frozen=True)
 class InitialContact:
     """First touch of an object: height (mm) of its lowest point, place, and the box that it will overlap on its path.
@@ -69,17 +77,19 @@ class InitialContact:
 
 
 def _grid(half_length: float, half_width: float, count: tuple[int, int] = _GRID) -> Float:
-    x, z = np.meshgrid(
-        np.linspace(-half_length, half_length, count[0]), np.linspace(-half_width, half_width, count[1]), indexing="ij"
-    )
+    """Return points (n, 2) over the finger; those of a section are one row."""
+    across = np.linspace(-half_width, half_width, count[1] if half_width else 1)
+    x, z = np.meshgrid(np.linspace(-half_length, half_length, count[0]), across, indexing="ij")
     return np.stack([x.ravel(), z.ravel()], axis=1)
 
 
-def _touching(
-    top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None
-) -> tuple[float, Float]:
-    """Return the height of the lowest point at first touch, and its place (2,); -inf without overlap in plan."""
-    placed = PlacedObject.of(obj, 0.0)
+def first_touch(way: ContactPath) -> FirstTouch:
+    """Return the first touch of an object: the largest difference of the two surfaces; -inf without overlap in plan.
+
+    The maximum is searched on a grid and at landmarks, then on finer grids around the best places.
+    """
+    top, obj, half_length, half_width = way.top, way.object, way.half_length_mm, way.half_width_mm
+    marks, placed = way.landmarks, PlacedObject.of(obj, 0.0)
 
     def difference(xz: Float) -> Float:
         return np.nan_to_num(top(xz[:, 0], xz[:, 1]) - placed.height(xz[:, 0], xz[:, 1]), nan=-np.inf, posinf=np.inf)
@@ -96,8 +106,7 @@ def _touching(
     step = 2.0 * limit / (np.array(_GRID) - 1)
     places = _apart(points, differences, 1.5 * step)
     for _ in range(_ZOOMS):
-        t = np.linspace(-1.0, 1.0, _ZOOM)
-        window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(1, -1, 2) * step
+        window = _grid(1.0, float(half_width > 0.0), (_ZOOM, _ZOOM)) * step
         points = np.clip(places[:, None] + window, -limit, limit)
         differences = difference(points.reshape(-1, 2)).reshape(len(places), -1)
         highest = differences.argmax(axis=1)
@@ -107,7 +116,7 @@ def _touching(
             best = float(peaks.max())
             place = places[int(peaks.argmax())]
         step = step * 2.0 / (_ZOOM - 1)
-    return best, place
+    return FirstTouch(best, place)
 
 
 def _apart(points: Float, value: Float, distance: Float) -> Float:
@@ -125,20 +134,18 @@ def _apart(points: Float, value: Float, distance: Float) -> Float:
 def first_contact_height(
     top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None
 ) -> float:
-    """Return the height (mm) of the object's lowest point at first touch: the largest difference of the two surfaces.
-
-    The maximum is searched on a grid and at landmarks, then on finer grids around the best places.
+    """Return the height (mm) of the object's lowest point at first touch; see `first_touch`.
 
     Parameters
     ----------
     top : the finger's height over (x, z), nan beside it
     marks : (k, 2) mm, corners of the finger
     """
-    return _touching(top, obj, half_length, half_width, marks)[0]
+    return first_touch(ContactPath(top, obj, half_length, half_width, (), marks)).height_mm
 
 
-def initial_contact(way: ContactPath) -> InitialContact:
-    """Return the first touch, as in :func:`first_contact_height`, of a path.
+def initial_contact(way: ContactPath, touch: FirstTouch | None = None) -> InitialContact:
+    """Return the first touch of a path, which may be known, and the box that the object will overlap on it.
 
     Raises
     ------
@@ -147,7 +154,7 @@ def initial_contact(way: ContactPath) -> InitialContact:
     """
     top, obj, path = way.top, way.object, way.poses
     half_length, half_width = way.half_length_mm, way.half_width_mm
-    first_contact_mm, place = _touching(top, obj, half_length, half_width, way.landmarks)
+    first_contact_mm, place = touch or first_touch(way)
     if first_contact_mm == math.inf:
         raise Finger3dError(
             "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
@@ -226,8 +233,7 @@ def _box(
     path: Sequence[ObjectPose],
 ) -> tuple[float, float, float, float]:
     limit = np.array([half_length, half_width])
-    t = np.linspace(-1.0, 1.0, _ZOOM)
-    window = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2) * 2.0 * limit / (np.array(_COARSE) - 1)
+    window = _grid(1.0, float(half_width > 0.0), (_ZOOM, _ZOOM)) * 2.0 * limit / (np.array(_COARSE) - 1)
     grids = [_grid(half_length, half_width, _COARSE)]
     for k in range(_ZOOMS):  # a tip may lie between the points of the grid
         near = window * 10.0**-k

@@ -5,13 +5,14 @@ A pose is the depth, the slides and the turns since first touch.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from finger3d._types import Float, freeze_arrays
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.rigid import RigidObject, rotation
 from finger3d.objects.triangulated import MeshObject
@@ -63,6 +64,12 @@ class ObjectPose:
     def coordinates(self) -> Float:
         """Depth and slides (mm), time (s) and turns (rad): array (7,)."""
         return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s, *self.turns])
+
+    def changed(self, numbers: Sequence[int] | Int, change: Sequence[float] | Float) -> ObjectPose:
+        """Return the pose with some of its `coordinates` changed."""
+        coordinates = self.coordinates
+        coordinates[numbers] += change
+        return ObjectPose(*coordinates.tolist())
 
 
 @dataclass(frozen=True)

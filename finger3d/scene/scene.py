@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from finger3d._ranges import printable
@@ -143,9 +144,10 @@ class Scene:
                 "effects.auto = true: a press finds which effects this scene calls for; take the scene.toml that "
                 "finger3d press writes"
             )
-        return self._assembled()
+        return self._model
 
-    def _assembled(self) -> Model:
+    @cached_property
+    def _model(self) -> Model:
         t = self.tables
         model = Model(
             design=self.design,
@@ -197,7 +199,7 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
         mesh = parts.mesh()
         filled, auto = parts.filled_in(mesh), parts.tolerance_of_effects
         scene = Scene(filled, parts.design, parts.object, mesh, parts.effects, auto, given, path)
-        scene._assembled()  # effects may refuse what the rest of the scene asks for
+        _ = scene._model  # effects may refuse what the rest of the scene asks for
     except Finger3dError as error:
         raise messages.refusal([str(error)], path, set_keys) from None
     return scene

@@ -31,6 +31,7 @@ from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
 from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
 from finger3d.scene import Scene, tree
@@ -243,7 +244,8 @@ class Simulation:
         if refusal(problem.model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
             return None
         try:
-            variations = [varied(scene, problem, key) for key in keys]
+            body = VariedBody(problem)
+            variations = [varied(scene, body, key) for key in keys]
             rows = [
                 derivatives(step, variations, sides, with_zones=with_zones)
                 for step, _, sides in tangents(problem, variations, steps)

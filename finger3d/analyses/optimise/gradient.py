@@ -22,6 +22,7 @@ from finger3d.analyses.sensitivity import has_derivative, varied
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, tangents
+from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.scene import Scene, tree
 
 _LEAST_BOX = 1e-3
@@ -46,7 +47,8 @@ def slopes_of(scene: Scene, problem: Problem, mus: Sequence[float], keys: Sequen
     for key in keys:
         if why or not has_derivative(key, float(str(tree.value_at(given, key) or 0.0)), problem):
             raise Finger3dError(f"--method gradient: {key}: {why or 'numbers have no derivative by it'}")
-    variations, found = [varied(scene, problem, key) for key in keys], []
+    body = VariedBody(problem)
+    variations, found = [varied(scene, body, key) for key in keys], []
     for mu in mus:
         friction = problem.model.friction.with_mu(mu)
         at_mu = [replace(v, low=under(v.low, friction), high=under(v.high, friction)) for v in variations]

@@ -102,6 +102,11 @@ class BoundarySurface:
         return np.asarray(self._interpolation @ values)
 
     @cached_property
+    def influence(self) -> sp.csr_matrix:
+        """Which points (c, c) have means that change with the displacements of each point; see `interpolated`."""
+        return sp.csr_matrix(self.average @ self._interpolation)
+
+    @cached_property
     def _interpolation(self) -> sp.csr_matrix:
         total = np.asarray(self.hats.sum(axis=0)).ravel()
         return sp.csr_matrix(sp.diags_array(1.0 / total) @ self.hats.T)

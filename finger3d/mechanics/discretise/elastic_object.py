@@ -16,10 +16,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, freeze_arrays
-from finger3d.fem.assembly import stiffness
+from finger3d.fem.assembly import Pattern, Stiffness, stiffness
 from finger3d.fem.mesh.simplex import Mesh, axis_numbers, reflected
-from finger3d.fem.solids.material import Isotropic
-from finger3d.fem.solvers.condense import condense
+from finger3d.fem.solids.material import Elasticity, Isotropic
+from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
@@ -90,22 +90,40 @@ def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Prog
 
 def response_of(problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool) -> ObjectResponse:
     """Condense a mesh of an elastic object; see `object_mesh`."""
-    model, axes, d = problem.model, problem.axes, problem.dim
-    trace = facing_trace(problem.surface, mesh, "contact")
-    frame = vertical_frame(d)
-    rows = sp.kron(trace, frame, format="csr")
-    images = 1
-    if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
-        rows, images = _all_images(problem, mesh, frame), 2 ** len(axes)
-    elastic = Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
-    matrix = stiffness(mesh, elastic, problem.body.thickness)
-    held = held_dofs(mesh, () if whole else axes, model.held_ends)
-    condensed = condense(matrix, held, rows[problem.system.active_dofs])
-    c = len(problem.surface.nodes)
+    condensed = condensed_object(problem, thing, mesh, whole)
+    active, (c, d) = problem.system.active_dofs, problem.surface.points.shape
     out = np.zeros((c * d, c * d))
-    out[np.ix_(problem.system.active_dofs, problem.system.active_dofs)] = condensed.compliance / images
+    out[np.ix_(active, active)] = condensed.compliance
     seconds = {"object_condensation": condensed.seconds}
     return ObjectResponse(out.reshape(c, d, c, d), condensed.factorizations, seconds)
+
+
+def law_of_object(model: Model, thing: ElasticObject) -> Elasticity:
+    """Return the small-strain law of an elastic object."""
+    return Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
+
+
+def condensed_object(problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool) -> Condensation:
+    """Condense a mesh of an elastic object to the directions of contact points that move; see `object_mesh`."""
+    held = held_dofs(mesh, () if whole else problem.axes, problem.model.held_ends)
+    matrix, rows = assembled_object(problem, thing, mesh, whole)
+    return condense(matrix, held, rows)
+
+
+def assembled_object(
+    problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool, pattern: Pattern | None = None
+) -> tuple[Stiffness, sp.csr_matrix]:
+    """Return the stiffness of an elastic object, and the rows (r, n d) of the directions of contact points that move.
+
+    A known `pattern` of the stiffness saves time.
+    """
+    model, axes, frame = problem.model, problem.axes, vertical_frame(problem.dim)
+    if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
+        rows = _all_images(problem, mesh, frame) / math.sqrt(2 ** len(axes))
+    else:
+        rows = sp.kron(facing_trace(problem.surface, mesh, "contact"), frame, format="csr")
+    matrix = stiffness(mesh, law_of_object(model, thing), problem.body.thickness, pattern)
+    return matrix, rows[problem.system.active_dofs]
 
 
 def _all_images(problem: Problem, mesh: Mesh, frame: Float) -> sp.csr_matrix:

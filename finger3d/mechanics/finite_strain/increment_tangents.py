@@ -31,16 +31,15 @@ from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import (
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, rubbed
+from finger3d.mechanics.small_strain.linearised import (
     MOST,
-    IncrementTangents,
+    LinearisedIncrement,
     Part,
     are_converged,
     derivative_scale,
-    rubbed,
     slopes,
 )
-from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
 

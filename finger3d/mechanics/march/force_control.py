@@ -17,7 +17,7 @@ from finger3d.errors import Outcome
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.state import State
-from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_contact_height
+from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_touch
 
 _DEEPEST = 0.99
 """Largest depth at which a force is searched for, over that at which the object would reach the finger's base."""
@@ -311,7 +311,7 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         indexing="ij",
     )
     plan = 4.0 * way.half_length_mm * half_width / x.size
-    first_contact_mm = first_contact_height(way.top, way.object, way.half_length_mm, way.half_width_mm, way.landmarks)
+    first_contact_mm = first_touch(way).height_mm
     level = np.zeros_like(z) if way.half_width_mm == 0.0 else z
     gap = PlacedObject.of(way.object, first_contact_mm, ObjectPose(0.0)).height(x, level) - way.top(x, level)
     gap = np.where(np.isfinite(gap), gap, np.inf)

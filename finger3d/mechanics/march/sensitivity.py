@@ -22,10 +22,10 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import AT_ONCE, IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
 from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
-from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
@@ -70,7 +70,39 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
     if not steps[-1].outcome.ok:
         raise Finger3dError(f"at depth {steps[-1].target.depth_mm:.4g} mm: {steps[-1].outcome}")
     along = _by_increments if any(step.path is None for step in steps) else _on_exact_path
-    yield from along(problem, variations, steps)
+    others, none = [one for one in variations if not one.of_readings], list[Side | None]()
+    found = along(problem, others, steps) if others else ((step, none, none) for step in steps)
+    own = _of_readings(problem, [one for one in variations if one.of_readings], steps)
+    for (step, falling, growing), read in zip(found, own, strict=True):
+        below = above = _in_turn(variations, falling, read)
+        if growing is not falling:
+            above = _in_turn(variations, growing, read)
+        yield step, below, above
+
+
+def _in_turn(variations: Sequence[Variation], sides: Sides, read: Sides) -> Sides:
+    """Return the sides (2 p,) of all parameters, from those of parameters of readings and those of the others."""
+    rest, own = iter(sides), iter(read)
+    return [next(own if one.of_readings else rest) for one in variations for _ in one.ends]
+
+
+def _of_readings(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Iterator[Sides]:
+    """Yield the sides (2 p,) of parameters of readings at the end of every increment; they change no contact."""
+    formulation, columns, first = formulation_of(problem.model), problem.model.columns, len(problem.system.active_dofs)
+    changes = [] if problem.model.finite_strain else [one.body for one in variations]
+    for start in range(0, len(steps), AT_ONCE):
+        states = [step.meshed_state for step in steps[start : start + AT_ONCE]]
+        forces = np.stack([problem.row_forces(problem.upright_force(state.contact)) for state in states], axis=1)
+        moved = changes_of_rows(changes, forces)[first:]
+        for i, (step, state) in enumerate(zip(steps[start:], states, strict=False)):
+            sides: Sides = []
+            for k, one in enumerate(variations):
+                for end, t in zip(one.ends, (-one.step, one.step), strict=True):
+                    found = formulation.readings(end, state)
+                    read = np.array([found[column] for column in columns])
+                    read = read + t * moved[: len(read), i, k] if changes else read
+                    sides.append(Side(end, state, step.target, read, step.external_work_mJ, step.dissipation_mJ))
+            yield sides
 
 
 def derivatives(

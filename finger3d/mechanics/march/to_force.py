@@ -52,7 +52,7 @@ def approached(
 
     Returns
     -------
-    The motion, and a rough solution; None if there is none.
+    The whole motion, and a rough solution; None if there is none.
     """
     rough = workspace.rough()
     end = increment_to_force(problem, start, move, forces[1], rough)
@@ -65,7 +65,8 @@ def approached(
         return None
     there, solution = half
     rest = Move(there.end, replace(move.end, depth_mm=there.at(2.0).depth_mm))
-    return approached(problem, workspace, (solution.state, None), rest, (middle, forces[1]), cuts - 1)
+    end = approached(problem, workspace, (solution.state, None), rest, (middle, forces[1]), cuts - 1)
+    return end and (Move(move.start, end[0].end), end[1])
 
 
 def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: tuple[float, float]) -> float:

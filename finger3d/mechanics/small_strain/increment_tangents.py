@@ -7,8 +7,10 @@ geometry of the contact, and on the parameters through the state before and the 
     D w + E x = 0,   dU = W (B^T (P dx + dmu e r_n) + dB^T r) + dW B^T r
 
 (`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
-parameter less and plus its step to first order.  They hold the curvature of the object, and where points touch within
-the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson 1965).
+parameter less and plus its step to first order, and those by U are the same for all parameters
+(`finger3d.mechanics.small_strain.contact_slopes`).  They hold the curvature of the object, and where points touch
+within the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson
+1965).
 
 Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
@@ -22,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._types import Array, Float
+from finger3d._types import Float, Int
 from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
@@ -32,46 +34,30 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, influence_of
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
-from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
-from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.linearised import (
+    MOST,
+    Linear,
+    LinearisedIncrement,
+    Part,
+    are_converged,
+    derivative_scale,
+    slopes,
+    upright,
+)
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
-
-_CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
-"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
-and the largest number of iterations."""
 
 _MEMORY = 8
 """Iterations from which the next one is extrapolated."""
 
-_NEGLIGIBLE = 1e-7
-"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
-
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
 
-_AT_ONCE = 32
+AT_ONCE = 32
 """Increments that the body is solved for at once, which costs less than one after another."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """Part of an increment, linearised, between two shares of its motion."""
-
-    before: State[Any]
-    after: State[Any]
-    linear: Any
-    start: float
-    end: float
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Equations of the active set of an increment in small strain, and the compliance (c, d, c, d) mm/N within it."""
-
-    active: LinearisedIncrement
-    delassus: Float
 
 
 @dataclass(frozen=True)
@@ -80,26 +66,6 @@ class FixedForces:
 
     displacement: Float
     readings: Float
-
-
-@dataclass(frozen=True)
-class _End:
-    """Side at the end of a part of an increment, with gap and slip (c, d) mm and forces (c, d) N in its directions."""
-
-    state: State[Float]
-    relative: Float
-    turned_force: Float
-
-    @classmethod
-    def of(cls, increment: Increment, contact: ContactState, force: Float, place: Float) -> _End:
-        """Return the end at displacements (c, d), with contact forces that differ by (c, d) from those of a state."""
-        # as in the solution of the increment, whose geometry is linear under a flat object
-        expansion_point = np.zeros_like(place) if increment.problem.model.object.is_flat else place
-        geometry = increment.geometry(expansion_point, np.inf)
-        changed = replace(contact, force=contact.force + force)
-        state = increment.reached(geometry, expansion_point, place, changed, None)
-        turned = np.einsum("ca,cak->ck", contact.force, geometry.bases)
-        return cls(state, increment.relative(geometry, expansion_point, place), turned)
 
 
 class IncrementTangents:
@@ -185,10 +151,10 @@ class IncrementTangents:
                 after = replace(after, contact=replace(after.contact, status=status))
             share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
             try:
-                linear = self._linearised(before, after, Move(place, pose))
+                linear = self._linearised(before, after, move := Move(place, pose))
             except np.linalg.LinAlgError:
                 raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
-            parts.append(Part(before, after, linear, start, share))
+            parts.append(Part(before, after, linear, move, start, share))
             before, place, start = after, pose, share
         return parts
 
@@ -210,17 +176,25 @@ class IncrementTangents:
         return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
 
     @cached_property
+    def _influence(self) -> tuple[Any, Int]:
+        return influence_of(self.problem.surface, self.problem.model.object.is_flat)
+
+    @cached_property
+    def _contacts(self) -> list[list[ContactState]]:
+        """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
+        contacts = [after.contact for step in self._results for _, after in step.parts]
+        return [contacts[start : start + AT_ONCE] for start in range(0, len(contacts), AT_ONCE)]
+
+    @cached_property
     def _fixed(self) -> dict[bytes, FixedForces]:
         """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
         problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
-        contacts = [after.contact for step in self._results for _, after in step.parts]
-        for start in range(0, len(contacts), _AT_ONCE):
-            some = contacts[start : start + _AT_ONCE]
+        for some in self._contacts:
             rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
             rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
             sizes = problem.surface.points.size, len(problem.system.reading_rows)
             displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
-            moved = self._changes_of_rows(rows, count)
+            moved = changes_of_rows([one.body for one in self._variations], rows)
             for k, one in enumerate(self._variations):
                 if one.body:
                     displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
@@ -228,14 +202,17 @@ class IncrementTangents:
                 found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
         return found
 
-    def _changes_of_rows(self, forces: Float, count: int) -> Float:
-        """Return what variations change in the rows' displacements (r, k, count) at fixed forces (r, k) on them."""
-        moved = np.zeros((*forces.shape, count))
-        changed = [(k, one.body) for k, one in enumerate(self._variations) if one.body]
-        unknowns = self.problem.body.condensed.unknowns(forces) if changed else forces
-        for k, body in changed:
-            moved[..., k] = body.moved(self.problem, forces, unknowns)
-        return moved
+    @cached_property
+    def _of_object(self) -> dict[bytes, Float]:
+        """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
+        active, found = self.problem.system.active_dofs, dict[bytes, Float]()
+        changes = [one.thing for one in self._variations]
+        for some in self._contacts:
+            forces = np.stack([self.problem.upright_force(contact).ravel() for contact in some], axis=1)
+            moved = np.zeros((*forces.shape, len(changes)))
+            moved[active] = changes_of_rows(changes, forces[active])
+            found |= {contact.force.tobytes(): moved[:, i] for i, contact in enumerate(some)}
+        return found
 
     def _reached(
         self,
@@ -258,7 +235,7 @@ class IncrementTangents:
             planned = [station.pose.coordinates[1:3] for station in before]
             self._left = np.array([side.pose.coordinates[1:3] for side in self.sides]) - planned
         change = (1.0 - targets[0].share) * self._left
-        return [_moved(target.pose, [1, 2], by) for target, by in zip(targets, change, strict=True)]
+        return [target.pose.changed([1, 2], by) for target, by in zip(targets, change, strict=True)]
 
     def _in_equilibrium(
         self, step: StepResult, parts: Sequence[Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
@@ -267,8 +244,8 @@ class IncrementTangents:
         loads = [target.load for target in targets if target.load]
         free = np.flatnonzero(~np.isnan(loads[0].forces))
         reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
-        held = [_moved(pose, free, (reached - pose.coordinates)[free]) for pose in poses]
-        moved = [_moved(step.target, [k], [t]) for k in free.tolist() for t in (-h, h)]
+        held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
+        moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
         here = self._begun(self.problem)._replace(state=self._state, pose=self._pose)
         found = self._through(
             parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
@@ -285,7 +262,7 @@ class IncrementTangents:
         except np.linalg.LinAlgError:
             raise Finger3dError("forces do not determine the pose of the object: numbers have no derivatives") from None
         both = np.stack([-change, change], axis=1).reshape(-1, len(free))
-        return [_moved(pose, free, by) for pose, by in zip(held, both, strict=True)]
+        return [pose.changed(free, by) for pose, by in zip(held, both, strict=True)]
 
     def _through(
         self, parts: Sequence[Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
@@ -304,14 +281,19 @@ class IncrementTangents:
         delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
         largest = np.abs(contact.force).max(initial=0.0)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
-        at_fixed_forces, force = fixed.displacement.copy(), self.problem.upright_force(contact).reshape(-1, 1)
-        for k, one in enumerate(self._variations):
-            at_fixed_forces[:, k] += one.object_displacement(force)[:, 0]
+        at_fixed_forces = fixed.displacement.copy()
+        if any(one.thing for one in self._variations):
+            at_fixed_forces[:, : len(self._variations)] += self._of_object[contact.force.tobytes()]
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
-        increments = [
-            Increment(side.problem, self._displaced(side.state), move, body, DistanceTracker())
-            for side, move in zip(sides, moves, strict=True)
-        ]
+
+        def increment(problem: Problem, state: State[Any], move: Move) -> Increment:
+            return Increment(problem, self._displaced(state), move, body, DistanceTracker())
+
+        own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
+        of_conditions, of_geometry = own.slopes(contact, self._influence)
+        pairs = zip(sides, moves, strict=True)
+        ends = [own.beside(increment(side.problem, side.state, move)) for side, move in pairs]
+        conditions = slopes([end.conditions(contact) for end in ends], steps)
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
         count = linear.forces.shape[1]
         tried, results, errors = [np.zeros((count + c * d, p))], list[Float](), list[Float]()
@@ -319,19 +301,20 @@ class IncrementTangents:
             unknowns, turned = tried[-1][:count], tried[-1][count:]
             fixed_basis = linear.forces @ unknowns + direct
             moved = delassus @ (fixed_basis + turned) + at_fixed_forces
-            force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
-            place = np.einsum("ckp,kl->pcl", moved.reshape(c, d, p), frame)
-            ends = [
-                _End.of(replace(one, tracker=DistanceTracker()), contact, t * force[k // 2], there + t * place[k // 2])
-                for k, (one, t) in enumerate(zip(increments, steps, strict=True))
-            ]
-            turns = slopes([end.turned_force @ frame.T for end in ends], steps)
-            change = linear.correction(slopes([upright(contact, end.relative) for end in ends], steps), unknowns)
-            results.append(np.concatenate([unknowns - change, turns]))
+            place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame).reshape(-1, p)
+            relative, turns = np.moveaxis((conditions + of_conditions @ place).reshape(c, 2, d, p), 1, 0)
+            change = linear.correction(relative.reshape(-1, p), unknowns)
+            results.append(np.concatenate([unknowns - change, turns.reshape(-1, p)]))
             error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
             errors.append(error / derivative_scale(unknowns - change, largest, size))
             if are_converged(errors):
-                reached = self._reached(part, fixed, [end.state for end in ends], sides, steps, moves)
+                force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
+                changes = [array.reshape(c, -1, p) for array in (place, of_geometry @ place)]
+                states = [
+                    end.moved(*(t * array[..., k // 2] for array in changes)).state(contact, t * force[k // 2])
+                    for k, (end, t) in enumerate(zip(ends, steps, strict=True))
+                ]
+                reached = self._reached(part, fixed, states, sides, steps, moves)
                 return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
             columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]
             tried.append(np.column_stack([extrapolated(*both) for both in columns]))
@@ -346,27 +329,6 @@ def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:
     state, readings = reached
     work, lost = energies(before.problem, [Substep(before.state, state, move)])
     return Side(before.problem, state, move.end, readings, before.work_mJ + work, before.dissipation_mJ + lost)
-
-
-def slopes(values: Sequence[Float], steps: Float) -> Float:
-    """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
-    array = np.reshape(values, (len(steps), -1))
-    return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))
-
-
-def derivative_scale(derivatives: Float, value: float, size: Float) -> Float:
-    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
-    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
-    return np.where(scale > 0.0, scale, 1.0)
-
-
-def are_converged(errors: Sequence[Float]) -> bool:
-    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
-
-    Unknowns and directions are corrected in turn, so that errors fall every second time.
-    """
-    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
-    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
@@ -385,13 +347,6 @@ def _forces(side: Side) -> Float:
     """Return the normal force and the forces along x and z (3,) N."""
     x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
     return np.array([-y, x, z])
-
-
-def _moved(pose: ObjectPose, numbers: Sequence[int] | Array, change: Sequence[float] | Float) -> ObjectPose:
-    """Return a pose with some of its coordinates changed."""
-    coordinates = pose.coordinates
-    coordinates[numbers] += change
-    return ObjectPose(*coordinates.tolist())
 
 
 def _coefficients(side: Side, status: Status) -> Float:

@@ -36,8 +36,8 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.variations import Side, Variation
-from finger3d.objects import ObjectPose, vertical_frame
+from finger3d.mechanics.small_strain.variations import BodyChange, Side, Variation
+from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
 """Difference of shares of the path below which two events are at the same place."""
@@ -110,13 +110,10 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
 
     They are in the directions of an upright object; None where a parameter changes nothing in the body.
     """
-    condensed, active, size = problem.body.condensed, problem.system.active_dofs, problem.surface.points.size
-    if not any(one.changes_compliance for one in variations):
-        return [None] * len(variations)
-    count = len(condensed.compliance)
-    unknowns = condensed.unknowns(np.eye(count)) if any(one.body for one in variations) else np.zeros((0, count))
-    forces = problem.inclusions.with_spring_forces(condensed.compliance, np.eye(count, len(active)))
-    on_points = np.eye(size)[:, active]
+    compliance, active = problem.body.condensed.compliance, problem.system.active_dofs
+    size = problem.surface.points.size
+    forces = problem.inclusions.with_spring_forces(compliance, np.eye(len(compliance), len(active)))
+    of_finger, of_object = (_unknowns([getattr(one, name) for one in variations]) for name in ("body", "thing"))
 
     def dense(rows: Float) -> Float:
         out = np.zeros((len(rows), size))
@@ -124,12 +121,21 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
         return out
 
     def changes(one: Variation) -> tuple[Float, Float]:
-        moved, read = np.zeros_like(on_points), np.zeros((len(problem.system.reading_rows), len(active)))
+        moved, read = np.zeros((size, len(active))), np.zeros((len(problem.system.reading_rows), len(active)))
         if one.body:
-            moved, read = one.body.of_points(problem, forces, one.body.compliance(unknowns) @ forces)
-        return dense(moved + one.object_displacement(on_points)), dense(read)
+            moved, read = one.body.of_points(problem, forces, one.body.compliance(of_finger) @ forces)
+        if one.thing:
+            moved[active] += one.thing.compliance(of_object)
+        return dense(moved), dense(read)
 
     return [changes(one) if one.changes_compliance else None for one in variations]
+
+
+def _unknowns(changes: Sequence[BodyChange | None]) -> Float:
+    """Return all unknowns (N, r) of a body under forces of 1 N on each row; none if it does not change."""
+    changed = next((one for one in changes if one), None)
+    count = len(changed.condensed.compliance) if changed else 0
+    return np.ascontiguousarray(changed.condensed.unknowns(np.eye(count))) if changed else np.zeros((0, 0))
 
 
 class PathTangents:
@@ -158,10 +164,10 @@ class PathTangents:
     ) -> None:
         self.path, self.variations, self._rest = path, variations, rest
         self._delassus = self._local(path.problem.delassus)
-        self._changes = [
-            change and self._local(change[0].reshape(path.problem.delassus.shape)) + self._turned(turn)
-            for change, turn in zip(changes, rest.bases, strict=True)
-        ]
+        self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
+        for change, turn in zip(self._changes, rest.bases, strict=True):
+            if change is not None and turn.any():
+                change += self._turned(turn)
         # gaps close along the normal of the object, which is not that of the points if it is elastic
         self._closing = path.bases.copy()
         self._closing[:, 0] = (
@@ -226,7 +232,7 @@ class PathTangents:
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
-                    moved_pose(step.target, t * motion[k]),
+                    step.target.changed([1, 0], t * motion[k] * [1.0, -1.0]),
                     t * read + problem.system.reading_rows @ problem.upright_force(moved).ravel(),
                     step.external_work_mJ + t * total[0, k],
                     step.dissipation_mJ + t * total[1, k],
@@ -341,11 +347,7 @@ class PathTangents:
         amplitude = -last.displacement[:, point, 0] / closing[point, 0]
         moved = last.displacement + amplitude[:, None, None] * closing
         moved[:, :, 1] += (event.amplitude - before.amplitude) * self._rest.bases[:, :, 1, 1]
-        return replace(
-            last,
-            displacement=moved,
-            amplitude=last.amplitude + amplitude,
-        )
+        return replace(last, displacement=moved, amplitude=last.amplitude + amplitude)
 
     def _solved(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at a place within a piece of the path that itself does not move."""
@@ -393,7 +395,3 @@ class PathTangents:
 def _relative(state: ContactState) -> Float:
     """Return gap and tangential displacement (c, 2)."""
     return np.column_stack([state.gap, state.tangential_displacement])
-
-
-def moved_pose(pose: ObjectPose, motion: Float) -> ObjectPose:
-    return replace(pose, slide_x_mm=pose.slide_x_mm + float(motion[0]), depth_mm=pose.depth_mm - float(motion[1]))

@@ -6,50 +6,48 @@ derivative is ``L K^-1 (dL_c^T r - dK u) + dL u``, where dK and dL are central d
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import stiffness
-from finger3d.fem.mesh.locate import locate
+from finger3d.fem.assembly import Pattern, stiffness, times
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.surface.traces import local_rows, restrict
-from finger3d.geometry.design import Design
+from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
+from finger3d.fem.solvers.condense import Condensation
+from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, restrict, surface
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
-from finger3d.mechanics.discretise.elastic_object import object_mesh, response_of
+from finger3d.mechanics.discretise.elastic_object import (
+    assembled_object,
+    condensed_object,
+    law_of_object,
+    object_mesh,
+)
 from finger3d.mechanics.discretise.foils import EmbeddedBars
-from finger3d.mechanics.discretise.problem import Problem, free_surface, object_share
+from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object, with_points_of
+from finger3d.mechanics.discretise.problem import Problem, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
-from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
-from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
 
-_FARTHEST = 1e-2
-"""Motion of the vertices, over the least size of the body, beyond which they are others."""
-
-_VOLUME, _ROUND_OFF = 0.05, 1e-9
-"""Relative errors of the growth of a stretched body, and of its volume, that are those of its mesh."""
-
-_CELLS_OF_SECTION = 40
-"""Edges along half the section in whose mesh the inside of a body of several parts moves."""
-
-_INSIDE = 1.0 - 1e-9
-"""Share of their distance from the axis at which points on the rim are inside in spite of round-off."""
-
-_IN_BODY = ("design", "material", "parts", "gauges", "markers", "taxels")
+_READINGS = {"gauges", "markers", "taxels"}
+_IN_BODY = ("design", "material", "parts", *_READINGS)
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
+
+
+_OTHER_ELEMENTS = "it switches between elements for compressible and nearly incompressible materials"
+
+_Matrices: TypeAlias = tuple[sp.csr_matrix, sp.csr_matrix]
+"""Upper triangle (N, N) of the stiffness of a body, and its rows (r, N)."""
 
 
 class Side(NamedTuple):
@@ -72,32 +70,43 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True)
 class BodyChange:
-    """Derivatives of a body by a parameter.
+    """Derivatives of a condensed body by a parameter.
 
     Attributes
     ----------
-    stiffness : (N, N) sparse
+    condensed : the body
+    stiffness : (N, N) sparse, the upper triangle
     rows : (r, N) sparse, of the condensed rows
     subgrid : (k, k), of the compliance of the last rows, gauges and bars, that the mesh lacks; empty without foils
     bars : (s,), of the stiffness of bars, over itself
     """
 
-    stiffness: Any
-    rows: Any
-    subgrid: Float
-    bars: Float
+    condensed: Condensation
+    stiffness: sp.csr_matrix
+    rows: sp.csr_matrix
+    subgrid: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    bars: Float = field(default_factory=lambda: np.zeros(0))
 
-    def moved(self, problem: Problem, forces: Float, unknowns: Float) -> Float:
+    @classmethod
+    def between(cls, condensed: Condensation, low: _Matrices, high: _Matrices, step: float) -> BodyChange:
+        """Return the central difference of the matrices of two bodies."""
+        stiffness, rows = ((above - below) / (2.0 * step) for below, above in zip(low, high, strict=True))
+        return cls(condensed, stiffness, rows)
+
+    def moved(self, forces: Float, unknowns: Float) -> Float:
         """Return the derivatives (r, k) of the rows at fixed forces (r, k) on them, which cause unknowns (N, k)."""
-        load = self.rows.T @ forces - self.stiffness @ unknowns
-        moved = problem.body.condensed.eliminated(load).displacement + self.rows @ unknowns
+        load, moved = self.rows.T @ forces - times(self.stiffness, unknowns), self.rows @ unknowns
+        if load.any():
+            moved += self.condensed.eliminated(load).displacement
         return self._with_subgrid(moved, forces)
 
     def compliance(self, unknowns: Float) -> Float:
         """Return the derivatives (r, r) of the rows under forces of 1 N on each, which cause unknowns (N, r)."""
         half = self.rows @ unknowns
-        moved = half + half.T - unknowns.T @ (self.stiffness @ unknowns)
-        return self._with_subgrid(moved, np.eye(len(moved)))
+        if self.stiffness.nnz:  # each half of the symmetric matrix has half of the diagonal
+            upper = self.stiffness - sp.diags_array(0.5 * self.stiffness.diagonal())
+            half -= unknowns.T @ (upper @ unknowns)
+        return self._with_subgrid(half + half.T, np.eye(len(half)))
 
     def _with_subgrid(self, moved: Float, forces: Float) -> Float:
         first = len(moved) - len(self.subgrid)
@@ -129,15 +138,18 @@ class Variation:
 
     Attributes
     ----------
-    low, high : with the compliance of the press itself, but for that of an elastic object
+    low, high : with the compliance of the press itself
     step : of the parameter
-    body : what changes in the finger's body; None if nothing does
+    body, thing : what changes in the finger's body, and in that of an elastic object; None if nothing does
+    of_readings : whether it changes readings only, and nothing in the contact
     """
 
     low: Problem
     high: Problem
     step: float
     body: BodyChange | None
+    thing: BodyChange | None
+    of_readings: bool = False
 
     @property
     def ends(self) -> tuple[Problem, Problem]:
@@ -147,207 +159,223 @@ class Variation:
     @property
     def changes_compliance(self) -> bool:
         """Whether the finger's body changes, or an elastic object."""
-        return self.body is not None or self.low.system.object_compliance is not self.high.system.object_compliance
-
-    def object_displacement(self, force: Float) -> Float:
-        """Return the derivatives (c d, k) of an elastic object's displacement at fixed contact forces (c d, k)."""
-        low, high = (end.system.object_compliance for end in self.ends)
-        if low is high or low is None or high is None:
-            return np.zeros_like(force)
-        return np.asarray(self.difference(low, high).reshape(len(force), -1) @ force)
+        return self.body is not None or self.thing is not None
 
     def difference(self, low: Float | float, high: Float | float) -> Float:
         """Return the central difference of two values."""
         return np.asarray((np.asarray(high) - low) / (2.0 * self.step))
 
 
-def variation(problem: Problem, low: Model, high: Model, step: float) -> Variation:
-    """Return the variation between two models; the mesh moves with the dimensions of the design.
+@dataclass(frozen=True)
+class VariedBody:
+    """A condensed body whose parameters vary, with what its variations have in common."""
 
-    They may differ in friction, path, object, materials, readings, and in dimensions that keep the cells of the meshes.
+    problem: Problem
 
-    Raises
-    ------
-    Finger3dError
-        If the models differ in anything else.
-    """
-    own = problem.model
-    kept = {name: getattr(own, name) for name in _CHANGES}
-    for model in (low, high):
-        if replace(model, **kept) != own or type(model.design) is not type(own.design):
-            raise Finger3dError("it changes the mesh")
-    models = [replace(own, **{name: getattr(model, name) for name in _CHANGES}) for model in (low, high)]
-    if any(model.object != own.object or model.design != own.design for model in models):
-        touches = [model.first_contact.first_contact_mm for model in (low, high)]
-    else:
-        touches = [problem.system.first_contact_mm] * 2
-    ends = [
-        replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
-        for model, touch in zip(models, touches, strict=True)
-    ]
-    changed = {name for name in _CHANGES for end in ends if getattr(end.model, name) != getattr(own, name)}
-    change = None
-    if changed & {*_IN_BODY, "inclusions"}:
-        below, above = (_assembled(problem, end) for end in ends)
-        ends, change = _changed(problem, below, above, step)
-    if own.object_compliance is not None:
-        ends = _beside_object(problem, ends, step, change)
-    return Variation(ends[0], ends[1], step, change)
+    def variation(self, low: Model, high: Model, step: float) -> Variation:
+        """Return the variation between two models; the mesh moves with the dimensions of the design.
 
+        They may differ in friction, path, object, materials, readings, and in dimensions that keep the cells of the
+        meshes.
 
-def _changed(problem: Problem, below: _Assembled, above: _Assembled, step: float) -> tuple[list[Problem], BodyChange]:
-    """Return the problems of two bodies, and what changes between these."""
-    ends = [below.problem, above.problem]
-    slopes = [(high - low) / (2.0 * step) for low, high in zip(below.matrices, above.matrices, strict=True)]
-    change = BodyChange(slopes[0], slopes[1], np.zeros((0, 0)), np.zeros(0))
-    if below.bars is None or above.bars is None:
-        return ends, change
-    own, condensed = problem.inclusions, problem.body.condensed
-    count, size = len(own.bar_stiffness), len(condensed.compliance)
-    pulls = np.eye(size, count, count - size)
-    slope = change.moved(problem, pulls, condensed.unknowns(pulls))[-count:]
-    of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
-    low, high = below.bars.in_mesh(of_mesh - step * slope), above.bars.in_mesh(of_mesh + step * slope)
-    ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
-    subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
-    bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
-    return ends, replace(change, subgrid=subgrid, bars=bars)
+        Raises
+        ------
+        Finger3dError
+            If the models differ in anything else.
+        """
+        problem, own = self.problem, self.problem.model
+        kept = {name: getattr(own, name) for name in _CHANGES}
+        for model in (low, high):
+            if replace(model, **kept) != own or type(model.design) is not type(own.design):
+                raise Finger3dError("it changes the mesh")
+        models = [replace(own, **{name: getattr(model, name) for name in _CHANGES}) for model in (low, high)]
+        if any(model.object != own.object or model.design != own.design for model in models):
+            touches = [model.first_contact.first_contact_mm for model in (low, high)]
+        else:
+            touches = [problem.system.first_contact_mm] * 2
+        ends = [
+            replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
+            for model, touch in zip(models, touches, strict=True)
+        ]
+        changed = {name for name in _CHANGES for model in models if getattr(model, name) != getattr(own, name)}
+        change = thing = None
+        if changed & {*_IN_BODY, "inclusions"}:
+            ends, change = self._changed([self._assembled(end) for end in ends], step)
+        if own.object_compliance is not None and changed & {"design", "object", "object_compliance"}:
+            softer, stiffer = (self._assembled_object(end) for end in ends)
+            thing = BodyChange.between(self._object.condensed, softer, stiffer, step)
+        if own.object_compliance is not None and (change or thing):
+            ends = self._beside_object(ends, step, change, thing)
+        of_readings = changed <= _READINGS and own.inclusions is None and own.relaxation is None
+        return Variation(ends[0], ends[1], step, change, thing, of_readings)
 
+    @cached_property
+    def _pattern(self) -> Pattern:
+        return Pattern.of(self.problem.mesh, self.problem.body.elastic.mixed)
 
-def _beside_object(problem: Problem, ends: Sequence[Problem], step: float, change: BodyChange | None) -> list[Problem]:
-    """Return problems with the compliance of an elastic object by their models, and its share by both bodies."""
-    system, face, image = problem.system, problem.surface, problem.symmetry.image_of
-    assert system.object_compliance is not None
-    assert system.object_share is not None
-    pressed = np.zeros(face.points.shape)
-    pressed[:, 0] = face.area
-    yielding, slope = system.delassus - system.object_compliance, np.zeros(len(pressed))
-    soft = np.einsum("idje,je->id", yielding, pressed)[:, 0]
-    if change is not None:
-        forces = problem.inclusions.with_spring_forces(
-            problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
-        )
-        moved = change.moved(problem, forces, problem.body.condensed.unknowns(forces))
-        slope = change.of_points(problem, forces, moved)[0][:: problem.dim, 0]
-    out = []
-    for end, t in zip(ends, (-step, step), strict=True):
-        thing, scale = _object_compliance(problem, end), 1.0 + t * slope / soft
-        share, points = object_share(end.surface, yielding * scale[:, None, None, None], thing), end.system.points
-        compliance = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
-        points = replace(points, compliance=compliance)
-        out.append(replace(end, system=replace(end.system, object_compliance=thing, object_share=share, points=points)))
-    return out
+    @cached_property
+    def _object(self) -> _ElasticObject:
+        problem, own = self.problem, self.problem.model.object_compliance
+        assert own is not None
+        mesh, whole = object_mesh(problem, own, problem.model.first_contact.contact_box, QUIET)
+        pattern = Pattern.of(mesh, law_of_object(problem.model, own).mixed)
+        return _ElasticObject(mesh, whole, condensed_object(problem, own, mesh, whole), pattern)
 
+    @cached_property
+    def _object_unknowns(self) -> Float:
+        """All unknowns (N, r) of an elastic object under forces of 1 N on each of its rows."""
+        condensed = self._object.condensed
+        return condensed.unknowns(np.eye(len(condensed.compliance)))
 
-def _object_compliance(problem: Problem, end: Problem) -> Float:
-    """Return the compliance (c, d, c, d) of an elastic object, whose mesh moves with the dimensions of both bodies."""
-    own, thing, model = problem.model.object_compliance, end.model.object_compliance, problem.model
-    assert own is not None
-    assert thing is not None
-    assert problem.system.object_compliance is not None
-    is_moved = (end.model.design, end.model.object) != (model.design, model.object)
-    if not is_moved and thing == own:
-        return problem.system.object_compliance
-    if not is_moved and replace(thing, E_MPa=own.E_MPa) == own:
-        return own.E_MPa / thing.E_MPa * problem.system.object_compliance
-    zone = model.first_contact.contact_box
-    mesh, whole = object_mesh(problem, own, zone, QUIET)
-    moved = stretched_object(mesh, model, end.model) or _moved(mesh, object_mesh(end, thing, zone, QUIET)[0])
-    return response_of(end, thing, moved, whole).compliance
+    def _changed(self, both: Sequence[_Assembled], step: float) -> tuple[list[Problem], BodyChange]:
+        """Return the problems of two bodies, and what changes between these."""
+        problem, ends, (below, above) = self.problem, [one.problem for one in both], [one.bars for one in both]
+        own, condensed = problem.inclusions, problem.body.condensed
+        change = BodyChange.between(condensed, both[0].matrices, both[1].matrices, step)
+        if below is None or above is None:
+            return ends, change
+        count, size = len(own.bar_stiffness), len(condensed.compliance)
+        pulls = np.eye(size, count, count - size)
+        slope = change.moved(pulls, condensed.unknowns(pulls))[-count:]
+        of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
+        low, high = below.in_mesh(of_mesh - step * slope), above.in_mesh(of_mesh + step * slope)
+        ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
+        subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
+        bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
+        return ends, replace(change, subgrid=subgrid, bars=bars)
 
+    def _beside_object(
+        self, ends: Sequence[Problem], step: float, change: BodyChange | None, thing: BodyChange | None
+    ) -> list[Problem]:
+        """Return problems with the share of an elastic object by both bodies, at finite strain with its compliance."""
+        problem, system, image = self.problem, self.problem.system, self.problem.symmetry.image_of
+        compliance, active = system.object_compliance, system.active_dofs
+        assert compliance is not None
+        assert system.object_share is not None
+        pressed = np.zeros(problem.surface.points.shape)
+        pressed[:, 0] = problem.surface.area
+        normal = [one[:, :1, :, :1] for one in (system.delassus, compliance)]
+        both, slopes = (normal[0] - normal[1], normal[1]), [np.zeros_like(pressed), np.zeros_like(pressed)]
+        if change is not None:
+            forces = problem.inclusions.with_spring_forces(
+                problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
+            )
+            moved = changes_of_rows([change], forces)[..., 0]
+            slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
+        if thing is not None:
+            slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
+        soft = [one[:, 0, :, 0] @ pressed[:, 0] for one in both]
+        growth = [
+            np.divide(by[:, 0], of, out=np.zeros(len(of)), where=of > 0.0) for by, of in zip(slopes, soft, strict=True)
+        ]
+        out = []
+        for end, t in zip(ends, (-step, step), strict=True):
+            at_end = [one * (1.0 + t * by)[:, None, None, None] for one, by in zip(both, growth, strict=True)]
+            share, points = object_share(end.surface, *at_end), end.system.points
+            of_points = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
+            points = replace(points, compliance=of_points)
+            out.append(replace(end, system=replace(end.system, object_share=share, points=points)))
+        if thing is not None and problem.model.finite_strain:
+            rate = np.zeros((pressed.size, pressed.size))
+            rate[np.ix_(active, active)] = thing.compliance(self._object_unknowns)
+            changed = [compliance + t * rate.reshape(compliance.shape) for t in (-step, step)]
+            pairs = zip(out, changed, strict=True)
+            out = [replace(end, system=replace(end.system, object_compliance=one)) for end, one in pairs]
+        return out
 
-def stretched_object(mesh: Mesh, model: Model, other: Model) -> Mesh | None:
-    """Return an unstructured mesh of the elastic object of a model with the dimensions of another; None for others."""
-    bodies = [one.object.held_body(one.design, mesh.dim == 3) for one in (model, other)]
-    if mesh.dim == 2 or bodies[0] is None or bodies[1] is None or bodies[0].mesher == "swept":
-        return None
-    own = replace(mesh, points=bodies[0].to_design(mesh.points))
-    if bodies[0].design != bodies[1].design:
-        own = stretched(own, bodies[0].design, bodies[1].design)
-    return replace(mesh, points=bodies[1].to_scene(own.points))
+    def _assembled(self, end: Problem) -> _Assembled:
+        """Return the problem of a changed model, with the compliance of another."""
+        problem, own, model, body = self.problem, self.problem.model, end.model, self.problem.body
+        mesh, thickness, elastic, matrix = body.mesh, body.thickness, body.elastic, body.stiffness
+        face, axes = problem.surface, problem.axes
+        active, points, is_other = problem.system.active_dofs, end.system.points, model.design != own.design
+        if is_other:
+            if mesh.dim == 3 and model.mesh.mesher != "swept":
+                mesh = stretched(mesh, own.design, model.design)
+            else:
+                mesh = with_points_of(mesh, mesh_part(model, own.first_contact.contact_box, axes)[0])
+            thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
+            face = restrict(self._faces(mesh, thickness), self._places)
+        if is_other or (model.material, model.parts) != (own.material, own.parts):
+            is_other = True
+            elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
+            if elastic.mixed != body.elastic.mixed:
+                raise Finger3dError(_OTHER_ELEMENTS)
+            matrix = stiffness(mesh, elastic, thickness, self._pattern)
+            points = unfold_points(model, mesh, face, axes, elastic)[1]
+            if (share := end.system.object_share) is not None:
+                points = replace(points, compliance=points.compliance / (1.0 - share[problem.symmetry.image_of]))
+        bars = bars_of(model, mesh, axes)
+        if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
+            raise Finger3dError("it changes which foils are mirror images of each other")
+        meshed = MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic))
+        if is_other or bars:
+            parts = [local_rows(face, vertical_frame(mesh.dim))[active], *rows_of_readings(model, meshed, bars)]
+        else:
+            parts = self._rows_of_readings(meshed, model)
+        rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
+        system = replace(end.system, surface=face, points=points)
+        changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
+        return _Assembled(replace(end, system=system, condensed_body=changed), (matrix.upper, rows), bars)
+
+    def _rows_of_readings(self, body: MeshedBody, model: Model) -> list[sp.csr_matrix]:
+        """Return the condensed rows with those of the readings of a model, where they are others."""
+        rows, first = self.problem.body.condensed.rows, len(self.problem.system.active_dofs)
+        parts = [rows[:first]]
+        for before, reading in zip(self.problem.model.readings, model.readings, strict=True):
+            count = len(reading.columns(body.mesh.dim))
+            parts.append(rows[first : first + count] if reading == before else reading.rows(body))
+            first += count
+        return parts
+
+    def _faces(self, mesh: Mesh, thickness: float) -> BoundarySurface:
+        """Return the points of a mesh on the faces that contact points belong to."""
+        return joined([surface(mesh, FREE_FACES[k], thickness) for k in np.unique(self.problem.surface.face)])
+
+    @cached_property
+    def _places(self) -> Int:
+        """Numbers of the contact points among those of their faces."""
+        face, free = self.problem.surface, self._faces(self.problem.mesh, self.problem.body.thickness)
+        place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(free.nodes, free.face, strict=True))}
+        return np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)])
+
+    def _assembled_object(self, end: Problem) -> _Matrices:
+        """Return the matrices of an elastic object by a model, whose mesh moves with the dimensions of both bodies."""
+        model, other = self.problem.model, end.model
+        own, thing, (mesh, whole, _, pattern) = model.object_compliance, other.object_compliance, self._object
+        assert own is not None
+        assert thing is not None
+        if law_of_object(other, thing).mixed != law_of_object(model, own).mixed:
+            raise Finger3dError(_OTHER_ELEMENTS)
+        if (other.design, other.object, thing.height_mm) != (model.design, model.object, own.height_mm):
+            zone = model.first_contact.contact_box
+            mesh = stretched_object(mesh, model, other) or with_points_of(mesh, object_mesh(end, thing, zone, QUIET)[0])
+        matrix, rows = assembled_object(end, thing, mesh, whole, pattern)
+        return matrix.upper, widened(rows, matrix.upper.shape[0])
 
 
 class _Assembled(NamedTuple):
     """Problem with another body on the same cells, its matrices as in a `BodyChange`, and the bars of its foils."""
 
     problem: Problem
-    matrices: tuple[Any, Any]
+    matrices: _Matrices
     bars: EmbeddedBars | None
 
 
-def _moved(mesh: Mesh, other: Mesh) -> Mesh:
-    """Return a mesh with the points of another one; where that has other diagonals, with those of its vertices."""
-    if mesh.cells.shape != other.cells.shape or mesh.points.shape != other.points.shape:
-        raise Finger3dError("it changes the cells of the mesh")
-    if (mesh.cells == other.cells).all():
-        return other
-    moved, corners = other.points - mesh.points, mesh.cells[:, : mesh.dim + 1]
-    moved[mesh.cells[:, mesh.dim + 1 :]] = 0.5 * moved[mesh.cells[:, mesh.element.edges]].sum(axis=2)
-    if np.abs(moved[corners]).max() > _FARTHEST * np.ptp(mesh.points, axis=0).min():
-        raise Finger3dError("it numbers the points of the mesh anew")
-    return replace(mesh, points=mesh.points + moved)
+class _ElasticObject(NamedTuple):
+    """Mesh of an elastic object, whether it is whole, the condensed body, and the pattern of its stiffness."""
+
+    mesh: Mesh
+    is_whole: bool
+    condensed: Condensation
+    pattern: Pattern
 
 
-def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
-    """Return an unstructured mesh of a design with the dimensions of another one of its kind.
-
-    The footprint stretches along x and z, and every vertical line from the base to the contact face stretches as well.
-    A body of several parts moves along x and y as a structured mesh of its section does.
-
-    Raises
-    ------
-    Finger3dError
-        If the body is not that between its base and its contact face, or has parts and no section.
-    """
-    points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
-    if design.part_labels:
-        size = design.half_length_mm / _CELLS_OF_SECTION
-        zone = (-design.half_length_mm, design.half_length_mm, 0.0, 0.0)
-        flat, end = (mesh_section(one, MeshOptions(size, size), zone)[0] for one in (design, other))
-        cells, places = locate(flat, mesh.points[:, :2])
-        motion = (_moved(flat, end).points - flat.points)[flat.cells[cells]]
-        points[:, :2] = mesh.points[:, :2] + np.einsum("pk,pkd->pd", flat.element.shape(places), motion)
-    else:
-        heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
-        stands = mesh.points[:, 1] > 0.0
-        points[stands, 1] *= heights[1][stands] / heights[0][stands]
-    moved = replace(mesh, points=points)
-    growth = curved_volume(moved) / curved_volume(mesh) - 1.0
-    wanted = other.volume_mm3 / design.volume_mm3 - 1.0
-    if not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
-        raise Finger3dError("it changes the cells of the mesh")
+def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
+    """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them."""
+    moved = np.zeros((*forces.shape, len(changes)))
+    changed = [(k, one) for k, one in enumerate(changes) if one]
+    unknowns = changed[0][1].condensed.unknowns(forces) if changed else forces
+    for k, one in changed:
+        moved[..., k] = one.moved(forces, unknowns)
     return moved
-
-
-def _assembled(problem: Problem, end: Problem) -> _Assembled:
-    """Return the problem of a changed model, with the compliance of another."""
-    model, body, face = end.model, problem.body, problem.surface
-    mesh, thickness = body.mesh, body.thickness
-    if model.design != problem.model.design:
-        if mesh.dim == 3 and model.mesh.mesher != "swept":
-            mesh = stretched(mesh, problem.model.design, model.design)
-        else:
-            mesh = _moved(mesh, mesh_part(model, problem.model.first_contact.contact_box, problem.axes)[0])
-        thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
-        free, own = (free_surface(problem.model, one, thickness) for one in (mesh, body.mesh))
-        place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}
-        face = restrict(free, np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)]))
-    elastic = elasticity_of(model.materials(mesh.part_labels), mesh, model.domain == "plane-stress")
-    if elastic.mixed != body.elastic.mixed:
-        raise Finger3dError("it switches between elements for compressible and nearly incompressible materials")
-    matrix = stiffness(mesh, elastic, thickness)
-    upper = matrix.upper
-    bars = bars_of(model, mesh, problem.axes)
-    if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
-        raise Finger3dError("it changes which foils are mirror images of each other")
-    meshed = MeshedBody(mesh, problem.axes, matrix, thickness, moduli_of(elastic))
-    contact = local_rows(face, vertical_frame(mesh.dim))[problem.system.active_dofs]
-    parts = (contact, *rows_of_readings(model, meshed, bars))
-    rows = sp.vstack([widened(part, upper.shape[0]) for part in parts], format="csr")
-    points = unfold_points(model, mesh, face, problem.axes, elastic)[1]
-    if (share := end.system.object_share) is not None:
-        points = replace(points, compliance=points.compliance / (1.0 - share[problem.symmetry.image_of]))
-    system = replace(end.system, surface=face, points=points)
-    changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-    matrices = (upper + sp.triu(upper, 1).T).tocsr(), rows
-    return _Assembled(replace(end, system=system, condensed_body=changed), matrices, bars)

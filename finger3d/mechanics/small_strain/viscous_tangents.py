@@ -23,10 +23,10 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, Linear, Part, slopes
-from finger3d.mechanics.small_strain.linearised import LinearisedIncrement
+from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents
+from finger3d.mechanics.small_strain.linearised import Linear, LinearisedIncrement, Part, slopes
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
-from finger3d.mechanics.small_strain.variations import Side, Variation
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody
 from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
 from finger3d.objects import Move
@@ -89,7 +89,8 @@ class ViscousTangents(IncrementTangents):
         if isinstance(body, ConstantBulkModulus):
             now = then = self._with_constant_bulk(body, part, forces, sides, steps, pasts, variables)
         else:
-            both = self._changes_of_rows(np.stack([memory.elastic, forces], axis=1), len(steps) // 2)
+            changes = [*(one.body for one in self._variations), *[None] * (len(steps) // 2 - len(self._variations))]
+            both = changes_of_rows(changes, np.stack([memory.elastic, forces], axis=1))
             now, then = both[:, 0], both[:, 1] + body.read(own)
         variables += _variables_under(response, own)
         rows = body.read(variables) + now
