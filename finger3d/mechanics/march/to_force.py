@@ -162,11 +162,12 @@ class ToForceAtFiniteStrain(ToForce):
         end = None if earlier else super()._directly(depth)
         if end is not None:
             return end
-        rough, state, parts = press.workspace.rough(), press.state, list[Substep]()
+        rough, state, parts, may_go_on = press.workspace.rough(), press.state, list[Substep](), True
         if earlier:
             found, parts = press.solved(state, earlier, workspace=rough)
-            state = found.state
-        near = approached(problem, rough, state, last, (normal_force(problem, state), self._wanted))
+            state, may_go_on = found.state, found.outcome.ok
+        forces = normal_force(problem, state), self._wanted
+        near = approached(problem, rough, state, last, forces) if may_go_on else None
         press.workspace.factorizations += rough.factorizations
         if near is None:
             return None
