@@ -163,7 +163,7 @@ def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool)
 @pytest.mark.parametrize("forecast_mm", [0.5, 1.8])
 @pytest.mark.parametrize(
     ("domain", "steps", "ratio"),
-    [("plane-strain", 1, 2.5), ("plane-strain", 3, 2), ("plane-strain", 5, 2), ("solid", 3, 2), ("solid", 5, 2)],
+    [("plane-strain", 1, 2), ("plane-strain", 3, 2), ("plane-strain", 5, 2), ("solid", 3, 2), ("solid", 5, 2)],
 )
 def test_a_press_by_force_at_large_deformation_is_the_press_by_its_depths_at_twice_the_cost(
     domain: Domain, steps: int, ratio: float, forecast_mm: float, monkeypatch: pytest.MonkeyPatch
@@ -203,11 +203,11 @@ def test_an_increment_is_repeated_until_its_parts_are_those_of_its_depth() -> No
         near.append(is_similar)
         return Trial(1.0 + 0.02 * (depth - 1.0) + 1e-3 * (depth - 1.0) ** 2, solution, 1.0)
 
-    first = repeated(Trial(0.0, solution, 0.0), 0.5, False)
+    first = repeated(Trial(0.0, solution, 0.0), 0.3, False)
     near.clear()
-    assert adapted(first, 0.5, repeated).depth == pytest.approx(1.0, rel=1e-9)
-    assert near == [False, True, True]  # 1e-2, 5e-6 and 1e-10 off by the secant method, 4e-6 the last without it
-    assert adapted(first, 0.5, lambda *_: None) is first
+    assert adapted(first, 0.3, repeated).depth == pytest.approx(1.0, rel=1e-9)
+    assert near == [False, True, True]  # 1e-2, 9e-6 and 1e-10 off by the secant method, 3e-4 the second without it
+    assert adapted(first, 0.3, lambda *_: None) is first
     near.clear()
     assert adapted(first, first.depth, repeated) is first
     assert near == []

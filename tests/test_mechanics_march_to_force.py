@@ -66,16 +66,16 @@ def test_a_later_depth_is_that_of_the_power_law() -> None:
     )
 
 
-def test_a_force_out_of_reach_of_one_increment_is_approached_in_parts() -> None:
+def test_a_force_out_of_reach_of_one_increment_is_approached_in_halves() -> None:
     problem = build(LargeDeformation().apply(small_section(legs=(Leg(1.2, steps=4),))))
     deep = list(march(problem))[-1]
     wanted, formulation = measure(problem.points, deep)["normal_force_N"], formulation_of(problem.model)
-    workspace, start = formulation.workspace(), (formulation.start(problem), None)
+    workspace, start = formulation.workspace(), formulation.start(problem)
     move = Move(ObjectPose(0.0), ObjectPose(1.2))
-    assert increment_to_force(problem, start, move, wanted, workspace) is None
-    before = workspace.factorizations
-    end = approached(problem, workspace, start, move, (0.0, wanted))
-    assert workspace.factorizations > before
+    assert increment_to_force(problem, (start, None), move, wanted, workspace) is None
+    rough = workspace.rough()
+    end = approached(problem, rough, start, move, (0.0, wanted))
+    assert rough.factorizations > 0
     assert end is not None
     assert end[0].start == move.start
     assert end[0].end.depth_mm == pytest.approx(1.2, rel=3e-3)  # 1.1e-3: it slips in other increments than the press

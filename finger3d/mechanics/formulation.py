@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol, Self, TypeVar
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -37,10 +37,6 @@ class Workspace:
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
-
-    def rough(self) -> Self:
-        """Return a workspace for solutions near which others begin, with the same factors and a count of its own."""
-        return replace(self, factorizations=0)
 
 
 class Loads(NamedTuple):

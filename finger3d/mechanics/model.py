@@ -201,6 +201,18 @@ class Model:
         return self.rule in STEP_DEPENDENT_RULES or self.friction.is_defined_by_increments
 
     @property
+    def begins_in_parts(self) -> bool:
+        """Whether an increment in which contact begins is solved in parts.
+
+        Where a body relaxes in small strain, a part has a share of the depth, not of a prescribed force, and in a solid
+        without bulk relaxation it costs a factorisation.
+        """
+        if self.relaxation is None or self.finite_strain:
+            return not self.is_defined_by_increments
+        costs = self.is_under_force or (self.domain == "solid" and self.refactorises)
+        return not (self.is_defined_by_increments or costs)
+
+    @property
     def contact_law(self) -> ContactLaw:
         """Law of the interface between finger and object."""
         return ContactLaw(self.friction)

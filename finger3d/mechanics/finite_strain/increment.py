@@ -44,6 +44,10 @@ _SNAPS = 0.02
 """Motion of the object, over the depth, up to which an increment without equilibrium nearby may end at another one, to
 which the body snaps.  Longer increments are halved instead, so that the path is followed to where it ends."""
 
+_STALLS, _FALLS = 6, 0.9
+"""Damped iterations in a row after which an increment too long to snap is given up, so that it is halved, if the
+residual has not fallen to this share of its least value."""
+
 _SNAP_RISES = 5
 """Damped iterations in a row in which the residual rises as the body leaves one equilibrium for another."""
 
@@ -117,10 +121,15 @@ class FiniteIncrement(IncrementEquations):
         now, force = self.at(self.start.body.unknowns), self.start.contact.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
         may_snap, rises, snapped = self.motion <= _SNAPS * self.length_scale, 0, False
+        least, stalls = math.inf, 0
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
             spent += solution.iterations
             next_error = math.inf if after is None else self._error(after[1], solution.state)
+            stalls = 0 if next_error < _FALLS * least else stalls + 1
+            least = min(least, next_error)
+            if stalls == _STALLS and not may_snap:
+                break
             if after is None or next_error > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue

@@ -21,7 +21,7 @@ from finger3d.objects import Move, ObjectPose
 TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to the tolerance that no longer falls."""
 
-_ROUGH = 1e-4
+_ROUGH = 1e-3
 """Residual of a solution near which others begin."""
 
 _CURVATURE_STEP = 0.1
@@ -88,7 +88,7 @@ class FiniteStrainWorkspace(Workspace):
 
     def rough(self) -> Self:
         """Return a workspace for solutions near which others begin, with the same factors and a count of its own."""
-        return replace(super().rough(), target=_ROUGH, ends=None)
+        return replace(self, factorizations=0, target=_ROUGH, ends=None)
 
 
 def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:

@@ -41,10 +41,10 @@ _STIFFENING = 5.0
 _NEARER = (0.5, 0.25, 0.125)
 """Shares of the first stride at which contact is looked for if there is none at its end."""
 
-_SIMILAR = 0.15
+_SIMILAR = 0.5
 """Relative change of the depth up to which increments are similar."""
 
-_SAME, _REPEATED, _CONTRACTION = 1e-6, 7, 0.5
+_SAME, _REPEATED, _CONTRACTION = 2e-6, 7, 0.5
 """Relative difference of the depths of an increment and of its parts at which these are not adapted any more, largest
 number of times, and change of the one with the other below which it is extrapolated."""
 

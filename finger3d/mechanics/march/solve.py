@@ -16,12 +16,18 @@ from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.formulations import formulation_of, increment_to_force
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
-from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, deepest, is_similar, target
+from finger3d.mechanics.march.force_control import deepest, target
 from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, expecting, solved_in_turn
 from finger3d.mechanics.march.path import Load, Station, stations
-from finger3d.mechanics.march.to_force import approached, expected_depth, forces_on, is_near, normal_force
+from finger3d.mechanics.march.to_force import (
+    ToForce,
+    ToForceAtFiniteStrain,
+    expected_depth,
+    forces_on,
+    normal_force,
+)
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.slip_limit import largest_force
@@ -96,10 +102,6 @@ class Press:
         self.has_failed, self._cancel, self._report = False, cancel, report
         self._is_exact = has_exact_path(model) and problem.contact_geometry is None
         self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS
-        # a part has a share of the depth, not of a prescribed force; without bulk relaxation it costs a factorisation
-        costs = any(leg.is_under_force for leg in model.legs) or (problem.dim == 3 and model.refactorises)
-        relaxes = model.relaxation is not None and not model.finite_strain
-        self._may_cut = not (model.is_defined_by_increments or (relaxes and costs))
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None
         self._path: ExactPath | None = None
@@ -186,12 +188,28 @@ class Press:
     def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
         """Return the motions in which an increment to a pose is solved: several where contact begins."""
         move = Move(self.pose, pose)
-        begins = self._may_cut and move.may_close_gaps and not self.state.contact.force.any()
-        return move.cut(*FIRST_PARTS) if begins else (move,)
+        begins = move.may_close_gaps and not self.state.contact.force.any()
+        return move.cut(*FIRST_PARTS) if begins and self.problem.model.begins_in_parts else (move,)
+
+    def solved(
+        self,
+        start: State[Any],
+        moves: Sequence[Move],
+        guess: Float | None = None,
+        near: Sequence[Substep] = (),
+        workspace: Any = None,
+    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
+        """Solve motions one after another from a state, which stays that of the press; see `solved_in_turn`.
+
+        Parameters
+        ----------
+        workspace : in place of that of the press
+        """
+        self._end_if_cancelled()
+        return solved_in_turn(self.problem, workspace or self.workspace, start, moves, self._cuts, guess, near)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
-        moves = self.moves_to(pose)
-        return Advanced(*solved_in_turn(self.problem, self.workspace, self.state, moves, self._cuts, guess), pose)
+        return Advanced(*self.solved(self.state, self.moves_to(pose), guess), pose)
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():
@@ -235,84 +253,11 @@ class Press:
         return Advanced(there.solution, [part], there.pose, there.energies)
 
     def _to_force(self, move: Move, load: Load) -> Advanced:
-        """Advance to the depth where the normal force is the prescribed one.
-
-        The depth is an unknown of the iteration, at finite strain near a rough solution, see `approached`.  Where that
-        does not converge, depths are tried, each from the end expected from those before it.  If the force is not
-        reached, the solution says why, and state and pose are those at the beginning.
-        """
-        problem, state, parts, trials = self.problem, self.state, dict[float, list[Substep]](), list[Trial]()
-        (force, *_), (wanted, *_) = (forces.tolist() for forces in self._wanted(load))
-        start_mm, start_s, is_finite = move.start.depth_mm, move.start.time_s, problem.model.finite_strain
-        deepens = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
-        begin = Trial(start_mm, ContactSolution(state, Outcome.CONVERGED, 0.0, 0, "none"), force) if deepens else None
-
-        def noted(trial: Trial, its_parts: list[Substep]) -> Trial:
-            trials.append(trial)
-            parts[trial.depth] = its_parts
-            text = f"{trial.force:.5g} N" if trial.ok else "no solution"
-            self._report.remark(f"{wanted:.5g} N wanted, {text} at a depth of {trial.depth:.4g} mm")
-            return trial
-
-        def trial_at(depth: float, good: Sequence[Trial]) -> Trial:
-            self._end_if_cancelled()
-            there = Move(move.start, replace(move.end, depth_mm=depth))
-            start, guess, near = state, self.expected_force(there.end), list[Substep]()
-            if good:
-                ends, share = search.expected_ends(depth)
-                guess = ends[0].contact.force + share * (ends[0].contact.force - ends[1].contact.force)
-                start = expecting(state, there, ends, share) if is_finite else state
-                near = parts[good[-1].depth] if is_finite and is_similar(depth, good[-1].depth) else []
-            moves = self.moves_to(there.end)
-            found, its_parts = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess, near)
-            reached = normal_force(problem, found.state) if found.outcome.ok else np.nan
-            trial = noted(Trial(depth, found, reached), its_parts)
-            end = to_force_from_last(its_parts) if is_finite and is_near(reached, wanted) else None
-            return trial if end is None else adapted(end, depth, repeated)
-
-        def repeated(trial: Trial, depth: float, near_last: bool) -> Trial | None:
-            its_parts, (*earlier, last) = parts[trial.depth], self.moves_to(replace(move.end, depth_mm=depth))
-            if not earlier:
-                return None
-            whole = len(its_parts) in (1, len(earlier) + 1)
-            moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
-            found, now = solved_in_turn(problem, self.workspace, state, moves, self._cuts, None, near)
-            now += [Substep(found.state, trial.solution.state, last)] if whole else []
-            return to_force_from_last(now) if found.outcome.ok else None
-
-        def to_force_from_last(its_parts: list[Substep]) -> Trial | None:
-            *before, last = its_parts
-            start = expecting(last.before, last.move, (last.after, last.after), 0.0)
-            return to_force(start, last.move, last.after.contact.force, before)
-
-        def to_force(start: State[Any], there: Move, guess: Float | None, before: list[Substep]) -> Trial | None:
-            found = increment_to_force(problem, (start, guess), there, wanted, self.workspace)
-            if found is None or found[0].end.depth_mm > self._deepest:
-                return None
-            there, solution = found
-            trial = Trial(there.end.depth_mm, solution, normal_force(problem, solution.state))
-            return noted(trial, [*before, Substep(start, solution.state, there)])
-
-        def directly(depth: float) -> Trial | None:
-            there = Move(move.start, replace(move.end, depth_mm=depth))
-            guess = self.expected_force(there.end)
-            if not is_finite:
-                return to_force(state, there, guess, []) if force > 0.0 else None
-            near = approached(problem, self.workspace, (state, guess), there, (force, wanted))
-            if near is None:
-                return None
-            depth, one = near[0].end.depth_mm, [Substep(state, near[1].state, near[0])]
-            begun = noted(Trial(depth, near[1], normal_force(problem, near[1].state)), one)
-            end = repeated(begun, depth, False) if self.moves_to(near[0].end)[1:] else to_force_from_last(one)
-            return end and adapted(end, depth, repeated)
-
-        search = DepthSearch(trial_at, wanted, start_mm, self._deepest, begin, target(is_finite))
-        first = expected_depth(problem, self._last_part, move, (force, wanted))
-        last = directly(first) or search.run(first)
-        solution = replace(last.solution, iterations=sum(trial.solution.iterations for trial in trials))
-        if not last.ok:
-            return Advanced(replace(solution, state=state), [], move.start)
-        return Advanced(solution, parts[last.depth], replace(move.end, depth_mm=last.depth))
+        """Advance to the depth where the normal force is the prescribed one."""
+        problem, (now, wanted) = self.problem, (float(forces[0]) for forces in self._wanted(load))
+        way = ToForceAtFiniteStrain if problem.model.finite_strain else ToForce
+        depth = expected_depth(problem, self._last_part, move, (now, wanted))
+        return way(self, move, (now, wanted), self._deepest, self._report).run(depth)
 
     def _to_forces(self, move: Move, load: Load) -> Advanced:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
@@ -328,7 +273,6 @@ class Press:
             return Advanced(ended, [], move.start)
 
         def trial_at(place: Float, near: PoseTrial | None) -> PoseTrial:
-            self._end_if_cancelled()
             coordinates = move.end.coordinates
             coordinates[free] = place
             there = Move(move.start, ObjectPose(*coordinates.tolist()))
@@ -337,8 +281,7 @@ class Press:
                 guess = near.solution.state.contact.force
                 if problem.model.finite_strain:
                     start = expecting(state, there, (near.solution.state, near.solution.state), 0.0)
-            moves = self.moves_to(there.end)
-            found, parts[place.tobytes()] = solved_in_turn(problem, self.workspace, start, moves, self._cuts, guess)
+            found, parts[place.tobytes()] = self.solved(start, self.moves_to(there.end), guess)
             reached = forces_on(problem, found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
             return PoseTrial(place, found, reached)
 

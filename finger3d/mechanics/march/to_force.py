@@ -1,25 +1,31 @@
-"""Where increments to a prescribed normal force begin their iteration: the depth expected, and a rough solution."""
+"""Increments to a prescribed normal force: with the depth as an unknown of the iteration, else by trial depths."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
+from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import increment_to_force
-from finger3d.mechanics.march.parts import Substep
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, is_similar, target
+from finger3d.mechanics.march.parts import Advanced, Substep, expecting
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.objects import Move, ObjectPose
+from finger3d.progress import Progress
 
 _CUTS = 3
 """Times that an increment which approaches a force is halved, at most."""
+
+_STRETCH = 3.0
+"""Ratio of depths from which an increment is halved at once."""
 
 _NEAR = 0.2
 """Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
@@ -31,42 +37,211 @@ _HERTZ = 2.0 / 3.0
 """Power of the force with which the depth grows under a ball (Hertz 1881)."""
 
 
+class Advancing(Protocol):
+    """A press, as an increment to a force advances it; see `finger3d.mechanics.march.solve.Press`."""
+
+    problem: Problem
+    workspace: Any
+    state: State[Any]
+
+    def expected_force(self, pose: ObjectPose) -> Float | None:
+        """Return the forces (c, d) N extrapolated to a pose, if the path continues in its last direction."""
+        ...
+
+    def moves_to(self, pose: ObjectPose) -> tuple[Move, ...]:
+        """Return the motions in which an increment to a pose is solved."""
+        ...
+
+    def solved(
+        self,
+        start: State[Any],
+        moves: Sequence[Move],
+        guess: Float | None = None,
+        near: Sequence[Substep] = (),
+        workspace: Any = None,
+    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
+        """Solve motions one after another; see `finger3d.mechanics.march.parts.solved_in_turn`."""
+        ...
+
+
+class ToForce:
+    """An increment of a press to a normal force.
+
+    The depth is an unknown of the iteration.  Where that does not converge, depths are tried, each from the forces that
+    are expected from those before it.
+
+    Parameters
+    ----------
+    press : whose next increment it is
+    move : to the depth of the leg's forecast
+    forces : before and at the end, N
+    deepest : largest depth, mm
+    report : Progress
+        Receives remarks on the depth and the force of every trial.
+    """
+
+    tolerance: ClassVar[float] = target(finite_strain=False)
+
+    def __init__(
+        self, press: Advancing, move: Move, forces: tuple[float, float], deepest: float, report: Progress
+    ) -> None:
+        (self._force, self._wanted), self._press, self._move = forces, press, move
+        self._deepest, self._report = deepest, report
+        self._trials, self._parts = list[Trial](), dict[float, list[Substep]]()
+        start_mm, start_s = move.start.depth_mm, move.start.time_s
+        deepens = replace(move.end, depth_mm=start_mm, time_s=start_s) == move.start
+        rest = ContactSolution(press.state, Outcome.CONVERGED, 0.0, 0, "none")
+        begin = Trial(start_mm, rest, self._force) if deepens else None
+        self._search = DepthSearch(self._tried, self._wanted, start_mm, deepest, begin, self.tolerance)
+
+    def run(self, depth: float) -> Advanced:
+        """Return the end of the increment, which is looked for first near an expected depth (mm).
+
+        If the force is not reached, the solution says why, and state and pose are those at the beginning.
+        """
+        last = self._directly(depth) or self._search.run(depth)
+        solution = replace(last.solution, iterations=sum(trial.solution.iterations for trial in self._trials))
+        if not last.ok:
+            return Advanced(replace(solution, state=self._press.state), [], self._move.start)
+        return Advanced(solution, self._parts[last.depth], self._pose(last.depth))
+
+    def _directly(self, depth: float) -> Trial | None:
+        """Return the end with the depth as an unknown; None where the iteration does not converge."""
+        there = Move(self._move.start, self._pose(depth))
+        guess = self._press.expected_force(there.end)
+        return self._to_force(self._press.state, there, guess, []) if self._force > 0.0 else None
+
+    def _to_force(self, start: State[Any], move: Move, guess: Float | None, before: Sequence[Substep]) -> Trial | None:
+        """Return the end of a part to the force, after other parts."""
+        found = increment_to_force(self._press.problem, (start, guess), move, self._wanted, self._press.workspace)
+        if found is None or found[0].end.depth_mm > self._deepest:
+            return None
+        move, solution = found
+        return self._noted(move.end.depth_mm, solution, [*before, Substep(start, solution.state, move)])
+
+    def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
+        """Return the increment to a depth (mm), after other trials."""
+        pose = self._pose(depth)
+        start, guess, near = self._press.state, self._press.expected_force(pose), list[Substep]()
+        if good:
+            (one, other), share = self._search.expected_ends(depth)
+            guess = one.contact.force + share * (one.contact.force - other.contact.force)
+            start, near = self._near(good[-1], depth, (one, other), share)
+        return self._noted(depth, *self._press.solved(start, self._press.moves_to(pose), guess, near))
+
+    def _near(
+        self, last: Trial, depth: float, ends: tuple[State[Any], State[Any]], share: float
+    ) -> tuple[State[Any], list[Substep]]:
+        """Return the state and the parts near which a trial begins its iteration, besides the expected forces."""
+        return self._press.state, []
+
+    def _pose(self, depth: float) -> ObjectPose:
+        return replace(self._move.end, depth_mm=depth)
+
+    def _noted(self, depth: float, solution: ContactSolution[State[Any]], parts: list[Substep]) -> Trial:
+        reached = normal_force(self._press.problem, solution.state) if solution.outcome.ok else math.nan
+        self._trials.append(Trial(depth, solution, reached))
+        self._parts[depth] = parts
+        text = f"{reached:.5g} N" if solution.outcome.ok else "no solution"
+        self._report.remark(f"{self._wanted:.5g} N wanted, {text} at a depth of {depth:.4g} mm")
+        return self._trials[-1]
+
+
+class ToForceAtFiniteStrain(ToForce):
+    """An increment to a normal force at finite strain, where every iteration from afar costs a factorisation.
+
+    The force is approached roughly; parts and end of the increment begin their iterations near that solution, until the
+    parts are at their shares of the depth.  Trials begin at the end that is expected from those before them.
+    """
+
+    tolerance: ClassVar[float] = target(finite_strain=True)
+
+    def _directly(self, depth: float) -> Trial | None:
+        press, problem = self._press, self._press.problem
+        *earlier, last = press.moves_to(self._pose(depth))
+        end = None if earlier else super()._directly(depth)
+        if end is not None:
+            return end
+        rough, state, parts, may_go_on = press.workspace.rough(), press.state, list[Substep](), True
+        if earlier:
+            found, parts = press.solved(state, earlier, workspace=rough)
+            state, may_go_on = found.state, found.outcome.ok
+        forces = normal_force(problem, state), self._wanted
+        near = approached(problem, rough, state, last, forces) if may_go_on else None
+        press.workspace.factorizations += rough.factorizations
+        if near is None:
+            return None
+        pose, solution = near[0].end, near[1]
+        trial = self._noted(pose.depth_mm, solution, [*parts, Substep(state, solution.state, Move(last.start, pose))])
+        end = adapted(trial, depth, self._repeated) if earlier else self._from_last(self._parts[trial.depth])
+        return end if end is not trial else None
+
+    def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
+        trial = super()._tried(depth, good)
+        end = self._from_last(self._parts[depth]) if is_near(trial.force, self._wanted) else None
+        return trial if end is None else adapted(end, depth, self._repeated)
+
+    def _near(
+        self, last: Trial, depth: float, ends: tuple[State[Any], State[Any]], share: float
+    ) -> tuple[State[Any], list[Substep]]:
+        start = expecting(self._press.state, Move(self._move.start, self._pose(depth)), ends, share)
+        return start, self._parts[last.depth] if is_similar(depth, last.depth) else []
+
+    def _repeated(self, trial: Trial, depth: float, near_last: bool) -> Trial | None:
+        """Return the end of an increment whose parts are at shares of a depth (mm), from a trial with the force."""
+        press, its_parts = self._press, self._parts[trial.depth]
+        *earlier, last = press.moves_to(self._pose(depth))
+        if not earlier:
+            return None
+        whole = len(its_parts) == len(earlier) + 1
+        moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
+        found, parts = press.solved(press.state, moves, near=near)
+        parts += [Substep(found.state, trial.solution.state, last)] if whole else []
+        return self._from_last(parts) if found.outcome.ok else None
+
+    def _from_last(self, parts: Sequence[Substep]) -> Trial | None:
+        """Return the end of an increment whose last part goes to the force, near the end of a similar part."""
+        *before, last = parts
+        start = expecting(last.before, last.move, (last.after, last.after), 0.0)
+        return self._to_force(start, last.move, last.after.contact.force, before)
+
+
 def approached(
     problem: Problem,
-    workspace: Workspace,
-    start: tuple[State[Any], Float | None],
+    workspace: Any,
+    state: State[Any],
     move: Move,
     forces: tuple[float, float],
     cuts: int = _CUTS,
 ) -> tuple[Move, ContactSolution[State[Any]]] | None:
-    """Approach a normal force at finite strain, to find where increments to that force may begin their iteration.
+    """Approach a normal force at finite strain in halves, which are halved again where they do not converge.
 
-    Where the iteration does not converge, the increment is halved in the square root of the force, in proportion to
-    which the depth grows under a cylinder, more or less.
+    They are halves of the square root of the force, in proportion to which the depth grows under a cylinder, more or
+    less.
 
     Parameters
     ----------
-    start : state before, and (c, d) contact forces where the iteration begins, N
     move : to the depth that is expected
     forces : before and at the end, N
+    cuts : times that it is halved, at most
 
     Returns
     -------
     The whole motion, and a rough solution; None if there is none.
     """
-    rough = workspace.rough()
-    end = increment_to_force(problem, start, move, forces[1], rough)
-    workspace.factorizations += rough.factorizations
-    if end is not None or cuts == 0:
-        return end
-    middle = (0.5 * sum(math.sqrt(max(force, 0.0)) for force in forces)) ** 2
-    half = approached(problem, workspace, start, move.cut(0.5)[0], (forces[0], middle), cuts - 1)
-    if half is None:
+    if cuts == 0:
         return None
-    there, solution = half
-    rest = Move(there.end, replace(move.end, depth_mm=there.at(2.0).depth_mm))
-    end = approached(problem, workspace, (solution.state, None), rest, (middle, forces[1]), cuts - 1)
-    return end and (Move(move.start, end[0].end), end[1])
+    middle = (0.5 * sum(math.sqrt(max(force, 0.0)) for force in forces)) ** 2
+    there = move.cut(0.5)[0]
+    for before, after in ((forces[0], middle), (middle, forces[1])):
+        end = increment_to_force(problem, (state, None), there, after, workspace)
+        end = end or approached(problem, workspace, state, there, (before, after), cuts - 1)
+        if end is None:
+            return None
+        there, solution = end
+        state = solution.state
+        there = Move(there.end, replace(move.end, depth_mm=2.0 * there.end.depth_mm - move.start.depth_mm))
+    return Move(move.start, there.start), solution
 
 
 def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: tuple[float, float]) -> float:
