@@ -159,7 +159,7 @@ def tets_of_ftetwild(cells: float) -> float:
 def tet_unknowns(cells: float, mixed: bool) -> float:
     """Return the unknowns of a mesh of quadratic tets; a mixed one has pressures at its vertices."""
     nodes, vertices = (a * cells + b * cells ** (2.0 / 3.0) for a, b in (_NODES_PER_TET, _VERTICES_PER_TET))
-    return 3.0 * nodes + vertices * mixed
+    return float(3.0 * nodes + vertices * mixed)
 
 
 def factor_mb(dofs: float, dim: int) -> float:
