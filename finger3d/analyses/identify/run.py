@@ -31,6 +31,7 @@ from finger3d.analyses.identify.simulated import (
     Simulation,
     check_rows,
     fitted_scene,
+    has_zones,
     largest,
     names_of,
     row_mistake,
@@ -174,7 +175,7 @@ def identify(
         claimed(out, "identify") as folder,
         opened(folder / "presses.jsonl", folder / "task.json", task, row_mistake(keys)) as journal,
     ):
-        simulation = Simulation(given, path, keys, journal)
+        simulation = Simulation(given, path, keys, journal, has_zones(data.columns))
         found = _fitted(simulation, data, start, report)
         _write(folder, found)
         return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -88,12 +88,14 @@ class Simulation:
     given : the scene as written, overrides included
     free : keys and bounds
     journal : the solutions that are known
+    with_zones : whether curves have lengths and areas of zones, which take most of the time of their numbers
     """
 
     given: TreeView
     path: Path | None
     free: tuple[FreeKey, ...]
     journal: Journal
+    with_zones: bool = True
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
     _bodies: dict[str, PressedBody] = field(default_factory=dict)
     _presses: dict[tuple[float, ...], tuple[Problem, list[StepResult]]] = field(default_factory=dict)
@@ -158,8 +160,7 @@ class Simulation:
         at = curve[measured.index]
         if (np.diff(at) <= 0.0).any():
             raise Finger3dError(_not_rising(measured))
-        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
-        offset = float(offset) if measured.index == "depth_mm" else 0.0
+        offset = self._offset(values, measured)
         if text := _beyond(measured, offset, float(at[-1])):
             raise Finger3dError(text)
         return dict(_scaled(_at_rows(curve, measured, offset), factor))
@@ -173,13 +174,11 @@ class Simulation:
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
         if point not in self._slopes:
             keys = [f.numbered(self.given) for f in costly]
-            self._slopes[point] = self._derivatives(point, keys, any(n.startswith(_ZONES) for n in measured.columns))
+            self._slopes[point] = self._derivatives(point, keys)
         known = self._slopes[point]
         if known is None:
             return None
-        by_key = dict(zip((f.key for f in costly), known, strict=True))
-        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
-        offset = float(offset) if measured.index == "depth_mm" else 0.0
+        by_key, offset = dict(zip((f.key for f in costly), known, strict=True)), self._offset(values, measured)
         out = {name: np.zeros((len(measured.at), len(self.free))) for name in measured.columns}
         for k, free in enumerate(self.free):
             h = _STEP * max(abs(float(values[k])), _LEAST)
@@ -196,6 +195,11 @@ class Simulation:
                 column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
         return out
 
+    def _offset(self, values: Sequence[float] | Float, measured: MeasuredPress) -> float:
+        """Return what is added to the measured depths, mm."""
+        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
+        return float(offset) if measured.index == "depth_mm" else 0.0
+
     def errors(self, values: Float, measured: MeasuredPress) -> dict[str, Float]:
         """Return independent errors (m, n) of every measured column whose error at the end of the press is known.
 
@@ -203,8 +207,10 @@ class Simulation:
         as an error of order `ORDER` does.  Two are those of all rows at once, with and without this growth, and one is
         of each row, since errors change as points close one by one.
         """
-        curve, (point, factor) = self.curve(values), self._point(values)
+        point, factor = self._point(values)
         problem, steps = self._pressed(point)
+        self._known[point] = _curve_of(problem, steps)
+        curve = self.curve(values)
         bars = estimate(problem, steps, numbers=press_numbers).totals()
         found = self.at(values, replace(measured, columns=dict.fromkeys((_LOAD, _SIZE), measured.at)))
         ratio = np.divide(curve[_SIZE][-1], found[_SIZE], out=np.ones_like(measured.at), where=found[_SIZE] > 0.0)
@@ -234,7 +240,7 @@ class Simulation:
                 return with_material(problem, model)
         return None
 
-    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str], with_zones: bool) -> list[Curve] | None:
+    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
         """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
         if not keys:
             return []
@@ -247,7 +253,7 @@ class Simulation:
             body = VariedBody(problem)
             variations = [varied(scene, body, key) for key in keys]
             rows = [
-                derivatives(step, variations, sides, with_zones=with_zones)
+                derivatives(step, variations, sides, with_zones=self.with_zones)
                 for step, _, sides in tangents(problem, variations, steps)
             ]
         except Finger3dError:  # forces that jump have no derivatives; differences of presses have
@@ -265,11 +271,8 @@ class Simulation:
         if bad is not None:
             outcome = f"at depth {bad.target.depth_mm:.4g} mm: {bad.outcome}"
             return {"values": list(point), "outcome": outcome, "curve": {}}
-        rows = []
-        for number, frame in enumerate(frames, start=1):
-            rows.append({"step": float(number)} | table_row(problem.points, frame))
-        columns = {n: [0.0, *(r[n] for r in rows)] for n in rows[0] if isinstance(rows[0][n], int | float)}
-        return {"values": list(point), "outcome": "converged", "curve": columns}
+        columns = _curve_of(problem, frames, self.with_zones)
+        return {"values": list(point), "outcome": "converged", "curve": {n: v.tolist() for n, v in columns.items()}}
 
     def _keep(self, row: Mapping[str, Any]) -> None:
         """Keep the solution of a row of the journal."""
@@ -291,6 +294,17 @@ def _kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value
             store.pop(next(iter(store)))
         store[key] = found
     return store[key]
+
+
+def has_zones(columns: Iterable[str]) -> bool:
+    """Return whether lengths or areas of zones are among columns of history.csv."""
+    return any(name.startswith(_ZONES) for name in columns)
+
+
+def _curve_of(problem: Problem, steps: Sequence[StepResult], with_zones: bool = True) -> Curve:
+    """Return the curve of a press from its increments."""
+    rows = [{"step": float(k)} | table_row(problem.points, step, with_zones) for k, step in enumerate(steps, start=1)]
+    return {n: np.array([0.0, *(r[n] for r in rows)]) for n in rows[0] if isinstance(rows[0][n], int | float)}
 
 
 def _scaled(curve: Curve, factor: float) -> Curve:
