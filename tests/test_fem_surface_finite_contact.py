@@ -98,3 +98,17 @@ def test_at_rest_rows_are_the_weighted_means() -> None:
     at = contact(mesh, face, u)
     assert at.area.ratio == pytest.approx(1.0, rel=1e-14)
     assert np.abs(np.asarray(at.rows[:, ::3].sum(axis=1))[0::3] - at.bases[:, 0, :1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_point_on_a_symmetry_plane_between_two_walls_has_the_normal_of_an_upright_object(d: int) -> None:
+    mesh, face, u = made(d)
+    away = -np.sign(face.samples[:, :1]) * np.eye(d)[0]  # walls at x = -2 and 2
+    at = deformed_contact(
+        face, points=mesh.points, displacement=u, gap=2.0 + (face.samples * away).sum(axis=1), normal=away, axes=("x",)
+    )
+    on_plane = face.points[:, 0] == 0.0
+    assert on_plane.any()
+    assert at.bases[on_plane, 0] == pytest.approx(np.tile(-np.eye(d)[1], (on_plane.sum(), 1)))
+    assert np.abs(at.bases[~on_plane, 0]) == pytest.approx(np.tile(np.eye(d)[0], ((~on_plane).sum(), 1)))
+    assert np.isfinite(at.rows.data).all()

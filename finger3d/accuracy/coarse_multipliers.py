@@ -21,9 +21,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.mesh.simplex import in_symmetry_planes
 from finger3d.fem.surface.traces import BoundarySurface
-from finger3d.fem.tensors import bases_of
+from finger3d.fem.tensors import bases_of, unit_normals
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
@@ -95,9 +95,7 @@ def _geometry(
     """Return the mean contact geometry (c') of the coarse multipliers in a state, and their displacement."""
     contact, moved = state.contact, state.body
     normal = np.asarray(mean @ contact.own_bases[:, 0])
-    for k in axis_numbers(problem.axes):
-        normal[problem.surface.points[kept, k] == 0.0, k] = 0.0
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal = unit_normals(in_symmetry_planes(normal, problem.surface.points[kept], problem.axes))
     gap = np.asarray(mean @ contact.gap)
     return ContactGeometry(gap, np.ones_like(gap), np.zeros_like(normal), bases_of(normal)), np.asarray(mean @ moved)
 

@@ -39,6 +39,15 @@ _ROUND_OFF = 1e-13
 """Round-off of directions."""
 
 
+def unit_normals(normal: Float) -> Float:
+    """Return unit vectors (c, d) along mean normals (c, d) of an object, -y where these are zero.
+
+    A mean is zero where normals cancel: half-way between two walls, or deep inside an object on its symmetry plane.
+    """
+    size = np.linalg.norm(normal, axis=1)[:, None]
+    return np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), -np.eye(normal.shape[1])[1])
+
+
 def bases_of(normal: Float) -> Float:
     """Return orthonormal bases (c, d, d) with unit normals (c, d), turned from that of an upright object the short way.
 

@@ -207,6 +207,14 @@ def axis_numbers(axes: Iterable[str]) -> tuple[int, ...]:
     return tuple("xyz".index(axis) for axis in axes)
 
 
+def in_symmetry_planes(vectors: Float, points: Float, axes: Iterable[str]) -> Float:
+    """Return vectors (c, d) at points (c, d), without the component across a symmetry plane that they lie on."""
+    out = vectors.copy()
+    for k in axis_numbers(axes):
+        out[points[:, k] == 0.0, k] = 0.0
+    return out
+
+
 def reflect_into_part(point: Float, direction: Float, axes: tuple[str, ...], dim: int) -> tuple[Float, Float]:
     """Return a place and a direction (3,) in the meshed part (d,), reflected if they lie in a mirror image."""
     sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.mesh.simplex import in_symmetry_planes
 from finger3d.fem.surface.traces import BoundarySurface, outward_normals
-from finger3d.fem.tensors import bases_of, block_diagonal
+from finger3d.fem.tensors import bases_of, block_diagonal, unit_normals
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,5 @@ def deformed_contact(
         body_normal *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(body_normal, axis=1))[:, None]
         mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * body_normal
     mean_gap = (face.average @ (gap * area.ratio)) / total
-    for k in axis_numbers(axes):
-        mean_normal[face.points[:, k] == 0.0, k] = 0.0
-    bases = bases_of(mean_normal / np.linalg.norm(mean_normal, axis=1)[:, None])
+    bases = bases_of(unit_normals(in_symmetry_planes(mean_normal, face.points, axes)))
     return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None)

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, freeze_arrays
-from finger3d.fem.mesh.simplex import CONTACT, axis_numbers
+from finger3d.fem.mesh.simplex import CONTACT, in_symmetry_planes
 from finger3d.fem.surface.traces import BoundarySurface
-from finger3d.fem.tensors import bases_of
+from finger3d.fem.tensors import bases_of, unit_normals
 from finger3d.objects import vertical_frame
 
 Distance = Callable[[Float], tuple[Float, Float]]
@@ -119,27 +119,17 @@ def contact_geometry(
         Share of an elastic object in the compliance of each point; none is rigid.  Its surface turns towards that of
         the finger by this share: two mirror images meet in a plane.
     """
-    d = surface.points.shape[1]
     moved = surface.samples
     if displacement is not None:
         interpolated = surface.interpolated(displacement)
         moved = moved + interpolated
     value, gradient = distance(moved)
-    mean = _in_planes(np.asarray(surface.average @ gradient), surface, axes)
+    mean = in_symmetry_planes(np.asarray(surface.average @ gradient), surface.points, axes)
     length = np.linalg.norm(mean, axis=1)
     if object_share is not None:
-        normals = _in_planes(surface.normals, surface, axes)
+        normals = in_symmetry_planes(surface.normals, surface.points, axes)
         normals *= (object_share * length / np.linalg.norm(normals, axis=1))[:, None]
         mean = (1.0 - object_share[:, None]) * mean - normals
-    size = np.linalg.norm(mean, axis=1)
-    normal = np.where((size > 0.0)[:, None], mean / np.where(size > 0.0, size, 1.0)[:, None], vertical_frame(d)[0])
+    normal = unit_normals(mean)
     offset = np.zeros_like(normal) if displacement is None else displacement - surface.average @ interpolated
     return ContactGeometry(np.asarray(surface.average @ value), length, offset, bases_of(normal))
-
-
-def _in_planes(vectors: Float, surface: BoundarySurface, axes: tuple[str, ...]) -> Float:
-    """Return vectors (c, d) at a surface's points, without the component across a symmetry plane that they lie on."""
-    out = vectors.copy()
-    for k in axis_numbers(axes):
-        out[surface.points[:, k] == 0.0, k] = 0.0
-    return out
