@@ -21,7 +21,7 @@ from finger3d.objects import (
     Wave,
     Wedge,
 )
-from finger3d.objects.first_contact import ContactPath, first_contact_height, initial_contact
+from finger3d.objects.first_contact import ContactPath, first_touch, initial_contact
 from tests.bodies import ball, box, channel
 from tests.designs import FIG9
 
@@ -59,7 +59,7 @@ def test_a_ball_off_the_axis_touches_on_the_line_between_the_centres(x: float) -
 def test_an_edge_between_the_points_of_the_grid_is_found() -> None:
     wedge = Wedge(angle=1.0, x_mm=0.123)
     expected = float(dome(np.array(0.123), np.array(0.0)))
-    assert first_contact_height(dome, wedge, 10.0, 8.0) == pytest.approx(expected, abs=1e-6)
+    assert first_touch(ContactPath(dome, wedge, 10.0, 8.0)).height_mm == pytest.approx(expected, abs=1e-6)
 
 
 def test_the_contact_box_follows_a_slide() -> None:
@@ -105,7 +105,7 @@ def near(obj: RigidObject, path: Sequence[Sequence[float]] = PRESS, walls_touch:
      Wedge(12.3, angle=0.4), Wave(1.7, wavelength_mm=4.0, amplitude_mm=0.5), Sphere(-17.77, 3.33, radius_mm=0.01)],
 )  # fmt: skip
 def test_first_touch_is_the_largest_overlap_of_the_real_surfaces(obj: RigidObject) -> None:
-    touch = first_contact_height(FIG9.top, obj, 50.0, 10.0)
+    touch = first_touch(ContactPath(FIG9.top, obj, 50.0, 10.0)).height_mm
     x, z = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 200_000)) * [[50.0], [10.0]]
     tried = np.nan_to_num(FIG9.top(x, z) - PlacedObject.of(obj, 0.0).height(x, z), nan=-np.inf).max()
     assert tried <= touch + 1e-9
@@ -124,14 +124,14 @@ def test_first_touch_by_search_not_by_bounding_box() -> None:
     # The object's corner beside a flat top: a vertex against a face.
     block = designs()["block"](4.0, 3.0, 4.0)
     spike = MeshObject(0.123, 0.321, surface=box(1.0, 1.0, 1.0))
-    assert first_contact_height(block.top, spike, 4.0, 2.0) == 3.0
+    assert first_touch(ContactPath(block.top, spike, 4.0, 2.0)).height_mm == 3.0
 
 
 def test_several_bumps_as_high_are_all_tried() -> None:
     def top(x: np.ndarray, z: np.ndarray) -> np.ndarray:
         return 5.0 - 0.5 * (x - 7.003) ** 2 * (x + 7.003) ** 2 / 50.0 - 1e-3 * z**2 + 1e-7 * x
 
-    assert first_contact_height(top, Plane(), 10.0, 2.0) == pytest.approx(5.0 + 7.003e-7, abs=1e-10)
+    assert first_touch(ContactPath(top, Plane(), 10.0, 2.0)).height_mm == pytest.approx(5.0 + 7.003e-7, abs=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_contact_height
+from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_touch
 
 from ._common import convergence, rate
 from ._rows import Result, Row
@@ -104,7 +104,7 @@ def run(quick: bool) -> Result:
         ("bar", bar, Cylinder(0.7, radius_mm=RADIUS)),
     ):
         true = pressed(exact, size)
-        touch = first_contact_height(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)
+        touch = first_touch(ContactPath(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)).height_mm
         x, z = 0.7 + np.linspace(-3.0, 3.0, 101), 0.4 + np.linspace(-2.0, 2.0, 101)
         errors: dict[str, list[float]] = {"height": [], "first touch": [], "force": []}
         for sectors in levels:
@@ -119,7 +119,9 @@ def run(quick: bool) -> Result:
                     )
                 )
             )
-            errors["first touch"].append(abs(first_contact_height(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0) - touch))
+            errors["first touch"].append(
+                abs(first_touch(ContactPath(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0)).height_mm - touch)
+            )
             errors["force"].append(abs(got["normal_force_N"] / true["normal_force_N"] - 1.0))
             table.append((name, sectors, len(obj.surface.faces), *(e[-1] for e in errors.values())))
         edges = [2.0 * np.pi * RADIUS / n for n in levels]

@@ -25,7 +25,7 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.objects import MeshObject, PlacedObject, first_contact_height
+from finger3d.objects import ContactPath, MeshObject, PlacedObject, first_touch
 
 from ._common import Body, body
 from ._rows import Result, Row
@@ -61,7 +61,7 @@ def oval(degrees: float, sectors: int) -> tuple[MeshObject, float]:
     round_ = ball(sectors)
     points = (round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8] @ q.T
     obj = MeshObject(*(q @ PLACE)[[0, 2]], surface=Triangles(points, round_.faces))
-    return obj, first_contact_height(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)
+    return obj, first_touch(ContactPath(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)).height_mm
 
 
 def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: float) -> Float:

@@ -3,14 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from finger3d.objects.first_contact import (
-    ContactPath,
-    FirstTouch,
-    InitialContact,
-    first_contact_height,
-    first_touch,
-    initial_contact,
-)
+from finger3d.objects.first_contact import ContactPath, FirstTouch, InitialContact, first_touch, initial_contact
 from finger3d.objects.placed import DistanceTracker, Move, ObjectPose, PlacedObject
 from finger3d.objects.rigid import Axis, HeldBody, RigidObject, vertical_frame
 from finger3d.objects.shapes import Cylinder, Plane, Sphere, Wave, Wedge
@@ -39,7 +32,6 @@ __all__ = [
     "Sphere",
     "Wave",
     "Wedge",
-    "first_contact_height",
     "first_touch",
     "initial_contact",
     "vertical_frame",

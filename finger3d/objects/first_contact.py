@@ -45,7 +45,7 @@ class ContactPath:
     object: RigidObject
     half_length_mm: float
     half_width_mm: float
-    poses: tuple[ObjectPose, ...]
+    poses: tuple[ObjectPose, ...] = ()
     landmarks: Float | None = None
     walls_touch: bool = True
 
@@ -129,19 +129,6 @@ def _apart(points: Float, value: Float, distance: Float) -> Float:
             if len(kept) == _PLACES:
                 break
     return np.array(kept).reshape(-1, 2) if kept else points[order[:1]]
-
-
-def first_contact_height(
-    top: Top, obj: RigidObject, half_length: float, half_width: float, marks: Float | None = None
-) -> float:
-    """Return the height (mm) of the object's lowest point at first touch; see `first_touch`.
-
-    Parameters
-    ----------
-    top : the finger's height over (x, z), nan beside it
-    marks : (k, 2) mm, corners of the finger
-    """
-    return first_touch(ContactPath(top, obj, half_length, half_width, (), marks)).height_mm
 
 
 def initial_contact(way: ContactPath, touch: FirstTouch | None = None) -> InitialContact:
