@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.friction import Coulomb
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
@@ -29,9 +30,6 @@ _STRETCH = 3.0
 
 _NEAR = 0.2
 """Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
-
-_SMALL_STRAIN = 2
-"""Increments of small strain after which the depth of a force is near enough to begin with."""
 
 _HERTZ = 2.0 / 3.0
 """Power of the force with which the depth grows under a ball (Hertz 1881)."""
@@ -263,12 +261,15 @@ def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: t
 
 
 def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float) -> float:
-    """Return a depth (mm) near that of a normal force (N) in small strain, from increments to the pose and onwards."""
+    """Return a depth (mm) near that of a normal force (N) in small strain, from increments to the pose and onwards.
+
+    The first one is frictionless, so that it is solved soon even where the pose is far too deep.
+    """
     small, depth, known = SmallStrain(), pose.depth_mm, (0.0, 0.0)
     workspace, rest = small.workspace(), small.start(problem)
-    for _ in range(_SMALL_STRAIN):
-        move = Move(problem.origin, replace(pose, depth_mm=depth))
-        found = small.increment(problem, rest, move, None, workspace)
+    for friction in (Coulomb(0.0), problem.model.friction):
+        like = replace(problem, model=replace(problem.model, friction=friction))
+        found = small.increment(like, rest, Move(problem.origin, replace(pose, depth_mm=depth)), None, workspace)
         now = depth, normal_force(problem, found.state)
         if not found.outcome.ok or now[1] <= 0.0:
             break
