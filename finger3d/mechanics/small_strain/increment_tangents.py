@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._types import Float, Int
+from finger3d._types import Float
 from finger3d.contact.friction import SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
@@ -34,7 +34,7 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, influence_of
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
 from finger3d.mechanics.small_strain.linearised import (
@@ -176,10 +176,6 @@ class IncrementTangents:
         return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
 
     @cached_property
-    def _influence(self) -> tuple[Any, Int]:
-        return influence_of(self.problem.surface, self.problem.model.object.is_flat)
-
-    @cached_property
     def _contacts(self) -> list[list[ContactState]]:
         """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
         contacts = [after.contact for step in self._results for _, after in step.parts]
@@ -290,7 +286,7 @@ class IncrementTangents:
             return Increment(problem, self._displaced(state), move, body, DistanceTracker())
 
         own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
-        of_conditions, of_geometry = own.slopes(contact, self._influence)
+        of_conditions, of_means = own.slopes(contact)
         pairs = zip(sides, moves, strict=True)
         ends = [own.beside(increment(side.problem, side.state, move)) for side, move in pairs]
         conditions = slopes([end.conditions(contact) for end in ends], steps)
@@ -309,7 +305,7 @@ class IncrementTangents:
             errors.append(error / derivative_scale(unknowns - change, largest, size))
             if are_converged(errors):
                 force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
-                changes = [array.reshape(c, -1, p) for array in (place, of_geometry @ place)]
+                changes = [array.reshape(c, -1, p) for array in (place, of_means @ place)]
                 states = [
                     end.moved(*(t * array[..., k // 2] for array in changes)).state(contact, t * force[k // 2])
                     for k, (end, t) in enumerate(zip(ends, steps, strict=True))
