@@ -188,12 +188,13 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
             problem.system,
             points=replace(points, compliance=both),
             delassus=problem.system.delassus + response.compliance,
-            object_factorizations=response.factorizations,
+            object_factorizations=response.body.condensed.factorizations if response.body else 0,
             object_compliance=response.compliance,
             object_share=share,
+            object_body=response.body,
         ),
         seconds=problem.seconds | response.seconds,
-        without_inclusions=with_object_compliance(body, response) if body else None,
+        without_inclusions=with_object_compliance(body, replace(response, body=None)) if body else None,
     )
 
 

@@ -57,6 +57,20 @@ class CondensedBody:
         freeze_arrays(self)
 
 
+@dataclass(frozen=True)
+class CondensedObject:
+    """Elastic object, condensed to the directions of contact points that move.
+
+    Attributes
+    ----------
+    is_whole : whether it is meshed whole although only a part of the finger is
+    """
+
+    mesh: Mesh
+    is_whole: bool
+    condensed: Condensation
+
+
 @dataclass(frozen=True, kw_only=True)
 class ContactSystem:
     """Body and object, seen at the candidate contact points (c points of the meshed part, m of the whole finger).
@@ -73,6 +87,7 @@ class ContactSystem:
     object_factorizations : factorisations of an elastic object
     object_compliance : (c, d, c, d) mm/N, the part of an elastic object in `delassus`; None if it is rigid
     object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
+    object_body : an elastic object, which derivatives need
     """
 
     surface: BoundarySurface
@@ -85,6 +100,7 @@ class ContactSystem:
     object_factorizations: int = 0
     object_compliance: Float | None = None
     object_share: Float | None = None
+    object_body: CondensedObject | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

@@ -24,13 +24,12 @@ from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, res
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
 from finger3d.mechanics.discretise.elastic_object import (
     assembled_object,
-    condensed_object,
     law_of_object,
     object_mesh,
 )
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object, with_points_of
-from finger3d.mechanics.discretise.problem import Problem, object_share
+from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
@@ -213,13 +212,16 @@ class VariedBody:
     def _pattern(self) -> Pattern:
         return Pattern.of(self.problem.mesh, self.problem.body.elastic.mixed)
 
+    @property
+    def _object(self) -> CondensedObject:
+        assert self.problem.system.object_body is not None
+        return self.problem.system.object_body
+
     @cached_property
-    def _object(self) -> _ElasticObject:
-        problem, own = self.problem, self.problem.model.object_compliance
-        assert own is not None
-        mesh, whole = object_mesh(problem, own, problem.model.first_contact.contact_box, QUIET)
-        pattern = Pattern.of(mesh, law_of_object(problem.model, own).mixed)
-        return _ElasticObject(mesh, whole, condensed_object(problem, own, mesh, whole), pattern)
+    def _pattern_of_object(self) -> Pattern:
+        model = self.problem.model
+        assert model.object_compliance is not None
+        return Pattern.of(self._object.mesh, law_of_object(model, model.object_compliance).mixed)
 
     @cached_property
     def _object_unknowns(self) -> Float:
@@ -342,7 +344,7 @@ class VariedBody:
     def _assembled_object(self, end: Problem) -> _Matrices:
         """Return the matrices of an elastic object by a model, whose mesh moves with the dimensions of both bodies."""
         model, other = self.problem.model, end.model
-        own, thing, (mesh, whole, _, pattern) = model.object_compliance, other.object_compliance, self._object
+        own, thing, mesh = model.object_compliance, other.object_compliance, self._object.mesh
         assert own is not None
         assert thing is not None
         if law_of_object(other, thing).mixed != law_of_object(model, own).mixed:
@@ -350,7 +352,7 @@ class VariedBody:
         if (other.design, other.object, thing.height_mm) != (model.design, model.object, own.height_mm):
             zone = model.first_contact.contact_box
             mesh = stretched_object(mesh, model, other) or with_points_of(mesh, object_mesh(end, thing, zone, QUIET)[0])
-        matrix, rows = assembled_object(end, thing, mesh, whole, pattern)
+        matrix, rows = assembled_object(end, thing, mesh, self._object.is_whole, self._pattern_of_object)
         return matrix.upper, widened(rows, matrix.upper.shape[0])
 
 
@@ -360,15 +362,6 @@ class _Assembled(NamedTuple):
     problem: Problem
     matrices: _Matrices
     bars: EmbeddedBars | None
-
-
-class _ElasticObject(NamedTuple):
-    """Mesh of an elastic object, whether it is whole, the condensed body, and the pattern of its stiffness."""
-
-    mesh: Mesh
-    is_whole: bool
-    condensed: Condensation
-    pattern: Pattern
 
 
 def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
