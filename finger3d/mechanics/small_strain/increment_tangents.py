@@ -23,9 +23,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.contact.friction import SLIP, Status
+from finger3d.contact.friction import OPEN, SLIP, Status
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -36,22 +37,16 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.contact_slopes import ContactEnd
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
+from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import (
-    MOST,
     Linear,
     LinearisedIncrement,
     Part,
-    are_converged,
-    derivative_scale,
     slopes,
     upright,
 )
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
-
-_MEMORY = 8
-"""Iterations from which the next one is extrapolated."""
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
@@ -274,8 +269,7 @@ class IncrementTangents:
         """Return the sides after a part of an increment."""
         contact, linear, frame = part.after.contact, part.linear.active, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
-        delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
-        largest = np.abs(contact.force).max(initial=0.0)
+        delassus = part.linear.delassus.reshape(c * d, c * d)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
         at_fixed_forces = fixed.displacement.copy()
         if any(one.thing for one in self._variations):
@@ -286,38 +280,38 @@ class IncrementTangents:
             return Increment(problem, self._displaced(state), move, body, DistanceTracker())
 
         own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
-        of_conditions, of_means = own.slopes(contact)
+        of_place, of_means = own.slopes(contact)
         pairs = zip(sides, moves, strict=True)
         ends = [own.beside(increment(side.problem, side.state, move)) for side, move in pairs]
-        conditions = slopes([end.conditions(contact) for end in ends], steps)
+        changes = slopes([end.conditions(contact) for end in ends], steps)
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
-        count = linear.forces.shape[1]
-        tried, results, errors = [np.zeros((count + c * d, p))], list[Float](), list[Float]()
-        for _ in range(MOST):
-            unknowns, turned = tried[-1][:count], tried[-1][count:]
-            fixed_basis = linear.forces @ unknowns + direct
-            moved = delassus @ (fixed_basis + turned) + at_fixed_forces
-            place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame).reshape(-1, p)
-            relative, turns = np.moveaxis((conditions + of_conditions @ place).reshape(c, 2, d, p), 1, 0)
-            change = linear.correction(relative.reshape(-1, p), unknowns)
-            results.append(np.concatenate([unknowns - change, turns.reshape(-1, p)]))
-            error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
-            errors.append(error / derivative_scale(unknowns - change, largest, size))
-            if are_converged(errors):
-                force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
-                changes = [array.reshape(c, -1, p) for array in (place, of_means @ place)]
-                states = [
-                    end.moved(*(t * array[..., k // 2] for array in changes)).state(contact, t * force[k // 2])
-                    for k, (end, t) in enumerate(zip(ends, steps, strict=True))
-                ]
-                reached = self._reached(part, fixed, states, sides, steps, moves)
-                return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
-            columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]
-            tried.append(np.column_stack([extrapolated(*both) for both in columns]))
-        raise Finger3dError(
-            f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
-            "abruptly where it touches"
-        )
+        # all by displacements in the directions of an upright object, and by forces on the points that touch
+        of_moved = of_place @ sp.kron(sp.eye_array(c), frame.T)
+        relative = (2 * d * np.arange(c)[:, None] + np.arange(d)).ravel()
+        touches = np.flatnonzero(np.repeat(contact.status != OPEN, d))
+        turned, through = (relative + d)[touches], delassus[:, touches]
+        of_unknowns = linear.forces[touches].toarray()
+        force = direct[touches] + changes[turned] + of_moved[turned] @ at_fixed_forces
+        if not self.problem.model.object.is_flat:  # forces turn with the directions of their points
+            matrix = np.eye(len(touches)) - of_moved[turned] @ through
+            both = np.linalg.solve(matrix, np.hstack([of_unknowns, force]))
+            of_unknowns, force = np.hsplit(both, [of_unknowns.shape[1]])
+        weights = linear.weights @ of_moved[relative]
+        response = weights @ through
+        matrix = response @ of_unknowns + np.diag(linear.diagonal)
+        right = linear.weights @ changes[relative] + weights @ at_fixed_forces + response @ force
+        unknowns = -np.linalg.solve(matrix, right)
+        moved = through @ (of_unknowns @ unknowns + force) + at_fixed_forces
+        place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame)
+        means = (of_means @ place.reshape(-1, p)).reshape(c, -1, p)
+        force = (linear.forces @ unknowns + direct).reshape(c, d, p)
+        force = np.einsum("cak,ckp->cap", contact.own_bases @ frame.T, force)
+        states = [
+            end.moved(t * place[..., k // 2], t * means[..., k // 2]).state(contact, t * force[..., k // 2])
+            for k, (end, t) in enumerate(zip(ends, steps, strict=True))
+        ]
+        reached = self._reached(part, fixed, states, sides, steps, moves)
+        return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
 
 
 def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:

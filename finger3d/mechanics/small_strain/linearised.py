@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -38,13 +39,13 @@ class LinearisedIncrement:
     forces : (c d, k) sparse, P
     weights : (k, c d) sparse, D
     diagonal : (k,), E
-    factor : LU factors of A
+    matrix : (k, k), A
     """
 
     forces: Any
     weights: Any
     diagonal: Float
-    factor: tuple[Float, Float]
+    matrix: Float
 
     @classmethod
     def of(
@@ -81,23 +82,26 @@ class LinearisedIncrement:
         )
         active = ActiveSet.of(local, after.status[points], augmented[points])
         matrix = cast("Float", assemble_in_place(local, active, np.float64))
-        factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)
         turned = turn[(points[:, None] * d + np.arange(d)).ravel()]
         diagonal = np.diagonal(active.with_turning(np.zeros((active.size, active.size))))
-        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, diagonal, factor)
+        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, diagonal, matrix)
+
+    @cached_property
+    def _factor(self) -> Any:
+        return lu_factor(self.matrix, check_finite=False)
 
     def correction(self, displacement: Float, unknowns: Float) -> Float:
         """Return A^-1 (D w + E x) (k, p), for relative displacements w (c d, p) and unknowns x (k, p)."""
         if not len(unknowns):
             return unknowns
         right = self.weights @ displacement + self.diagonal[:, None] * unknowns
-        return np.asarray(lu_solve(self.factor, right))
+        return np.asarray(lu_solve(self._factor, right))
 
     def adjoint(self, gradient: Float) -> Float:
         """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""
         if not self.weights.shape[0]:
             return np.zeros_like(gradient)
-        return np.asarray(self.weights.T @ lu_solve(self.factor, self.forces.T @ gradient, trans=1))
+        return np.asarray(self.weights.T @ lu_solve(self._factor, self.forces.T @ gradient, trans=1))
 
 
 def upright(state: ContactState, local: Float) -> Float:
