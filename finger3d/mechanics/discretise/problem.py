@@ -286,13 +286,11 @@ def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int
     return out.reshape(count, dim, count, dim)
 
 
-def object_share(surface: BoundarySurface, finger: Float, thing: Float) -> Float:
-    """Return the share (c,) of an elastic object in the normal displacement under uniform pressure.
+def under_pressure(surface: BoundarySurface, compliance: Float) -> Float:
+    """Return the normal displacement (c,) mm under a uniform pressure of 1 MPa, by a compliance (c, d, c, d) mm/N."""
+    return np.asarray(compliance[:, 0, :, 0] @ surface.area)
 
-    Parameters
-    ----------
-    finger, thing : (c, d, c, d) mm/N
-        Compliance of the two bodies at the surface's points.
-    """
-    own_compliance, other = (np.einsum("ij,j->i", w[:, 0, :, 0], surface.area) for w in (finger, thing))
-    return np.asarray(np.clip(other / (own_compliance + other), 0.0, 1.0))
+
+def object_share(finger: Float, thing: Float) -> Float:
+    """Return the share (c,) of an elastic object in the normal displacements (c,) of both under uniform pressure."""
+    return np.asarray(np.clip(thing / (finger + thing), 0.0, 1.0))

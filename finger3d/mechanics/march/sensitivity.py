@@ -22,7 +22,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.increment_tangents import AT_ONCE, IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
 from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
@@ -90,19 +90,17 @@ def _of_readings(problem: Problem, variations: Sequence[Variation], steps: Seque
     """Yield the sides (2 p,) of parameters of readings at the end of every increment; they change no contact."""
     formulation, columns, first = formulation_of(problem.model), problem.model.columns, len(problem.system.active_dofs)
     changes = [] if problem.model.finite_strain else [one.body for one in variations]
-    for start in range(0, len(steps), AT_ONCE):
-        states = [step.meshed_state for step in steps[start : start + AT_ONCE]]
-        forces = np.stack([problem.row_forces(problem.upright_force(state.contact)) for state in states], axis=1)
-        moved = changes_of_rows(changes, forces)[first:]
-        for i, (step, state) in enumerate(zip(steps[start:], states, strict=False)):
-            sides: Sides = []
-            for k, one in enumerate(variations):
-                for end, t in zip(one.ends, (-one.step, one.step), strict=True):
-                    found = formulation.readings(end, state)
-                    read = np.array([found[column] for column in columns])
-                    read = read + t * moved[: len(read), i, k] if changes else read
-                    sides.append(Side(end, state, step.target, read, step.external_work_mJ, step.dissipation_mJ))
-            yield sides
+    forces = np.stack([problem.row_forces(problem.upright_force(one.meshed_state.contact)) for one in steps], axis=1)
+    moved = changes_of_rows(changes, forces)[first:]
+    for i, step in enumerate(steps):
+        sides, state = list[Side | None](), step.meshed_state
+        for k, one in enumerate(variations):
+            for end, t in zip(one.ends, (-one.step, one.step), strict=True):
+                found = formulation.readings(end, state)
+                read = np.array([found[column] for column in columns])
+                read = read + t * moved[: len(read), i, k] if changes else read
+                sides.append(Side(end, state, step.target, read, step.external_work_mJ, step.dissipation_mJ))
+        yield sides
 
 
 def derivatives(

@@ -27,7 +27,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, Status
-from finger3d.contact.state import ContactState, pressure
+from finger3d.contact.state import pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -50,9 +50,6 @@ from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
-
-AT_ONCE = 32
-"""Increments that the body is solved for at once, which costs less than one after another."""
 
 
 @dataclass(frozen=True)
@@ -167,43 +164,39 @@ class IncrementTangents:
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
         """Return the derivatives of the body at the end of a part of an increment under its forces."""
         found = self._fixed[part.after.contact.force.tobytes()]
-        more = ((0, 0), (0, len(steps) // 2 - len(self._variations)))  # by poses, which change nothing in the body
-        return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
+        more = len(steps) // 2 - len(self._variations)  # by poses, which change nothing in the body
+        return FixedForces(*np.split(np.pad(found, ((0, 0), (0, more))), [self.problem.surface.points.size]))
 
     @cached_property
-    def _contacts(self) -> list[list[ContactState]]:
-        """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
-        contacts = [after.contact for step in self._results for _, after in step.parts]
-        return [contacts[start : start + AT_ONCE] for start in range(0, len(contacts), AT_ONCE)]
+    def _forces(self) -> list[Float]:
+        """Contact forces (c, d) at the ends of all parts of the press, in the directions of an upright object."""
+        return [self.problem.upright_force(after.contact) for step in self._results for _, after in step.parts]
+
+    def _by_contact(self, array: Float) -> dict[bytes, Float]:
+        """Return slices of an array (n, k, p) for each of `_forces`, by the contact forces."""
+        contacts = [after.contact.force.tobytes() for step in self._results for _, after in step.parts]
+        return dict(zip(contacts, np.moveaxis(array, 1, 0), strict=True))
 
     @cached_property
-    def _fixed(self) -> dict[bytes, FixedForces]:
-        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
-        problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
-        for some in self._contacts:
-            rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
-            rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
-            sizes = problem.surface.points.size, len(problem.system.reading_rows)
-            displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
-            moved = changes_of_rows([one.body for one in self._variations], rows)
-            for k, one in enumerate(self._variations):
-                if one.body:
-                    displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
-            for i, contact in enumerate(some):
-                found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
-        return found
+    def _fixed(self) -> dict[bytes, Float]:
+        """Derivatives of displacements and readings (c d + g, p) under the forces at the ends of all parts."""
+        problem, size = self.problem, self.problem.surface.points.size
+        rows = np.stack([problem.row_forces(force) for force in self._forces], axis=1)
+        rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
+        moved = changes_of_rows([one.body for one in self._variations], rows)
+        out = np.zeros((size + len(problem.system.reading_rows), *moved.shape[1:]))
+        for k, one in enumerate(self._variations):
+            if one.body:
+                out[:, :, k] = np.concatenate(one.body.of_points(problem, rows, moved[..., k]))
+        return self._by_contact(out)
 
     @cached_property
     def _of_object(self) -> dict[bytes, Float]:
         """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
-        active, found = self.problem.system.active_dofs, dict[bytes, Float]()
-        changes = [one.thing for one in self._variations]
-        for some in self._contacts:
-            forces = np.stack([self.problem.upright_force(contact).ravel() for contact in some], axis=1)
-            moved = np.zeros((*forces.shape, len(changes)))
-            moved[active] = changes_of_rows(changes, forces[active])
-            found |= {contact.force.tobytes(): moved[:, i] for i, contact in enumerate(some)}
-        return found
+        active, forces = self.problem.system.active_dofs, np.stack([one.ravel() for one in self._forces], axis=1)
+        moved = np.zeros((*forces.shape, len(self._variations)))
+        moved[active] = changes_of_rows([one.thing for one in self._variations], forces[active])
+        return self._by_contact(moved)
 
     def _reached(
         self,

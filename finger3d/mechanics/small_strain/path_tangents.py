@@ -36,7 +36,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.variations import BodyChange, Side, Variation
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
@@ -113,29 +113,22 @@ def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> lis
     compliance, active = problem.body.condensed.compliance, problem.system.active_dofs
     size = problem.surface.points.size
     forces = problem.inclusions.with_spring_forces(compliance, np.eye(len(compliance), len(active)))
-    of_finger, of_object = (_unknowns([getattr(one, name) for one in variations]) for name in ("body", "thing"))
+    of_finger = changes_of_rows([one.body for one in variations], forces)
+    of_object = changes_of_rows([one.thing for one in variations], np.eye(len(active)))
 
     def dense(rows: Float) -> Float:
         out = np.zeros((len(rows), size))
         out[:, active] = rows
         return out
 
-    def changes(one: Variation) -> tuple[Float, Float]:
+    def changes(k: int, one: Variation) -> tuple[Float, Float]:
         moved, read = np.zeros((size, len(active))), np.zeros((len(problem.system.reading_rows), len(active)))
         if one.body:
-            moved, read = one.body.of_points(problem, forces, one.body.compliance(of_finger) @ forces)
-        if one.thing:
-            moved[active] += one.thing.compliance(of_object)
+            moved, read = one.body.of_points(problem, forces, of_finger[..., k])
+        moved[active] += of_object[..., k]
         return dense(moved), dense(read)
 
-    return [changes(one) if one.changes_compliance else None for one in variations]
-
-
-def _unknowns(changes: Sequence[BodyChange | None]) -> Float:
-    """Return all unknowns (N, r) of a body under forces of 1 N on each row; none if it does not change."""
-    changed = next((one for one in changes if one), None)
-    count = len(changed.condensed.compliance) if changed else 0
-    return np.ascontiguousarray(changed.condensed.unknowns(np.eye(count))) if changed else np.zeros((0, 0))
+    return [changes(k, one) if one.changes_compliance else None for k, one in enumerate(variations)]
 
 
 class PathTangents:

@@ -29,7 +29,7 @@ from finger3d.mechanics.discretise.elastic_object import (
 )
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object, with_points_of
-from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share
+from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share, under_pressure
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
@@ -42,6 +42,12 @@ _IN_BODY = ("design", "material", "parts", *_READINGS)
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
 
+
+_MANY = 0.5
+"""Number of forces, over that of rows, from which the derivative of the whole compliance takes less time."""
+
+_AT_ONCE = 32
+"""Forces that a body is solved for at once, which costs less than one after another."""
 
 _OTHER_ELEMENTS = "it switches between elements for compressible and nearly incompressible materials"
 
@@ -256,8 +262,7 @@ class VariedBody:
         assert system.object_share is not None
         pressed = np.zeros(problem.surface.points.shape)
         pressed[:, 0] = problem.surface.area
-        normal = [one[:, :1, :, :1] for one in (system.delassus, compliance)]
-        both, slopes = (normal[0] - normal[1], normal[1]), [np.zeros_like(pressed), np.zeros_like(pressed)]
+        slopes = np.zeros((2, *pressed.shape))
         if change is not None:
             forces = problem.inclusions.with_spring_forces(
                 problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
@@ -266,14 +271,10 @@ class VariedBody:
             slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
         if thing is not None:
             slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
-        soft = [one[:, 0, :, 0] @ pressed[:, 0] for one in both]
-        growth = [
-            np.divide(by[:, 0], of, out=np.zeros(len(of)), where=of > 0.0) for by, of in zip(slopes, soft, strict=True)
-        ]
         out = []
         for end, t in zip(ends, (-step, step), strict=True):
-            at_end = [one * (1.0 + t * by)[:, None, None, None] for one, by in zip(both, growth, strict=True)]
-            share, points = object_share(end.surface, *at_end), end.system.points
+            both = [under_pressure(end.surface, one) for one in (system.delassus - compliance, compliance)]
+            share, points = object_share(*(both + t * slopes[..., 0])), end.system.points
             of_points = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
             points = replace(points, compliance=of_points)
             out.append(replace(end, system=replace(end.system, object_share=share, points=points)))
@@ -365,10 +366,22 @@ class _Assembled(NamedTuple):
 
 
 def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
-    """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them."""
-    moved = np.zeros((*forces.shape, len(changes)))
-    changed = [(k, one) for k, one in enumerate(changes) if one]
-    unknowns = changed[0][1].condensed.unknowns(forces) if changed else forces
-    for k, one in changed:
-        moved[..., k] = one.moved(forces, unknowns)
+    """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them.
+
+    For many forces the whole compliance is differentiated, which needs no solution for each of them.
+    """
+    moved, changed = np.zeros((*forces.shape, len(changes))), [(k, one) for k, one in enumerate(changes) if one]
+    if not changed:
+        return moved
+    condensed = changed[0][1].condensed
+    if forces.shape[1] > _MANY * len(forces):
+        unknowns = np.ascontiguousarray(condensed.unknowns(np.eye(len(forces))))
+        for k, one in changed:
+            moved[..., k] = one.compliance(unknowns) @ forces
+        return moved
+    for start in range(0, forces.shape[1], _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        unknowns = condensed.unknowns(forces[:, some])
+        for k, one in changed:
+            moved[:, some, k] = one.moved(forces[:, some], unknowns)
     return moved
