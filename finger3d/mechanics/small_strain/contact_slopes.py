@@ -18,6 +18,7 @@ from finger3d._types import Float
 from finger3d.contact.state import ContactState
 from finger3d.fem.tensors import block_diagonal
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_means, geometry_of_means
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import Increment
 from finger3d.mechanics.small_strain.linearised import upright
@@ -55,9 +56,8 @@ class ContactEnd:
 
     def beside(self, increment: Increment) -> ContactEnd:
         """Return the end of another increment at the same displacements; the means are taken anew if they differ."""
-        (one, other), end = (each.problem for each in (self.increment, increment)), increment.move.end
-        is_same = other.surface is one.surface and other.system.first_contact_mm == one.system.first_contact_mm
-        if is_same and other.model.object == one.model.object and end == self.increment.move.end:
+        is_same = increment.move.end == self.increment.move.end
+        if is_same and are_placed_alike(increment.problem, self.increment.problem):
             return replace(self, increment=increment)
         return ContactEnd.of(increment, self.displacement)
 
@@ -101,6 +101,12 @@ class ContactEnd:
             of_means = average.tocsr() @ (block_diagonal(by_place) @ interpolation.tocsr())
             of_conditions = of_conditions + block_diagonal(own[:, :, d:]) @ of_means
         return of_conditions, of_means
+
+
+def are_placed_alike(one: Problem, other: Problem) -> bool:
+    """Whether two problems have the same contact points, and the same object at first touch."""
+    is_same = one.surface is other.surface and one.system.first_contact_mm == other.system.first_contact_mm
+    return is_same and one.model.object == other.model.object
 
 
 def _expansion_point(increment: Increment, displacement: Float) -> Float:

@@ -35,7 +35,7 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.contact_slopes import ContactEnd
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, are_placed_alike
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import (
@@ -79,10 +79,10 @@ class IncrementTangents:
         self._steps = np.array([t for one in variations for t in (-one.step, one.step)])
         ends = [end for one in variations for end in one.ends]
         self.formulation = formulation_of(problem.model)
-        self.sides = [self._begun(end) for end in ends]
+        self._here = Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+        self.sides = [self._here._replace(problem=end, state=self._start(end)) for end in ends]
         self._variations = variations
-        self._stations = [stations(end.model.legs) for end in ends]
-        self._state, self._pose, self._number = self.formulation.start(problem), problem.origin, 0
+        self._stations, self._number = [stations(end.model.legs) for end in ends], 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
         self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
@@ -97,11 +97,11 @@ class IncrementTangents:
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
-        sides, (here, length) = self._sides(self._parts(step), step), self._end(step)
+        sides, (here, length) = self._sides(step), self._end(step)
         if way and is_kink(here, length):
 
             def solved(status: Status) -> tuple[list[Side], list[End]]:
-                found = self._sides(self._parts(step, status), step)
+                found = self._sides(step, status)
                 befores = zip(self._last, found, strict=True)
                 ends = [
                     End(before.state.contact, side.state.contact, _coefficients(before, status))
@@ -113,7 +113,8 @@ class IncrementTangents:
             self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
             sides = [own or side for own, side in zip(chosen, sides, strict=True)]
         self.sides = sides
-        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
+        self._here = self._here._replace(state=step.meshed_state, pose=step.target)
+        self._number += 1
         return [None if unknown else side for unknown, side in zip(self._is_unknown, sides, strict=True)]
 
     def is_at_kink(self, step: StepResult) -> bool:
@@ -122,36 +123,42 @@ class IncrementTangents:
 
     def _end(self, step: StepResult) -> tuple[End, float]:
         """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
-        states = [self._state, *(after for _, after in step.parts)]
-        before, contact = self._begun(self.problem)._replace(state=states[-2]), states[-1].contact
+        states = [self._here.state, *(after for _, after in step.parts)]
+        before, contact = self._here._replace(state=states[-2]), states[-1].contact
         friction = _coefficients(before, contact.status)
         return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
 
-    def _sides(self, parts: Sequence[Part], step: StepResult) -> list[Side]:
+    def _sides(self, step: StepResult, status: Status | None = None) -> list[Side]:
+        """Return the sides at the end of an increment, where the points may have other statuses (c,)."""
         targets = [own[self._number] for own in self._stations]
         poses = self._poses(targets)
-        if any(target.load for target in targets):
-            poses = self._in_equilibrium(step, parts, targets, poses)
-        return self._through(parts, self.sides, self._steps, poses)
+        try:
+            parts = self._parts(step, status)
+            if any(target.load for target in targets):
+                poses = self._in_equilibrium(step, parts, targets, poses)
+            return self._through(parts, self.sides, self._steps, poses)
+        except np.linalg.LinAlgError:
+            raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
 
-    def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
-        """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
-        whole, parts = Move(self._pose, step.target).change, list[Part]()
-        before, place, start = self._state, self._pose, 0.0
+    def _parts(self, step: StepResult, status: Status | None) -> list[Part]:
+        """Return the parts of an increment, linearised."""
+        whole, parts = Move(self._here.pose, step.target).change, list[Part]()
+        before, place, start = self._here.state, self._here.pose, 0.0
         for pose, after in step.parts:
             if status is not None and after is step.parts[-1][1]:
                 after = replace(after, contact=replace(after.contact, status=status))
-            share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
-            try:
-                linear = self._linearised(before, after, move := Move(place, pose))
-            except np.linalg.LinAlgError:
-                raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
+            way = Move(self._here.pose, pose).change
+            share = 1.0 if pose == step.target else float(way @ whole) / float(whole @ whole)
+            linear = self._linearised(before, after, move := Move(place, pose))
             parts.append(Part(before, after, linear, move, start, share))
             before, place, start = after, pose, share
         return parts
 
-    def _begun(self, problem: Problem) -> Side:
-        return Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+    def _start(self, problem: Problem) -> State[Any]:
+        """Return the state at rest, which is that of the press where its contact is the same."""
+        own = self.problem
+        is_same = are_placed_alike(problem, own) and problem.system.object_share is own.system.object_share
+        return self._here.state if is_same else self.formulation.start(problem)
 
     def _linearised(self, before: State[Any], after: State[Any], move: Move) -> Any:
         """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
@@ -230,10 +237,8 @@ class IncrementTangents:
         reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
         held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
         moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
-        here = self._begun(self.problem)._replace(state=self._state, pose=self._pose)
-        found = self._through(
-            parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
-        )
+        steps = np.array([*self._steps, *[-h, h] * len(free)])
+        found = self._through(parts, [*self.sides, *[self._here] * len(moved)], steps, [*held, *moved])
         forces = np.array([_forces(side) for side in found])
         if loads[0].begins:
             self._leg_start_N = np.array([_forces(side) for side in self.sides])
