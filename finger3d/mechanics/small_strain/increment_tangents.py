@@ -9,8 +9,7 @@ geometry of the contact, and on the parameters through the state before and the 
 (`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
 parameter less and plus its step to first order, and those by U are the same for all parameters
 (`finger3d.mechanics.small_strain.contact_slopes`).  They hold the curvature of the object, and where points touch
-within the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson
-1965).
+within the increment.  As dB is linear in dU, the forces d(B^T r) are eliminated, and one system for dx remains.
 
 Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
