@@ -22,13 +22,6 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import Move, vertical_frame
 
-_CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
-"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
-and the largest number of iterations."""
-
-_NEGLIGIBLE = 1e-7
-"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
-
 
 @dataclass(frozen=True)
 class LinearisedIncrement:
@@ -134,18 +127,3 @@ def slopes(values: Sequence[Float], steps: Float) -> Float:
     """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
     array = np.reshape(values, (len(steps), -1))
     return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))
-
-
-def derivative_scale(derivatives: Float, value: float, size: Float) -> Float:
-    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
-    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
-    return np.where(scale > 0.0, scale, 1.0)
-
-
-def are_converged(errors: Sequence[Float]) -> bool:
-    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
-
-    Unknowns and directions are corrected in turn, so that errors fall every second time.
-    """
-    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
-    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())
