@@ -24,7 +24,7 @@ from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
-from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
+from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangent, PathTangents
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
@@ -134,13 +134,12 @@ def _increment_tangents(
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
     count = len(variations)
-    rest = RestTangent.of(variations, len(problem.surface.nodes))
-    moved = np.stack([rest.gap, np.zeros_like(rest.gap)], axis=2)
+    changes = Changes.of(problem, variations)
+    moved = np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
     tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
-    changes = compliance_changes(problem, variations)
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
-        follower = follower or PathTangents(step.path, variations, changes, rest, tangent, motion, number)
+        follower = follower or PathTangents(step.path, variations, changes, tangent, motion, number)
         place = follower.at_share(station.share)
         sides: Sides = list(follower.sides(step, station.share, place, energies))
         both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None
