@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -29,13 +28,12 @@ def freeze_arrays(record: DataclassInstance) -> None:
 
     A frozen dataclass calls it in ``__post_init__``. The arrays that were passed stay writable for their owner.
     """
-    for field in fields(record):
-        value = getattr(record, field.name)
+    values = vars(record)
+    for name, value in values.items():
         if isinstance(value, np.ndarray):
-            object.__setattr__(record, field.name, _view(value))
+            values[name] = _view(value)
         elif isinstance(value, Mapping):
-            views = {key: _view(v) if isinstance(v, np.ndarray) else v for key, v in value.items()}
-            object.__setattr__(record, field.name, views)
+            values[name] = {key: _view(v) if isinstance(v, np.ndarray) else v for key, v in value.items()}
 
 
 def _view(array: np.ndarray) -> np.ndarray:

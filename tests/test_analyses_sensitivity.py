@@ -53,6 +53,15 @@ def test_moduli_times_and_durations_of_a_viscous_press_have_derivatives() -> Non
         assert found.derivatives["normal_force_N"][key] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-5)
 
 
+def test_a_silicone_has_the_derivatives_of_its_modulus() -> None:
+    named = scene(**SECTION | {"material": {"silicone": "Dragon Skin 20"}})
+    found = finger3d.sensitivity(named, ["normal_force_N"])
+    modulus = {key: found.keys[f"material.{key}"] for key in ("E_MPa", "nu")}
+    given = finger3d.sensitivity(scene(**SECTION | {"material": modulus}), ["normal_force_N"])
+    assert found.derivatives == given.derivatives
+    assert finger3d.press(named, error=False).derivatives("normal_force_N") == found.derivatives["normal_force_N"]
+
+
 def test_at_a_kink_both_derivatives_are_told() -> None:
     given = scene(**SECTION | HOLD)
     found = finger3d.sensitivity(given, ["gauge_g36"])

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, influence_of
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd
 from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
-from finger3d.objects import Cylinder, DistanceTracker, Move, ObjectPose, Plane
+from finger3d.objects import Cylinder, DistanceTracker, Move, ObjectPose
 from tests.models import block, run, small_section
 
 CURVED = {
@@ -30,22 +27,13 @@ def test_slopes_are_those_of_any_displacement(name: str) -> None:
     body = LinearBody(problem.delassus, np.zeros_like(place))
     move = Move(problem.origin, ObjectPose(0.3, slide_x_mm=0.05))
     own = ContactEnd.of(Increment(problem, SmallStrain().start(problem), move, body, DistanceTracker()), place)
-    of_conditions, of_geometry = own.slopes(contact, influence_of(problem.surface, is_flat=False))
+    of_conditions, of_means = own.slopes(contact)
     change = np.random.default_rng(1).normal(size=place.shape)
     low, high = (ContactEnd.of(own.increment, place + t * change) for t in (-1e-6, 1e-6))
     wanted = (high.conditions(contact) - low.conditions(contact)) / 2e-6
     found = (of_conditions @ change.ravel()).reshape(wanted.shape)
     assert found == pytest.approx(wanted, abs=1e-7 * np.abs(wanted).max())
-    # the same by the slopes of the geometry
+    # the same by the slopes of the means
     t = 1e-6
-    moved = own.moved(t * change, t * (of_geometry @ change.ravel()).reshape(len(change), -1))
+    moved = own.moved(t * change, t * (of_means @ change.ravel()).reshape(len(change), -1))
     assert moved.conditions(contact) == pytest.approx(high.conditions(contact), abs=1e-10)
-
-
-@pytest.mark.parametrize("model", [*CURVED.values(), replace(CURVED["solid"], object=Plane())])
-def test_points_of_a_group_influence_no_point_in_common(model: Model) -> None:
-    is_flat = model.object.is_flat
-    influences, groups = influence_of(build(model).surface, is_flat)
-    for group in range(int(groups.max()) + 1):
-        assert (influences[:, groups == group].getnnz(axis=1) <= 1).all()
-    assert (groups.max() == 0) == is_flat

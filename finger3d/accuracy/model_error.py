@@ -162,7 +162,7 @@ class CoarsePresses:
         for (*others, other), body in self._bodies.items():
             known = body.system.object_compliance
             if others == [still, finite, foils] and other and known is not None:  # its compliance is as 1/E
-                return with_object_compliance(alone, ObjectResponse(other.E_MPa / thing.E_MPa * known, 0, {}))
+                return with_object_compliance(alone, ObjectResponse(other.E_MPa / thing.E_MPa * known, None, {}))
         return with_elastic_object(alone)
 
     def changes(

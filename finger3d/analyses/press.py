@@ -131,7 +131,9 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
 
     def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:
         spent = before.all_factorizations if before else 0
-        record = PressRecord(scene, problem, started, refinement, spent)
+        # derivatives solve for an elastic object again, a press does not: its factor takes memory
+        light = replace(problem, system=replace(problem.system, object_body=None))
+        record = PressRecord(scene, light, started, refinement, spent)
         _march(record, writer, report)
         return record, record.converged_steps
 

@@ -139,8 +139,9 @@ class PressResult:
             If the press has no such number, or its numbers have no derivatives.
         """
         from finger3d.analyses.sensitivity import sensitivity  # a press needs none of it
+        from finger3d.scene.material import with_moduli_only
 
-        found = sensitivity(self._numbers["scene"], [number])
+        found = sensitivity(with_moduli_only(self._numbers["scene"]), [number])
         return {**found.derivatives[number], **(found.falling.get(number, {}) if falling else {})}
 
     def plot_contact(self) -> Picture:

@@ -24,6 +24,7 @@ from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.variations import Variation, VariedBody
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
+from finger3d.scene.material import with_moduli_only
 
 _KEYS = re.compile(
     r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
@@ -152,7 +153,7 @@ def sensitivity(
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
     keys, variations, varying = dict[str, float](), list[Variation](), VariedBody(problem)
-    for key, value in _numbers_of(scene.as_dict()):
+    for key, value in _numbers_of(with_moduli_only(scene.as_dict())):
         if has_derivative(key, value, problem):
             try:
                 variations.append(varied(scene, varying, key))
@@ -179,7 +180,7 @@ def varied(scene: Scene, body: VariedBody, key: str) -> Variation:
     Finger3dError
         If numbers have no derivative by the key.
     """
-    given, own = scene.as_dict(), body.problem.model
+    given, own = with_moduli_only(scene.as_dict()), body.problem.model
     value = float(str(tree.value_at(given, key)))
     step = (_NU_STEP if key.endswith(".nu") else _STEP) * max(abs(value), _LEAST)
     count = len(stations(own.legs))
@@ -223,7 +224,7 @@ def _result(
     scene: Scene, keys: Mapping[str, float], numbers: Numbers, both: tuple[Sequence[Numbers], Sequence[Numbers]]
 ) -> Sensitivity:
     """Return the derivatives (k,) as keys fall and grow with the names of gauges and markers in place of numbers."""
-    given = scene.as_dict()
+    given = with_moduli_only(scene.as_dict())
     titles = {key: _named(key, given) for key in keys}
     falling, growing = (
         {name: {titles[key]: row.get(name, np.nan) for key, row in zip(keys, rows, strict=True)} for name in numbers}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
-from finger3d._types import Tree
+from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.materials.elastic import MODULUS_KEYS, NU
 from finger3d.materials.silicones import silicone_named
@@ -66,6 +66,16 @@ def with_modulus(table: ElasticTable) -> Tree:
         return values
     constants = table.constants
     return values | {"E_MPa": constants.E_MPa, "E_spread": constants.spread, "E_origin": constants.origin}
+
+
+def with_moduli_only(scene: TreeView) -> Tree:
+    """Return the tables of `Scene.as_dict` with Young's moduli in place of what they follow from; they load again."""
+
+    def own(table: TreeView) -> TreeView:
+        return {key: table[key] for key in ("E_MPa", "nu")} if "E_origin" in table else table
+
+    parts = {label: own(part) for label, part in scene["parts"].items()}
+    return {**scene, "material": own(scene["material"]), "parts": parts}
 
 
 def replace_modulus(tree: Tree, changed: Iterable[str]) -> None:

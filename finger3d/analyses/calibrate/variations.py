@@ -11,7 +11,7 @@ import numpy as np
 from finger3d.fem.solids.material import MIXED_FROM, Isotropic, Material
 from finger3d.fem.solvers.condense import stiffened
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points
+from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points, under_pressure
 from finger3d.mechanics.model import Leg, MeshOptions
 
 _TILTED_POINTS = {2: 100, 3: 500}
@@ -46,7 +46,8 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
         rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
         rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces
         finger = scatter_to_points(changed, active, c, d)
-        share = None if one.system.object_share is None else object_share(one.surface, finger, of_object)
+        both = [under_pressure(one.surface, compliance) for compliance in (finger, of_object)]
+        share = None if one.system.object_share is None else object_share(*both)
         system = replace(one.system, delassus=finger + of_object, reading_rows=rows, object_share=share)
         return replace(one, system=system)
 

@@ -94,20 +94,12 @@ class BoundarySurface:
     def _on_vectors(self, rows: sp.csr_matrix) -> sp.csr_matrix:
         return sp.csr_matrix(sp.kron(rows, np.eye(self.points.shape[1]), format="csr"))
 
-    def interpolated(self, values: Float) -> Float:
-        """Return values (q, k) at the samples, linear between those of the points (c, k).
+    @cached_property
+    def interpolation(self) -> sp.csr_matrix:
+        """Linear interpolation (q, c) of values at the points to the samples.
 
         Where a neighbour is not among the points, those that are share its weight.
         """
-        return np.asarray(self._interpolation @ values)
-
-    @cached_property
-    def influence(self) -> sp.csr_matrix:
-        """Which points (c, c) have means that change with the displacements of each point; see `interpolated`."""
-        return sp.csr_matrix(self.average @ self._interpolation)
-
-    @cached_property
-    def _interpolation(self) -> sp.csr_matrix:
         total = np.asarray(self.hats.sum(axis=0)).ravel()
         return sp.csr_matrix(sp.diags_array(1.0 / total) @ self.hats.T)
 

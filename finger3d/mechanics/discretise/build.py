@@ -27,6 +27,7 @@ from finger3d.mechanics.discretise.problem import (
     free_surface,
     object_share,
     scatter_to_points,
+    under_pressure,
 )
 from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
@@ -180,20 +181,22 @@ def with_elastic_object(problem: Problem, report: Progress = QUIET) -> Problem:
 def with_object_compliance(problem: Problem, response: ObjectResponse) -> Problem:
     """Return the problem with the compliance of an elastic object added to that of the contact points."""
     body = problem.without_inclusions
-    share, points = object_share(problem.surface, problem.system.delassus, response.compliance), problem.points
-    both = points.compliance / (1.0 - share[problem.symmetry.image_of])
+    both = [under_pressure(problem.surface, one) for one in (problem.system.delassus, response.compliance)]
+    share, points = object_share(*both), problem.points
+    softer = points.compliance / (1.0 - share[problem.symmetry.image_of])
     return replace(
         problem,
         system=replace(
             problem.system,
-            points=replace(points, compliance=both),
+            points=replace(points, compliance=softer),
             delassus=problem.system.delassus + response.compliance,
-            object_factorizations=response.factorizations,
+            object_factorizations=response.body.condensed.factorizations if response.body else 0,
             object_compliance=response.compliance,
             object_share=share,
+            object_body=response.body,
         ),
         seconds=problem.seconds | response.seconds,
-        without_inclusions=with_object_compliance(body, response) if body else None,
+        without_inclusions=with_object_compliance(body, replace(response, body=None)) if body else None,
     )
 
 

@@ -19,11 +19,11 @@ from finger3d._types import Float, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, stiffness
 from finger3d.fem.mesh.simplex import Mesh, axis_numbers, reflected
 from finger3d.fem.solids.material import Elasticity, Isotropic
-from finger3d.fem.solvers.condense import Condensation, condense
+from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.problem import CondensedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
@@ -53,12 +53,12 @@ class ObjectResponse:
     ----------
     compliance : (c, d, c, d) array, mm/N
         Zero in the directions that symmetry holds.
-    factorizations : int
+    body : the object, if this is the response of its own mesh
     seconds : time of each stage by name
     """
 
     compliance: Float
-    factorizations: int
+    body: CondensedObject | None
     seconds: dict[str, float]
 
     def __post_init__(self) -> None:
@@ -78,8 +78,14 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: 
     mesh, whole = object_mesh(problem, thing, zone, report)
     meshing = time.perf_counter() - start
     report.say(f"condensing the object's {mesh.points.size} unknowns")
-    response = response_of(problem, thing, mesh, whole)
-    return replace(response, seconds={"object_mesh": meshing, **response.seconds})
+    held = held_dofs(mesh, () if whole else problem.axes, problem.model.held_ends)
+    matrix, rows = assembled_object(problem, thing, mesh, whole)
+    condensed = condense(matrix, held, rows)
+    active, (c, d) = problem.system.active_dofs, problem.surface.points.shape
+    out = np.zeros((c * d, c * d))
+    out[np.ix_(active, active)] = condensed.compliance
+    seconds = {"object_mesh": meshing, "object_condensation": condensed.seconds}
+    return ObjectResponse(out.reshape(c, d, c, d), CondensedObject(mesh, whole, condensed), seconds)
 
 
 def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> tuple[Mesh, bool]:
@@ -88,26 +94,9 @@ def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Prog
     return ObjectBody(model, thing.height_mm or model.design.height_mm, zone, problem.axes, report).mesh()
 
 
-def response_of(problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool) -> ObjectResponse:
-    """Condense a mesh of an elastic object; see `object_mesh`."""
-    condensed = condensed_object(problem, thing, mesh, whole)
-    active, (c, d) = problem.system.active_dofs, problem.surface.points.shape
-    out = np.zeros((c * d, c * d))
-    out[np.ix_(active, active)] = condensed.compliance
-    seconds = {"object_condensation": condensed.seconds}
-    return ObjectResponse(out.reshape(c, d, c, d), condensed.factorizations, seconds)
-
-
 def law_of_object(model: Model, thing: ElasticObject) -> Elasticity:
     """Return the small-strain law of an elastic object."""
     return Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
-
-
-def condensed_object(problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool) -> Condensation:
-    """Condense a mesh of an elastic object to the directions of contact points that move; see `object_mesh`."""
-    held = held_dofs(mesh, () if whole else problem.axes, problem.model.held_ends)
-    matrix, rows = assembled_object(problem, thing, mesh, whole)
-    return condense(matrix, held, rows)
 
 
 def assembled_object(

@@ -57,6 +57,20 @@ class CondensedBody:
         freeze_arrays(self)
 
 
+@dataclass(frozen=True)
+class CondensedObject:
+    """Elastic object, condensed to the directions of contact points that move.
+
+    Attributes
+    ----------
+    is_whole : whether it is meshed whole although only a part of the finger is
+    """
+
+    mesh: Mesh
+    is_whole: bool
+    condensed: Condensation
+
+
 @dataclass(frozen=True, kw_only=True)
 class ContactSystem:
     """Body and object, seen at the candidate contact points (c points of the meshed part, m of the whole finger).
@@ -73,6 +87,7 @@ class ContactSystem:
     object_factorizations : factorisations of an elastic object
     object_compliance : (c, d, c, d) mm/N, the part of an elastic object in `delassus`; None if it is rigid
     object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
+    object_body : an elastic object, which derivatives need
     """
 
     surface: BoundarySurface
@@ -85,6 +100,7 @@ class ContactSystem:
     object_factorizations: int = 0
     object_compliance: Float | None = None
     object_share: Float | None = None
+    object_body: CondensedObject | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -270,13 +286,11 @@ def scatter_to_points(rows: Float, kept: NDArray[np.int64], count: int, dim: int
     return out.reshape(count, dim, count, dim)
 
 
-def object_share(surface: BoundarySurface, finger: Float, thing: Float) -> Float:
-    """Return the share (c,) of an elastic object in the normal displacement under uniform pressure.
+def under_pressure(surface: BoundarySurface, compliance: Float) -> Float:
+    """Return the normal displacement (c,) mm under a uniform pressure of 1 MPa, by a compliance (c, d, c, d) mm/N."""
+    return np.asarray(compliance[:, 0, :, 0] @ surface.area)
 
-    Parameters
-    ----------
-    finger, thing : (c, d, c, d) mm/N
-        Compliance of the two bodies at the surface's points.
-    """
-    own_compliance, other = (np.einsum("ij,j->i", w[:, 0, :, 0], surface.area) for w in (finger, thing))
-    return np.asarray(np.clip(other / (own_compliance + other), 0.0, 1.0))
+
+def object_share(finger: Float, thing: Float) -> Float:
+    """Return the share (c,) of an elastic object in the normal displacements (c,) of both under uniform pressure."""
+    return np.asarray(np.clip(thing / (finger + thing), 0.0, 1.0))

@@ -32,16 +32,16 @@ from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWor
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, rubbed
-from finger3d.mechanics.small_strain.linearised import (
-    MOST,
-    LinearisedIncrement,
-    Part,
-    are_converged,
-    derivative_scale,
-    slopes,
-)
+from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, Part, slopes
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
+
+_CHANGE, _ROUND_OFF, _MOST = 1e-8, 1e-5, 60
+"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
+and the largest number of iterations."""
+
+_NEGLIGIBLE = 1e-7
+"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class FiniteIncrementTangents(IncrementTangents):
         direct = slopes(rubbed(part, sides), steps)
         unknowns, moved = np.zeros((linear.active.forces.shape[1], p)), np.zeros((len(x), p))
         errors = list[Float]()
-        for _ in range(MOST):
+        for _ in range(_MOST):
             force = linear.active.forces @ unknowns + direct
             ends = [
                 _End.of(one, x + t * moved[:, k // 2], contact, t * force[:, k // 2].reshape(contact.force.shape))
@@ -119,10 +119,10 @@ class FiniteIncrementTangents(IncrementTangents):
             change = linear.active.correction(relative, unknowns)
             step = eliminated.unknowns(-(linear.active.forces @ change)[active])
             unknowns, moved = unknowns - change, moved + step
-            scales = derivative_scale(moved[:n], np.abs(x[:n]).max(), size), derivative_scale(unknowns, largest, size)
+            scales = _scale(moved[:n], np.abs(x[:n]).max(), size), _scale(unknowns, largest, size)
             both = zip((step[:n], change), scales, strict=True)
             errors.append(np.max([np.abs(by).max(axis=0, initial=0.0) / scale for by, scale in both], axis=0))
-            if are_converged(errors):
+            if _are_converged(errors):
                 return [end.side(*rest) for end, rest in zip(ends, zip(sides, formulations, strict=True), strict=True)]
         raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
 
@@ -154,3 +154,18 @@ class _End:
         found = formulation.readings(problem, state)
         read = np.array([found[column] for column in problem.model.columns])
         return Side(problem, state, move.end, read, before.work_mJ + work, before.dissipation_mJ + lost)
+
+
+def _scale(derivatives: Float, value: float, size: Float) -> Float:
+    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
+    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
+    return np.where(scale > 0.0, scale, 1.0)
+
+
+def _are_converged(errors: Sequence[Float]) -> bool:
+    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
+
+    Unknowns and directions are corrected in turn, so that errors fall every second time.
+    """
+    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
+    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())

@@ -22,9 +22,9 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.increment_tangents import AT_ONCE, IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
-from finger3d.mechanics.small_strain.path_tangents import PathTangent, PathTangents, RestTangent, compliance_changes
+from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangent, PathTangents
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
@@ -49,9 +49,10 @@ Tangents: TypeAlias = Iterator[tuple[StepResult, Sides, Sides]]
 
 
 def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult] = ()) -> Tangents:
-    """Yield every increment of a press, and the sides (2 p,) of p variations at its end as they fall and as they grow.
+    """Yield every increment of a press, and the sides at its end of its variations as they fall and as they grow.
 
-    Both are the same list until an increment ends at a kink, along an exact path until the press does.
+    Both are the same list until an increment ends at a kink, along an exact path until the press does.  They hold two
+    sides of each variation but those of readings only, which change no contact.
 
     Parameters
     ----------
@@ -71,38 +72,21 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
         raise Finger3dError(f"at depth {steps[-1].target.depth_mm:.4g} mm: {steps[-1].outcome}")
     along = _by_increments if any(step.path is None for step in steps) else _on_exact_path
     others, none = [one for one in variations if not one.of_readings], list[Side | None]()
-    found = along(problem, others, steps) if others else ((step, none, none) for step in steps)
-    own = _of_readings(problem, [one for one in variations if one.of_readings], steps)
-    for (step, falling, growing), read in zip(found, own, strict=True):
-        below = above = _in_turn(variations, falling, read)
-        if growing is not falling:
-            above = _in_turn(variations, growing, read)
-        yield step, below, above
+    yield from along(problem, others, steps) if others else ((step, none, none) for step in steps)
 
 
-def _in_turn(variations: Sequence[Variation], sides: Sides, read: Sides) -> Sides:
-    """Return the sides (2 p,) of all parameters, from those of parameters of readings and those of the others."""
-    rest, own = iter(sides), iter(read)
-    return [next(own if one.of_readings else rest) for one in variations for _ in one.ends]
-
-
-def _of_readings(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Iterator[Sides]:
-    """Yield the sides (2 p,) of parameters of readings at the end of every increment; they change no contact."""
+def _read(step: StepResult, one: Variation) -> tuple[Side, Side]:
+    """Return the sides of a parameter that changes readings only at the end of an increment."""
+    state, problem = step.meshed_state, one.low
     formulation, columns, first = formulation_of(problem.model), problem.model.columns, len(problem.system.active_dofs)
-    changes = [] if problem.model.finite_strain else [one.body for one in variations]
-    for start in range(0, len(steps), AT_ONCE):
-        states = [step.meshed_state for step in steps[start : start + AT_ONCE]]
-        forces = np.stack([problem.row_forces(problem.upright_force(state.contact)) for state in states], axis=1)
-        moved = changes_of_rows(changes, forces)[first:]
-        for i, (step, state) in enumerate(zip(steps[start:], states, strict=False)):
-            sides: Sides = []
-            for k, one in enumerate(variations):
-                for end, t in zip(one.ends, (-one.step, one.step), strict=True):
-                    found = formulation.readings(end, state)
-                    read = np.array([found[column] for column in columns])
-                    read = read + t * moved[: len(read), i, k] if changes else read
-                    sides.append(Side(end, state, step.target, read, step.external_work_mJ, step.dissipation_mJ))
-            yield sides
+    moved = np.zeros(len(columns))
+    if not problem.model.finite_strain:
+        forces = problem.row_forces(problem.upright_force(state.contact))[:, None]
+        moved = changes_of_rows([one.body], forces)[first : first + len(columns), 0, 0]
+    found = [formulation.readings(end, state) for end in one.ends]
+    low, high = (np.array([own[column] for column in columns]) for own in found)
+    side = Side(one.low, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
+    return side, side._replace(problem=one.high, readings=high + one.step * moved)
 
 
 def derivatives(
@@ -115,12 +99,13 @@ def derivatives(
     """
     friction = np.linalg.norm(step.meshed_state.contact.force[:, 1:], axis=1)
     starts = friction <= _NO_FRICTION * friction.max(initial=0.0)
-    pairs = zip(variations, sides[::2], sides[1::2], strict=True)
-    found = [_of_numbers(step, *one, with_zones) for one in pairs]
-    for numbers, one, side in zip(found, variations, sides[1::2], strict=True):
-        if way and side is not None:
-            begun = np.linalg.norm(side.state.contact.force[:, 1:], axis=1) * starts
-            numbers["friction_sum_N"] += way * side.problem.symmetry.total(begun) / one.step
+    rest, found = iter(sides), list[Numbers]()
+    for one in variations:
+        low, high = _read(step, one) if one.of_readings else (next(rest), next(rest))
+        found.append(_of_numbers(step, one, low, high, with_zones))
+        if way and high is not None:
+            begun = np.linalg.norm(high.state.contact.force[:, 1:], axis=1) * starts
+            found[-1]["friction_sum_N"] += way * high.problem.symmetry.total(begun) / one.step
     return found
 
 
@@ -149,13 +134,12 @@ def _increment_tangents(
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
     count = len(variations)
-    rest = RestTangent.of(variations, len(problem.surface.nodes))
-    moved = np.stack([rest.gap, np.zeros_like(rest.gap)], axis=2)
+    changes = Changes.of(problem, variations)
+    moved = np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
     tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
     energies, number, follower = np.zeros((2, count)), 0, None
-    changes = compliance_changes(problem, variations)
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
-        follower = follower or PathTangents(step.path, variations, changes, rest, tangent, motion, number)
+        follower = follower or PathTangents(step.path, variations, changes, tangent, motion, number)
         place = follower.at_share(station.share)
         sides: Sides = list(follower.sides(step, station.share, place, energies))
         both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None

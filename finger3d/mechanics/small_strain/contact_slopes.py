@@ -1,17 +1,24 @@
-"""Contact at the end of an increment, and its derivatives by the displacements of the contact points."""
+"""Contact at the end of an increment, and its derivatives by the displacements of the contact points.
+
+They follow from means of distance, gradient and displacement over the samples of the surface.  The means are linear in
+values at the samples, whose derivatives are central differences, as those of the conditions of each point are by its
+own displacement and means.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d._types import Float, Int
+from finger3d._types import Float
 from finger3d.contact.state import ContactState
-from finger3d.fem.surface.traces import BoundarySurface
-from finger3d.mechanics.discretise.contact_geometry import ContactGeometry
+from finger3d.fem.tensors import block_diagonal
+from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_means, geometry_of_means
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import Increment
 from finger3d.mechanics.small_strain.linearised import upright
@@ -23,96 +30,83 @@ _STEP = 3e-6
 
 @dataclass(frozen=True)
 class ContactEnd:
-    """End of an increment at displacements (c, d) mm of its points."""
+    """End of an increment at displacements (c, d) mm of its points, with means (c, 1 + 2 d) over the samples."""
 
     increment: Increment
-    geometry: ContactGeometry
     displacement: Float
+    means: Float
 
     @classmethod
     def of(cls, increment: Increment, displacement: Float) -> ContactEnd:
         """Return the end of an increment."""
-        return cls(increment, increment.geometry(_expansion_point(increment, displacement), np.inf), displacement)
+        problem, place = increment.problem, _expansion_point(increment, displacement)
+        means = contact_means(problem.placed(increment.move.end).distance, problem.surface, place)
+        return cls(increment, displacement, means)
+
+    @cached_property
+    def geometry(self) -> ContactGeometry:
+        """Gaps and directions of the points."""
+        problem = self.increment.problem
+        share = problem.system.object_share
+        return geometry_of_means(self.means, problem.surface, self._expansion_point, problem.axes, share)
+
+    @property
+    def _expansion_point(self) -> Float:
+        return _expansion_point(self.increment, self.displacement)
 
     def beside(self, increment: Increment) -> ContactEnd:
-        """Return the end of another increment at the same displacements; the geometry is evaluated if it differs."""
-        (one, other), end = (each.problem for each in (self.increment, increment)), increment.move.end
-        is_same = other.surface is one.surface and other.system.object_share is one.system.object_share
-        is_same = is_same and other.system.first_contact_mm == one.system.first_contact_mm
-        if is_same and other.model.object == one.model.object and end == self.increment.move.end:
+        """Return the end of another increment at the same displacements; the means are taken anew if they differ."""
+        is_same = increment.move.end == self.increment.move.end
+        if is_same and are_placed_alike(increment.problem, self.increment.problem):
             return replace(self, increment=increment)
         return ContactEnd.of(increment, self.displacement)
 
-    def moved(self, displacement: Float, geometry: Float) -> ContactEnd:
-        """Return the end with displacements and geometry that differ by (c, d) and (c, m); see `slopes`."""
-        c, d = displacement.shape
-        array = _as_array(self.geometry) + geometry
-        changed = ContactGeometry(array[:, 0], array[:, 1], array[:, 2 : 2 + d], array[:, 2 + d :].reshape(c, d, d))
-        return replace(self, geometry=changed, displacement=self.displacement + displacement)
+    def moved(self, displacement: Float, means: Float) -> ContactEnd:
+        """Return the end with displacements and means that differ by (c, d) and (c, 1 + 2 d)."""
+        return replace(self, displacement=self.displacement + displacement, means=self.means + means)
 
     def conditions(self, contact: ContactState) -> Float:
         """Return gap and slip (mm), and the forces (N) of a state if they turn to the end's directions, (c, 2 d).
 
         Both are in the directions of an upright object.
         """
-        expansion_point = _expansion_point(self.increment, self.displacement)
-        relative = self.increment.relative(self.geometry, expansion_point, self.displacement)
+        relative = self.increment.relative(self.geometry, self._expansion_point, self.displacement)
         turned = np.einsum("ca,cak->ck", contact.force, self.geometry.bases) @ vertical_frame(self.geometry.dim).T
         return np.column_stack([upright(contact, relative), turned])
 
     def state(self, contact: ContactState, force: Float) -> State[Float]:
         """Return the state with contact forces that differ by (c, d) from those of another."""
-        expansion_point = _expansion_point(self.increment, self.displacement)
         changed = replace(contact, force=contact.force + force)
-        return self.increment.reached(self.geometry, expansion_point, self.displacement, changed, None)
+        return self.increment.reached(self.geometry, self._expansion_point, self.displacement, changed, None)
 
-    def slopes(self, contact: ContactState, influence: tuple[sp.csr_matrix, Int]) -> tuple[Any, Any]:
-        """Return the derivatives of `conditions` and of the geometry, (c 2 d, c d) and (c m, c d) sparse.
+    def slopes(self, contact: ContactState) -> tuple[Any, Any]:
+        """Return the derivatives of `conditions` and of the means, (c 2 d, c d) and (c (1 + 2 d), c d) sparse."""
+        (c, d), problem = self.displacement.shape, self.increment.problem
+        is_flat, surface = problem.model.object.is_flat, problem.surface
+        step, m = _STEP * problem.model.largest_depth_mm, self.means.shape[1]
+        changes = step * np.eye(d if is_flat else d + m, d + m)
 
-        Points that influence no point in common are displaced at once; see `influence_of`.
-        """
-        (c, d), (influences, groups) = self.displacement.shape, influence
-        step, rows, columns, values = _STEP * self.increment.problem.model.largest_depth_mm, [], [], []
-        for group in range(int(groups.max()) + 1):
-            points = np.flatnonzero(groups == group)
-            near = influences[:, points].tocoo()
-            for k in range(d):
-                change = np.zeros((c, d))
-                change[points, k] = step
-                low, high = (ContactEnd.of(self.increment, self.displacement + t * change) for t in (-1.0, 1.0))
-                both = [np.column_stack([end.conditions(contact), _as_array(end.geometry)]) for end in (low, high)]
-                values.append((both[1] - both[0])[near.row] / (2.0 * step))
-                rows.append(near.row)
-                columns.append(d * points[near.col] + k)
-        row, column, value = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+        def conditions(change: Float) -> Float:
+            return self.moved(*np.hsplit(np.tile(change, (c, 1)), [d])).conditions(contact)
 
-        def matrix(entries: Float) -> sp.csr_matrix:
-            width = entries.shape[1]
-            places = (width * row[:, None] + np.arange(width)).ravel(), np.repeat(column, width)
-            return sp.csr_matrix((entries.ravel(), places), shape=(c * width, c * d))
-
-        return matrix(value[:, : 2 * d]), matrix(value[:, 2 * d :])
+        own = np.stack([(conditions(by) - conditions(-by)) / (2.0 * step) for by in changes], axis=2)
+        of_conditions, of_means = block_diagonal(own[:, :, :d]), sp.csr_array((c * m, c * d))
+        if not is_flat:
+            distance, samples = problem.placed(self.increment.move.end).distance, surface.samples
+            samples = samples + surface.interpolation @ self.displacement
+            found = [[np.column_stack(distance(samples + t * by)) for t in (-1.0, 1.0)] for by in changes[:d, :d]]
+            by_place = np.stack([(high - low) / (2.0 * step) for low, high in found], axis=2)
+            by_place = np.concatenate([by_place, np.broadcast_to(np.eye(d), (len(samples), d, d))], axis=1)
+            average, interpolation = sp.kron(surface.average, np.eye(m)), sp.kron(surface.interpolation, np.eye(d))
+            of_means = average.tocsr() @ (block_diagonal(by_place) @ interpolation.tocsr())
+            of_conditions = of_conditions + block_diagonal(own[:, :, d:]) @ of_means
+        return of_conditions, of_means
 
 
-def influence_of(surface: BoundarySurface, is_flat: bool) -> tuple[sp.csr_matrix, Int]:
-    """Return by the displacements of which points (c, c) the geometry of each point changes, and groups (c,) of points.
-
-    Those of a group influence no point in common.  Under a flat object a point influences itself only.
-    """
-    count = len(surface.nodes)
-    influences = sp.identity(count, format="csr") if is_flat else surface.influence
-    beside = (influences.T @ influences).tocsr()
-    groups = np.full(count, -1)
-    for point in range(count):
-        taken = groups[beside.indices[beside.indptr[point] : beside.indptr[point + 1]]]
-        groups[point] = next(group for group in range(count) if group not in taken)
-    return influences, groups
-
-
-def _as_array(geometry: ContactGeometry) -> Float:
-    """Return distance, slope, offset and bases of points, (c, m)."""
-    bases = geometry.bases.reshape(len(geometry.bases), -1)
-    return np.column_stack([geometry.distance, geometry.slope, geometry.offset, bases])
+def are_placed_alike(one: Problem, other: Problem) -> bool:
+    """Whether two problems have the same contact points, and the same object at first touch."""
+    is_same = one.surface is other.surface and one.system.first_contact_mm == other.system.first_contact_mm
+    return is_same and one.model.object == other.model.object
 
 
 def _expansion_point(increment: Increment, displacement: Float) -> Float:

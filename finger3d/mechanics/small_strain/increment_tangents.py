@@ -9,8 +9,7 @@ geometry of the contact, and on the parameters through the state before and the 
 (`finger3d.contact.newton.ActiveSet`) the derivatives of w and B are central differences between two sides, presses at a
 parameter less and plus its step to first order, and those by U are the same for all parameters
 (`finger3d.mechanics.small_strain.contact_slopes`).  They hold the curvature of the object, and where points touch
-within the increment.  The equations are solved for dx with factors that neglect the curvature, by iteration (Anderson
-1965).
+within the increment.  As dB is linear in dU, the forces d(B^T r) are eliminated, and one system for dx remains.
 
 Under prescribed forces an increment is differentiated by depth and slides, too, which change so that they are kept.
 """
@@ -23,10 +22,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
-from finger3d._types import Float, Int
-from finger3d.contact.friction import SLIP, Status
-from finger3d.contact.state import ContactState, pressure
+from finger3d._types import Float
+from finger3d.contact.friction import OPEN, SLIP, Status
+from finger3d.contact.state import pressure
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -34,30 +34,21 @@ from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, influence_of
+from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, are_placed_alike
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody, extrapolated
+from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import (
-    MOST,
     Linear,
     LinearisedIncrement,
     Part,
-    are_converged,
-    derivative_scale,
     slopes,
     upright,
 )
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
-_MEMORY = 8
-"""Iterations from which the next one is extrapolated."""
-
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
-
-AT_ONCE = 32
-"""Increments that the body is solved for at once, which costs less than one after another."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +78,10 @@ class IncrementTangents:
         self._steps = np.array([t for one in variations for t in (-one.step, one.step)])
         ends = [end for one in variations for end in one.ends]
         self.formulation = formulation_of(problem.model)
-        self.sides = [self._begun(end) for end in ends]
+        self._here = Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+        self.sides = [self._here._replace(problem=end, state=self._start(end)) for end in ends]
         self._variations = variations
-        self._stations = [stations(end.model.legs) for end in ends]
-        self._state, self._pose, self._number = self.formulation.start(problem), problem.origin, 0
+        self._stations, self._number = [stations(end.model.legs) for end in ends], 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
         self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
@@ -105,11 +96,11 @@ class IncrementTangents:
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
-        sides, (here, length) = self._sides(self._parts(step), step), self._end(step)
+        sides, (here, length) = self._sides(step), self._end(step)
         if way and is_kink(here, length):
 
             def solved(status: Status) -> tuple[list[Side], list[End]]:
-                found = self._sides(self._parts(step, status), step)
+                found = self._sides(step, status)
                 befores = zip(self._last, found, strict=True)
                 ends = [
                     End(before.state.contact, side.state.contact, _coefficients(before, status))
@@ -121,7 +112,8 @@ class IncrementTangents:
             self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
             sides = [own or side for own, side in zip(chosen, sides, strict=True)]
         self.sides = sides
-        self._state, self._pose, self._number = step.meshed_state, step.target, self._number + 1
+        self._here = self._here._replace(state=step.meshed_state, pose=step.target)
+        self._number += 1
         return [None if unknown else side for unknown, side in zip(self._is_unknown, sides, strict=True)]
 
     def is_at_kink(self, step: StepResult) -> bool:
@@ -130,36 +122,42 @@ class IncrementTangents:
 
     def _end(self, step: StepResult) -> tuple[End, float]:
         """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
-        states = [self._state, *(after for _, after in step.parts)]
-        before, contact = self._begun(self.problem)._replace(state=states[-2]), states[-1].contact
+        states = [self._here.state, *(after for _, after in step.parts)]
+        before, contact = self._here._replace(state=states[-2]), states[-1].contact
         friction = _coefficients(before, contact.status)
         return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
 
-    def _sides(self, parts: Sequence[Part], step: StepResult) -> list[Side]:
+    def _sides(self, step: StepResult, status: Status | None = None) -> list[Side]:
+        """Return the sides at the end of an increment, where the points may have other statuses (c,)."""
         targets = [own[self._number] for own in self._stations]
         poses = self._poses(targets)
-        if any(target.load for target in targets):
-            poses = self._in_equilibrium(step, parts, targets, poses)
-        return self._through(parts, self.sides, self._steps, poses)
+        try:
+            parts = self._parts(step, status)
+            if any(target.load for target in targets):
+                poses = self._in_equilibrium(step, parts, targets, poses)
+            return self._through(parts, self.sides, self._steps, poses)
+        except np.linalg.LinAlgError:
+            raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
 
-    def _parts(self, step: StepResult, status: Status | None = None) -> list[Part]:
-        """Return the parts of an increment, linearised; the points may have other statuses (c,) at its end."""
-        whole, parts = Move(self._pose, step.target).change, list[Part]()
-        before, place, start = self._state, self._pose, 0.0
+    def _parts(self, step: StepResult, status: Status | None) -> list[Part]:
+        """Return the parts of an increment, linearised."""
+        whole, parts = Move(self._here.pose, step.target).change, list[Part]()
+        before, place, start = self._here.state, self._here.pose, 0.0
         for pose, after in step.parts:
             if status is not None and after is step.parts[-1][1]:
                 after = replace(after, contact=replace(after.contact, status=status))
-            share = 1.0 if pose == step.target else float(Move(self._pose, pose).change @ whole) / float(whole @ whole)
-            try:
-                linear = self._linearised(before, after, move := Move(place, pose))
-            except np.linalg.LinAlgError:
-                raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
+            way = Move(self._here.pose, pose).change
+            share = 1.0 if pose == step.target else float(way @ whole) / float(whole @ whole)
+            linear = self._linearised(before, after, move := Move(place, pose))
             parts.append(Part(before, after, linear, move, start, share))
             before, place, start = after, pose, share
         return parts
 
-    def _begun(self, problem: Problem) -> Side:
-        return Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
+    def _start(self, problem: Problem) -> State[Any]:
+        """Return the state at rest, which is that of the press where its contact is the same."""
+        own = self.problem
+        is_same = are_placed_alike(problem, own) and problem.system.object_share is own.system.object_share
+        return self._here.state if is_same else self.formulation.start(problem)
 
     def _linearised(self, before: State[Any], after: State[Any], move: Move) -> Any:
         """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
@@ -172,47 +170,39 @@ class IncrementTangents:
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
         """Return the derivatives of the body at the end of a part of an increment under its forces."""
         found = self._fixed[part.after.contact.force.tobytes()]
-        more = ((0, 0), (0, len(steps) // 2 - len(self._variations)))  # by poses, which change nothing in the body
-        return FixedForces(np.pad(found.displacement, more), np.pad(found.readings, more))
+        more = len(steps) // 2 - len(self._variations)  # by poses, which change nothing in the body
+        return FixedForces(*np.split(np.pad(found, ((0, 0), (0, more))), [self.problem.surface.points.size]))
 
     @cached_property
-    def _influence(self) -> tuple[Any, Int]:
-        return influence_of(self.problem.surface, self.problem.model.object.is_flat)
+    def _forces(self) -> list[Float]:
+        """Contact forces (c, d) at the ends of all parts of the press, in the directions of an upright object."""
+        return [self.problem.upright_force(after.contact) for step in self._results for _, after in step.parts]
+
+    def _by_contact(self, array: Float) -> dict[bytes, Float]:
+        """Return slices of an array (n, k, p) for each of `_forces`, by the contact forces."""
+        contacts = [after.contact.force.tobytes() for step in self._results for _, after in step.parts]
+        return dict(zip(contacts, np.moveaxis(array, 1, 0), strict=True))
 
     @cached_property
-    def _contacts(self) -> list[list[ContactState]]:
-        """Contact at the ends of all parts of the press, in portions that the body is solved for at once."""
-        contacts = [after.contact for step in self._results for _, after in step.parts]
-        return [contacts[start : start + AT_ONCE] for start in range(0, len(contacts), AT_ONCE)]
-
-    @cached_property
-    def _fixed(self) -> dict[bytes, FixedForces]:
-        """Derivatives of the body under the forces at the ends of all parts of the press, by these forces."""
-        problem, count, found = self.problem, len(self._variations), dict[bytes, FixedForces]()
-        for some in self._contacts:
-            rows = np.stack([problem.row_forces(problem.upright_force(contact)) for contact in some], axis=1)
-            rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
-            sizes = problem.surface.points.size, len(problem.system.reading_rows)
-            displacement, readings = (np.zeros((size, len(some), count)) for size in sizes)
-            moved = changes_of_rows([one.body for one in self._variations], rows)
-            for k, one in enumerate(self._variations):
-                if one.body:
-                    displacement[..., k], readings[..., k] = one.body.of_points(problem, rows, moved[..., k])
-            for i, contact in enumerate(some):
-                found[contact.force.tobytes()] = FixedForces(displacement[:, i], readings[:, i])
-        return found
+    def _fixed(self) -> dict[bytes, Float]:
+        """Derivatives of displacements and readings (c d + g, p) under the forces at the ends of all parts."""
+        problem, size = self.problem, self.problem.surface.points.size
+        rows = np.stack([problem.row_forces(force) for force in self._forces], axis=1)
+        rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
+        moved = changes_of_rows([one.body for one in self._variations], rows)
+        out = np.zeros((size + len(problem.system.reading_rows), *moved.shape[1:]))
+        for k, one in enumerate(self._variations):
+            if one.body:
+                out[:, :, k] = np.concatenate(one.body.of_points(problem, rows, moved[..., k]))
+        return self._by_contact(out)
 
     @cached_property
     def _of_object(self) -> dict[bytes, Float]:
         """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
-        active, found = self.problem.system.active_dofs, dict[bytes, Float]()
-        changes = [one.thing for one in self._variations]
-        for some in self._contacts:
-            forces = np.stack([self.problem.upright_force(contact).ravel() for contact in some], axis=1)
-            moved = np.zeros((*forces.shape, len(changes)))
-            moved[active] = changes_of_rows(changes, forces[active])
-            found |= {contact.force.tobytes(): moved[:, i] for i, contact in enumerate(some)}
-        return found
+        active, forces = self.problem.system.active_dofs, np.stack([one.ravel() for one in self._forces], axis=1)
+        moved = np.zeros((*forces.shape, len(self._variations)))
+        moved[active] = changes_of_rows([one.thing for one in self._variations], forces[active])
+        return self._by_contact(moved)
 
     def _reached(
         self,
@@ -246,10 +236,8 @@ class IncrementTangents:
         reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
         held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
         moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
-        here = self._begun(self.problem)._replace(state=self._state, pose=self._pose)
-        found = self._through(
-            parts, [*self.sides, *[here] * len(moved)], np.array([*self._steps, *[-h, h] * len(free)]), [*held, *moved]
-        )
+        steps = np.array([*self._steps, *[-h, h] * len(free)])
+        found = self._through(parts, [*self.sides, *[self._here] * len(moved)], steps, [*held, *moved])
         forces = np.array([_forces(side) for side in found])
         if loads[0].begins:
             self._leg_start_N = np.array([_forces(side) for side in self.sides])
@@ -278,8 +266,7 @@ class IncrementTangents:
         """Return the sides after a part of an increment."""
         contact, linear, frame = part.after.contact, part.linear.active, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
-        delassus, size = part.linear.delassus.reshape(c * d, c * d), steps[1::2]
-        largest = np.abs(contact.force).max(initial=0.0)
+        delassus = part.linear.delassus.reshape(c * d, c * d)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
         at_fixed_forces = fixed.displacement.copy()
         if any(one.thing for one in self._variations):
@@ -290,38 +277,38 @@ class IncrementTangents:
             return Increment(problem, self._displaced(state), move, body, DistanceTracker())
 
         own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
-        of_conditions, of_geometry = own.slopes(contact, self._influence)
+        of_place, of_means = own.slopes(contact)
         pairs = zip(sides, moves, strict=True)
         ends = [own.beside(increment(side.problem, side.state, move)) for side, move in pairs]
-        conditions = slopes([end.conditions(contact) for end in ends], steps)
+        changes = slopes([end.conditions(contact) for end in ends], steps)
         direct = slopes([upright(contact, friction) for friction in rubbed(part, sides)], steps)
-        count = linear.forces.shape[1]
-        tried, results, errors = [np.zeros((count + c * d, p))], list[Float](), list[Float]()
-        for _ in range(MOST):
-            unknowns, turned = tried[-1][:count], tried[-1][count:]
-            fixed_basis = linear.forces @ unknowns + direct
-            moved = delassus @ (fixed_basis + turned) + at_fixed_forces
-            place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame).reshape(-1, p)
-            relative, turns = np.moveaxis((conditions + of_conditions @ place).reshape(c, 2, d, p), 1, 0)
-            change = linear.correction(relative.reshape(-1, p), unknowns)
-            results.append(np.concatenate([unknowns - change, turns.reshape(-1, p)]))
-            error = np.abs(results[-1] - tried[-1]).max(axis=0, initial=0.0)
-            errors.append(error / derivative_scale(unknowns - change, largest, size))
-            if are_converged(errors):
-                force = np.einsum("cak,ckp->pca", contact.own_bases @ frame.T, fixed_basis.reshape(c, d, p))
-                changes = [array.reshape(c, -1, p) for array in (place, of_geometry @ place)]
-                states = [
-                    end.moved(*(t * array[..., k // 2] for array in changes)).state(contact, t * force[k // 2])
-                    for k, (end, t) in enumerate(zip(ends, steps, strict=True))
-                ]
-                reached = self._reached(part, fixed, states, sides, steps, moves)
-                return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
-            columns = [[[one[:, k] for one in some[-_MEMORY:]] for some in (tried, results)] for k in range(p)]
-            tried.append(np.column_stack([extrapolated(*both) for both in columns]))
-        raise Finger3dError(
-            f"at depth {moves[0].end.depth_mm:.4g} mm numbers have no derivatives: the normals of the object change "
-            "abruptly where it touches"
-        )
+        # all by displacements in the directions of an upright object, and by forces on the points that touch
+        of_moved = of_place @ sp.kron(sp.eye_array(c), frame.T)
+        relative = (2 * d * np.arange(c)[:, None] + np.arange(d)).ravel()
+        touches = np.flatnonzero(np.repeat(contact.status != OPEN, d))
+        turned, through = (relative + d)[touches], delassus[:, touches]
+        of_unknowns = linear.forces[touches].toarray()
+        force = direct[touches] + changes[turned] + of_moved[turned] @ at_fixed_forces
+        if not self.problem.model.object.is_flat:  # forces turn with the directions of their points
+            matrix = np.eye(len(touches)) - of_moved[turned] @ through
+            both = np.linalg.solve(matrix, np.hstack([of_unknowns, force]))
+            of_unknowns, force = np.hsplit(both, [of_unknowns.shape[1]])
+        weights = linear.weights @ of_moved[relative]
+        response = weights @ through
+        matrix = response @ of_unknowns + np.diag(linear.diagonal)
+        right = linear.weights @ changes[relative] + weights @ at_fixed_forces + response @ force
+        unknowns = -np.linalg.solve(matrix, right)
+        moved = through @ (of_unknowns @ unknowns + force) + at_fixed_forces
+        place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame)
+        means = (of_means @ place.reshape(-1, p)).reshape(c, -1, p)
+        force = (linear.forces @ unknowns + direct).reshape(c, d, p)
+        force = np.einsum("cak,ckp->cap", contact.own_bases @ frame.T, force)
+        states = [
+            end.moved(t * place[..., k // 2], t * means[..., k // 2]).state(contact, t * force[..., k // 2])
+            for k, (end, t) in enumerate(zip(ends, steps, strict=True))
+        ]
+        reached = self._reached(part, fixed, states, sides, steps, moves)
+        return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
 
 
 def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -21,13 +22,6 @@ from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import Move, vertical_frame
 
-_CHANGE, _ROUND_OFF, MOST = 1e-8, 1e-5, 60
-"""Change of the unknowns, over the largest, at which the iteration ends, that at which it may if it falls no further,
-and the largest number of iterations."""
-
-_NEGLIGIBLE = 1e-7
-"""Derivative by a parameter in units of its step, over the value, that errors are relative to at least."""
-
 
 @dataclass(frozen=True)
 class LinearisedIncrement:
@@ -38,13 +32,13 @@ class LinearisedIncrement:
     forces : (c d, k) sparse, P
     weights : (k, c d) sparse, D
     diagonal : (k,), E
-    factor : LU factors of A
+    matrix : (k, k), A
     """
 
     forces: Any
     weights: Any
     diagonal: Float
-    factor: tuple[Float, Float]
+    matrix: Float
 
     @classmethod
     def of(
@@ -81,23 +75,26 @@ class LinearisedIncrement:
         )
         active = ActiveSet.of(local, after.status[points], augmented[points])
         matrix = cast("Float", assemble_in_place(local, active, np.float64))
-        factor = lu_factor(matrix, overwrite_a=True, check_finite=False) if len(matrix) else (matrix, matrix)
         turned = turn[(points[:, None] * d + np.arange(d)).ravel()]
         diagonal = np.diagonal(active.with_turning(np.zeros((active.size, active.size))))
-        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, diagonal, factor)
+        return cls(turned.T @ active.force_matrix(), active.weight_matrix(rho[points]) @ turned, diagonal, matrix)
+
+    @cached_property
+    def _factor(self) -> Any:
+        return lu_factor(self.matrix, check_finite=False)
 
     def correction(self, displacement: Float, unknowns: Float) -> Float:
         """Return A^-1 (D w + E x) (k, p), for relative displacements w (c d, p) and unknowns x (k, p)."""
         if not len(unknowns):
             return unknowns
         right = self.weights @ displacement + self.diagonal[:, None] * unknowns
-        return np.asarray(lu_solve(self.factor, right))
+        return np.asarray(lu_solve(self._factor, right))
 
     def adjoint(self, gradient: Float) -> Float:
         """Return z (c d, g), D^T A^-T P^T times gradients (c d, g)."""
         if not self.weights.shape[0]:
             return np.zeros_like(gradient)
-        return np.asarray(self.weights.T @ lu_solve(self.factor, self.forces.T @ gradient, trans=1))
+        return np.asarray(self.weights.T @ lu_solve(self._factor, self.forces.T @ gradient, trans=1))
 
 
 def upright(state: ContactState, local: Float) -> Float:
@@ -130,18 +127,3 @@ def slopes(values: Sequence[Float], steps: Float) -> Float:
     """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
     array = np.reshape(values, (len(steps), -1))
     return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))
-
-
-def derivative_scale(derivatives: Float, value: float, size: Float) -> Float:
-    """Return what errors (p,) of derivatives (k, p) are relative to, for a largest value and steps (p,)."""
-    scale = np.maximum(np.abs(derivatives).max(axis=0, initial=0.0), _NEGLIGIBLE * value / size)
-    return np.where(scale > 0.0, scale, 1.0)
-
-
-def are_converged(errors: Sequence[Float]) -> bool:
-    """Whether an iteration with these relative errors (p,) ends: they are small, or round-off keeps them from falling.
-
-    Unknowns and directions are corrected in turn, so that errors fall every second time.
-    """
-    stay = errors[-1] > 0.5 * errors[-3] if len(errors) > 2 else np.zeros(len(errors[-1]), dtype=bool)
-    return bool((errors[-1] <= np.where(stay, _ROUND_OFF, _CHANGE)).all())

@@ -36,7 +36,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.variations import BodyChange, Side, Variation
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
@@ -75,24 +75,6 @@ class PathTangent:
         )
 
 
-class RestTangent(NamedTuple):
-    """Derivatives of the contact at rest by p parameters: gaps (p, c), and directions (p, c, 2, 2) of the points.
-
-    Directions change with the share of an elastic object in the compliance.
-    """
-
-    gap: Float
-    bases: Float
-
-    @classmethod
-    def of(cls, variations: Sequence[Variation], count: int) -> RestTangent:
-        """Return the derivatives at `count` points."""
-        both = [(one, at_rest(one.low), at_rest(one.high)) for one in variations]
-        gap = [one.difference(low.gap, high.gap) for one, low, high in both]
-        bases = [one.difference(low.own_bases, high.own_bases) for one, low, high in both]
-        return cls(np.reshape(gap, (-1, count)), np.reshape(bases, (-1, count, 2, 2)))
-
-
 class PlaceOnPath(NamedTuple):
     """Derivatives at a place on a path and at an event before, and those (2, p) of work and dissipation up to it.
 
@@ -105,37 +87,44 @@ class PlaceOnPath(NamedTuple):
     energies: Float
 
 
-def compliance_changes(problem: Problem, variations: Sequence[Variation]) -> list[tuple[Float, Float] | None]:
-    """Return the derivatives of compliance (c d, c d) and reading rows (g, c d) by p parameters.
+class Changes(NamedTuple):
+    """What p parameters change in the body, and in the contact at rest.
 
-    They are in the directions of an upright object; None where a parameter changes nothing in the body.
+    Attributes
+    ----------
+    compliance, readings : (p,) arrays (c d, c d) and (g, c d) in the directions of an upright object, or None
+    gap, friction : (p, c) and (p,)
+    bases : (p, c, 2, 2), directions of the points, which change with the share of an elastic object in the compliance
     """
-    compliance, active = problem.body.condensed.compliance, problem.system.active_dofs
-    size = problem.surface.points.size
-    forces = problem.inclusions.with_spring_forces(compliance, np.eye(len(compliance), len(active)))
-    of_finger, of_object = (_unknowns([getattr(one, name) for one in variations]) for name in ("body", "thing"))
 
-    def dense(rows: Float) -> Float:
-        out = np.zeros((len(rows), size))
-        out[:, active] = rows
-        return out
+    compliance: list[Float | None]
+    readings: list[Float | None]
+    gap: Float
+    friction: Float
+    bases: Float
 
-    def changes(one: Variation) -> tuple[Float, Float]:
-        moved, read = np.zeros((size, len(active))), np.zeros((len(problem.system.reading_rows), len(active)))
-        if one.body:
-            moved, read = one.body.of_points(problem, forces, one.body.compliance(of_finger) @ forces)
-        if one.thing:
-            moved[active] += one.thing.compliance(of_object)
-        return dense(moved), dense(read)
-
-    return [changes(one) if one.changes_compliance else None for one in variations]
-
-
-def _unknowns(changes: Sequence[BodyChange | None]) -> Float:
-    """Return all unknowns (N, r) of a body under forces of 1 N on each row; none if it does not change."""
-    changed = next((one for one in changes if one), None)
-    count = len(changed.condensed.compliance) if changed else 0
-    return np.ascontiguousarray(changed.condensed.unknowns(np.eye(count))) if changed else np.zeros((0, 0))
+    @classmethod
+    def of(cls, problem: Problem, variations: Sequence[Variation]) -> Changes:
+        """Return what variations of a problem change."""
+        count, readings = len(problem.surface.nodes), len(problem.system.reading_rows)
+        body, active = problem.body.condensed.compliance, problem.system.active_dofs
+        forces = problem.inclusions.with_spring_forces(body, np.eye(len(body), len(active)))
+        of_finger = changes_of_rows([one.body for one in variations], forces)
+        of_object = changes_of_rows([one.thing for one in variations], np.eye(len(active)))
+        compliance, rows = list[Float | None](), list[Float | None]()
+        for k, one in enumerate(variations):
+            both = np.zeros((2 * count + readings, 2 * count))
+            if one.body:
+                both[:, active] = np.concatenate(one.body.of_points(problem, forces, of_finger[..., k]))
+            both[np.ix_(active, active)] += of_object[..., k]
+            compliance.append(both[: 2 * count] if one.changes_compliance else None)
+            rows.append(both[2 * count :] if one.changes_compliance else None)
+        ends = [(at_rest(one.low), at_rest(one.high)) for one in variations]
+        pairs = list(zip(variations, ends, strict=True))
+        gap = [one.difference(low.gap, high.gap) for one, (low, high) in pairs]
+        bases = [one.difference(low.own_bases, high.own_bases) for one, (low, high) in pairs]
+        friction = [one.difference(*(end.model.friction.mu for end in one.ends)) for one in variations]
+        return cls(compliance, rows, np.array(gap), np.array(friction), np.array(bases))
 
 
 class PathTangents:
@@ -145,8 +134,7 @@ class PathTangents:
     ----------
     path : of the leg
     variations : of p parameters
-    changes : (p,), see `compliance_changes`
-    rest : derivatives of the contact at rest
+    changes : what the parameters change
     start : derivatives of the state at the start of the leg
     motion : (p, 2), those of the displacement of the object there
     leg : number of the leg
@@ -156,16 +144,16 @@ class PathTangents:
         self,
         path: ExactPath,
         variations: Sequence[Variation],
-        changes: Sequence[tuple[Float, Float] | None],
-        rest: RestTangent,
+        changes: Changes,
         start: PathTangent,
         motion: Float,
         leg: int,
     ) -> None:
-        self.path, self.variations, self._rest = path, variations, rest
+        self.path, self.variations, self._changes = path, variations, changes
         self._delassus = self._local(path.problem.delassus)
-        self._changes = [change and self._local(change[0].reshape(path.problem.delassus.shape)) for change in changes]
-        for change, turn in zip(self._changes, rest.bases, strict=True):
+        shape = path.problem.delassus.shape
+        self._compliance = [None if own is None else self._local(own.reshape(shape)) for own in changes.compliance]
+        for change, turn in zip(self._compliance, changes.bases, strict=True):
             if change is not None and turn.any():
                 change += self._turned(turn)
         # gaps close along the normal of the object, which is not that of the points if it is elastic
@@ -173,11 +161,6 @@ class PathTangents:
         self._closing[:, 0] = (
             path.problem.surface.average
             @ path.problem.placed(path.move.start).distance(path.problem.surface.samples)[1]
-        )
-        none = np.zeros((len(path.problem.system.reading_rows), path.bases[:, 0].size))
-        self._reading_changes = [none if change is None else change[1] for change in changes]
-        self._mu = np.array(
-            [one.difference(one.low.model.friction.mu, one.high.model.friction.mu) for one in variations]
         )
         legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
         ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
@@ -190,7 +173,7 @@ class PathTangents:
             at_end = [
                 one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
             ]
-            self._turned_weights = -path.count[:, None] * rest.bases[..., 1]
+            self._turned_weights = -path.count[:, None] * changes.bases[..., 1]
             begin = np.einsum("ca,pca->p", self._weights, start.force)
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
             self._force_slopes = begin, np.array(at_end)
@@ -225,10 +208,11 @@ class PathTangents:
         force = problem.upright_force(contact).ravel()
         motion, total = self.motion(place.tangent, share), energies + place.energies
         for k, one in enumerate(self.variations):
-            read = self._reading_changes[k] @ force
+            rows = self._changes.readings[k]
+            read = 0.0 if rows is None else rows @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
                 moved = place.tangent.changed(contact, k, t)
-                moved = replace(moved, bases=moved.own_bases + t * self._rest.bases[k])
+                moved = replace(moved, bases=moved.own_bases + t * self._changes.bases[k])
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
@@ -287,7 +271,7 @@ class PathTangents:
         mean = 0.5 * count * (before.state.force + event.state.force)
         change = 0.5 * count * (first.force + tangent.force)
         resultant = np.einsum("ca,cak->k", mean, path.bases)
-        turned = np.einsum("pca,cak->pk", change, path.bases) + np.einsum("ca,pcak->pk", mean, self._rest.bases)
+        turned = np.einsum("pca,cak->pk", change, path.bases) + np.einsum("ca,pcak->pk", mean, self._changes.bases)
         if "x" in path.problem.axes:  # the halves of a mirrored finger cancel
             resultant[0] = turned[:, 0] = 0.0
         along = (path.move.end.displacement - path.move.start.displacement)[:2]
@@ -319,7 +303,7 @@ class PathTangents:
         change, rate = (
             self._margin(old[points[0]], new[points[0]], event.state.force[points[0]], *both)
             for both in (
-                (found.force[:, points[0]], found.displacement[:, points[0]], self._mu),
+                (found.force[:, points[0]], found.displacement[:, points[0]], self._changes.friction),
                 (force[None, points[0]] / way, moved[None, points[0]] / way, np.zeros(1)),
             )
         )
@@ -346,7 +330,7 @@ class PathTangents:
         closing = self._closing[:, :, 1]
         amplitude = -last.displacement[:, point, 0] / closing[point, 0]
         moved = last.displacement + amplitude[:, None, None] * closing
-        moved[:, :, 1] += (event.amplitude - before.amplitude) * self._rest.bases[:, :, 1, 1]
+        moved[:, :, 1] += (event.amplitude - before.amplitude) * self._changes.bases[:, :, 1, 1]
         return replace(last, displacement=moved, amplitude=last.amplitude + amplitude)
 
     def _solved(self, piece: int, event: Event) -> PathTangent:
@@ -358,12 +342,12 @@ class PathTangents:
         slid = _relative(event.state)[:, 1] - _relative(self._events[piece].state)[:, 1]
         sign[slips] = np.sign(np.where(force[:, 1] != 0.0, force[:, 1], -slid))[slips]
         base = np.zeros((count, c, 2))
-        base[:, slips, 1] = (self._mu[:, None] * (sign * force[:, 0]))[:, slips]
+        base[:, slips, 1] = (self._changes.friction[:, None] * (sign * force[:, 0]))[:, slips]
         fixed = replace(last, amplitude=np.zeros(count))
         free = -np.einsum("cak,pk->pca", self._closing, self.motion(fixed, share))
-        free[:, :, 0] += self._rest.gap
-        free[:, :, 1] -= self._rest.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
-        for k, change in enumerate(self._changes):
+        free[:, :, 0] += self._changes.gap
+        free[:, :, 1] -= self._changes.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
+        for k, change in enumerate(self._compliance):
             if change is not None:
                 free[k] += (change @ force.ravel()).reshape(c, 2)
         free += (base.reshape(count, -1) @ self._delassus.T).reshape(base.shape)

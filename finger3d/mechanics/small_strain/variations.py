@@ -24,13 +24,12 @@ from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, res
 from finger3d.mechanics.discretise.build import bars_of, mesh_part, rows_of_readings, widened
 from finger3d.mechanics.discretise.elastic_object import (
     assembled_object,
-    condensed_object,
     law_of_object,
     object_mesh,
 )
 from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object, with_points_of
-from finger3d.mechanics.discretise.problem import Problem, object_share
+from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share, under_pressure
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.reading import MeshedBody
@@ -43,6 +42,12 @@ _IN_BODY = ("design", "material", "parts", *_READINGS)
 _CHANGES = (*_IN_BODY, "friction", "legs", "object", "object_compliance", "inclusions", "relaxation")
 """What a parameter may change in a model, in the body and elsewhere."""
 
+
+_MANY = 0.5
+"""Number of forces, over that of rows, from which the derivative of the whole compliance takes less time."""
+
+_AT_ONCE = 32
+"""Forces that a body is solved for at once, which costs less than one after another."""
 
 _OTHER_ELEMENTS = "it switches between elements for compressible and nearly incompressible materials"
 
@@ -213,13 +218,16 @@ class VariedBody:
     def _pattern(self) -> Pattern:
         return Pattern.of(self.problem.mesh, self.problem.body.elastic.mixed)
 
+    @property
+    def _object(self) -> CondensedObject:
+        assert self.problem.system.object_body is not None
+        return self.problem.system.object_body
+
     @cached_property
-    def _object(self) -> _ElasticObject:
-        problem, own = self.problem, self.problem.model.object_compliance
-        assert own is not None
-        mesh, whole = object_mesh(problem, own, problem.model.first_contact.contact_box, QUIET)
-        pattern = Pattern.of(mesh, law_of_object(problem.model, own).mixed)
-        return _ElasticObject(mesh, whole, condensed_object(problem, own, mesh, whole), pattern)
+    def _pattern_of_object(self) -> Pattern:
+        model = self.problem.model
+        assert model.object_compliance is not None
+        return Pattern.of(self._object.mesh, law_of_object(model, model.object_compliance).mixed)
 
     @cached_property
     def _object_unknowns(self) -> Float:
@@ -254,8 +262,7 @@ class VariedBody:
         assert system.object_share is not None
         pressed = np.zeros(problem.surface.points.shape)
         pressed[:, 0] = problem.surface.area
-        normal = [one[:, :1, :, :1] for one in (system.delassus, compliance)]
-        both, slopes = (normal[0] - normal[1], normal[1]), [np.zeros_like(pressed), np.zeros_like(pressed)]
+        slopes = np.zeros((2, *pressed.shape))
         if change is not None:
             forces = problem.inclusions.with_spring_forces(
                 problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
@@ -264,14 +271,10 @@ class VariedBody:
             slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
         if thing is not None:
             slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
-        soft = [one[:, 0, :, 0] @ pressed[:, 0] for one in both]
-        growth = [
-            np.divide(by[:, 0], of, out=np.zeros(len(of)), where=of > 0.0) for by, of in zip(slopes, soft, strict=True)
-        ]
         out = []
         for end, t in zip(ends, (-step, step), strict=True):
-            at_end = [one * (1.0 + t * by)[:, None, None, None] for one, by in zip(both, growth, strict=True)]
-            share, points = object_share(end.surface, *at_end), end.system.points
+            both = [under_pressure(end.surface, one) for one in (system.delassus - compliance, compliance)]
+            share, points = object_share(*(both + t * slopes[..., 0])), end.system.points
             of_points = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
             points = replace(points, compliance=of_points)
             out.append(replace(end, system=replace(end.system, object_share=share, points=points)))
@@ -342,7 +345,7 @@ class VariedBody:
     def _assembled_object(self, end: Problem) -> _Matrices:
         """Return the matrices of an elastic object by a model, whose mesh moves with the dimensions of both bodies."""
         model, other = self.problem.model, end.model
-        own, thing, (mesh, whole, _, pattern) = model.object_compliance, other.object_compliance, self._object
+        own, thing, mesh = model.object_compliance, other.object_compliance, self._object.mesh
         assert own is not None
         assert thing is not None
         if law_of_object(other, thing).mixed != law_of_object(model, own).mixed:
@@ -350,7 +353,7 @@ class VariedBody:
         if (other.design, other.object, thing.height_mm) != (model.design, model.object, own.height_mm):
             zone = model.first_contact.contact_box
             mesh = stretched_object(mesh, model, other) or with_points_of(mesh, object_mesh(end, thing, zone, QUIET)[0])
-        matrix, rows = assembled_object(end, thing, mesh, whole, pattern)
+        matrix, rows = assembled_object(end, thing, mesh, self._object.is_whole, self._pattern_of_object)
         return matrix.upper, widened(rows, matrix.upper.shape[0])
 
 
@@ -362,20 +365,23 @@ class _Assembled(NamedTuple):
     bars: EmbeddedBars | None
 
 
-class _ElasticObject(NamedTuple):
-    """Mesh of an elastic object, whether it is whole, the condensed body, and the pattern of its stiffness."""
-
-    mesh: Mesh
-    is_whole: bool
-    condensed: Condensation
-    pattern: Pattern
-
-
 def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
-    """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them."""
-    moved = np.zeros((*forces.shape, len(changes)))
-    changed = [(k, one) for k, one in enumerate(changes) if one]
-    unknowns = changed[0][1].condensed.unknowns(forces) if changed else forces
-    for k, one in changed:
-        moved[..., k] = one.moved(forces, unknowns)
+    """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them.
+
+    For many forces the whole compliance is differentiated, which needs no solution for each of them.
+    """
+    moved, changed = np.zeros((*forces.shape, len(changes))), [(k, one) for k, one in enumerate(changes) if one]
+    if not changed:
+        return moved
+    condensed = changed[0][1].condensed
+    if forces.shape[1] > _MANY * len(forces):
+        unknowns = np.ascontiguousarray(condensed.unknowns(np.eye(len(forces))))
+        for k, one in changed:
+            moved[..., k] = one.compliance(unknowns) @ forces
+        return moved
+    for start in range(0, forces.shape[1], _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        unknowns = condensed.unknowns(forces[:, some])
+        for k, one in changed:
+            moved[:, some, k] = one.moved(forces[:, some], unknowns)
     return moved
