@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import MeshOptions
+from finger3d.mechanics.march.sensitivity import held_normals
+from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.mechanics.small_strain.variations import VariedBody
 from tests.differences import STEP, differentiated
-from tests.models import fig9
+from tests.models import block, ended, fig9
 from tests.test_mechanics_small_strain_path_tangents import PRESS, READINGS
+from tests.viscous_cases import TWO
 
 
 def test_forces_are_proportional_to_the_modulus_and_places_are_not() -> None:
@@ -55,3 +60,15 @@ def test_what_changes_the_mesh_and_what_increments_define_is_refused() -> None:
         VariedBody(problem).variation(model, other, STEP)
     with pytest.raises(Finger3dError, match="rule"):
         differentiated(replace(problem, model=replace(model, rule="paper")), [])
+
+
+@pytest.mark.parametrize("relaxation", [None, Relaxation(TWO, False)], ids=["elastic", "relaxing"])
+def test_normals_that_were_held_are_counted(relaxation: Relaxation | None) -> None:
+    problem, last = ended(block(relaxation=relaxation, legs=(Leg(0.3, steps=2, duration_s=1.0),)))
+    assert held_normals(problem, last) == 0
+    contact = last.meshed_state.contact
+    touching = np.flatnonzero(contact.force[:, 0] > 0.0)[:2]
+    bases, (c, s) = contact.own_bases.copy(), (math.cos(0.01), math.sin(0.01))
+    bases[touching] = bases[touching] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(last.meshed_state, contact=replace(contact, bases=bases))
+    assert held_normals(problem, replace(last, meshed_state=turned)) == 2

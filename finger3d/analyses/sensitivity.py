@@ -17,7 +17,7 @@ from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import stations
-from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, tangents
+from finger3d.mechanics.march.sensitivity import Numbers, derivatives, held_normals, refusal, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
@@ -69,6 +69,7 @@ class Sensitivity:
     derivatives : of each number by each key, per unit of the key, as the key grows
     falling : the same as the key falls, for those that differ, since the press ends at a kink
     without : keys of the scene that have no derivative, since they change the mesh or the object
+    held_normals : points in contact whose normals are held fixed at an edge of the object; derivatives are approximate
     """
 
     title: str
@@ -78,6 +79,7 @@ class Sensitivity:
     derivatives: Mapping[str, Mapping[str, float]]
     falling: Mapping[str, Mapping[str, float]]
     without: tuple[str, ...]
+    held_normals: int = 0
 
     def change(self, key: str) -> float:
         """Return the change of a key that effects are shown for: its tolerance, or 1 % of its value."""
@@ -93,6 +95,7 @@ class Sensitivity:
             "derivatives": {name: dict(row) for name, row in self.derivatives.items()},
             "derivatives_falling": {name: dict(row) for name, row in self.falling.items()},
             "without_derivative": list(self.without),
+            "held_normals": self.held_normals,
         }
 
     def rows(self) -> list[Tree]:
@@ -166,7 +169,7 @@ def sensitivity(
     falling = growing = derivatives(step, variations, both[0])
     if both[1] is not both[0]:
         falling, growing = (derivatives(step, variations, sides, way) for sides, way in zip(both, (-1, 1), strict=True))
-    found = _result(scene, keys, numbers, (falling, growing))
+    found = replace(_result(scene, keys, numbers, (falling, growing)), held_normals=held_normals(problem, step))
     if out is not None:
         _write(Path(out), found)
     return found

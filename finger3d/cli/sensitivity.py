@@ -52,6 +52,11 @@ def sensitivity(
         print("the press ends at a kink, so that some derivatives differ as the key grows and as it falls")
     if found.without:
         print(f"keys without a derivative, since they change mesh, object or symmetry: {', '.join(found.without)}")
+    if found.held_normals:
+        print(
+            f"approximate: normals of {found.held_normals} contact points are held fixed at an edge of the object; "
+            "a smaller mesh.size_mm resolves it"
+        )
     print(f"results: {out}")
 
 

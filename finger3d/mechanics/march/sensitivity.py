@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import stations
@@ -31,6 +32,9 @@ from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
 """Numbers of an increment that have no derivative."""
 
+_TURNED = 1e-6
+"""Angle (rad) between the normal of a point and that of the object there above which it was held fixed."""
+
 _NO_FRICTION = 1e-8
 """Friction of a point, over the largest, that is none."""
 
@@ -43,6 +47,21 @@ def refusal(model: Model) -> str:
     if model.rule != "projection":
         return 'derivatives need contact.rule = "projection"'
     return ""
+
+
+def held_normals(problem: Problem, step: StepResult) -> int:
+    """Return how many points in contact have normals that an increment held fixed at an edge of the object.
+
+    Derivatives take the normals of the object there, and are approximate.
+    """
+    state, contact = step.meshed_state, step.meshed_state.contact
+    if step.path is not None or problem.model.finite_strain or problem.model.object.is_flat:
+        return 0
+    displacement = getattr(state.body, "displacement", state.body)  # a body that relaxes has internal variables, too
+    distance, share = problem.placed(step.target).distance, problem.system.object_share
+    geometry = contact_geometry(distance, problem.surface, displacement, problem.axes, share)
+    apart = np.linalg.norm(geometry.bases[:, 0] - contact.own_bases[:, 0], axis=1)
+    return int(((apart > _TURNED) & (contact.force[:, 0] > 0.0)).sum())
 
 
 Tangents: TypeAlias = Iterator[tuple[StepResult, Sides, Sides]]
