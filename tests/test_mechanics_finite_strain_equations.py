@@ -55,7 +55,7 @@ def test_the_tangent_is_the_derivative_of_the_forces_out_of_balance(
     _, found, change = increment.contact(now, state.contact.force, linearisation, eliminated.displacement)
     assert found.outcome.ok
     assert change is not None
-    after = increment.moved(now, eliminated.unknowns(change))
+    after = increment.moved(now, eliminated.unknowns(change), found.state.force)
     size = np.abs(state.body.unknowns).max()
     assert np.abs(after.x - state.body.unknowns).max() < 0.02 * 0.001 * size
 
