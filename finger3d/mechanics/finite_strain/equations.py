@@ -51,7 +51,7 @@ _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
 
 _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
-"""Fractions of a step tried in the line search, until no cell is inverted."""
+"""Fractions of a step tried in the line search."""
 
 
 @dataclass(frozen=True)

@@ -94,13 +94,13 @@ class FiniteIncrement(IncrementEquations):
         is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors == self.most_factors:
+                if factors >= self.most_factors:
                     break
                 linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
             solution, after = increment._advance(now, force, linearisation)
             spent += solution.iterations
             if after is None:
-                if factors and not is_damped:
+                if factors and not is_damped:  # a tangent near a singular one, under which contact need not settle
                     linearisation, factors, is_damped = self.linearise(now, force, _CONVEX), factors + 1, True
                     continue
                 if factors:
