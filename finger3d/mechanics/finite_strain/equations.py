@@ -51,7 +51,7 @@ _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
 
 _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
-"""Fractions of a step tried in the line search, until no cell is inverted."""
+"""Fractions of a step tried in the line search."""
 
 
 @dataclass(frozen=True)
@@ -178,22 +178,39 @@ class IncrementEquations:
         contact = contact_of(problem, problem.surface, displacement(problem.mesh, x), self.move.end)
         return Configuration(x, self.body.internal_forces(x), contact)
 
-    def moved(self, now: Configuration, step: Float) -> Configuration:
-        """Return the configuration after the longest fraction of a step that inverts no cell.
+    def moved(self, now: Configuration, step: Float, force: Float) -> Configuration:
+        """Return the configuration after a step (N,), under contact forces (c, d) N.
+
+        A step is at most as long as the largest one.  One that would be longer and leads up in energy, as it does where
+        the tangent has a negative eigenvalue beyond a limit point of the path, is reversed.  It is halved where it
+        inverts a cell, and where the energy rises more steeply at its end than it falls at its beginning (Matthies and
+        Strang 1979).
 
         Raises
         ------
         InvertedError
             If even the shortest fraction inverts a cell.
         """
-        largest = float(np.abs(step[: self.problem.mesh.points.size]).max())
-        whole = min(1.0, self._largest_step / largest) if largest else 1.0
+        n = self.problem.mesh.points.size
+
+        def slope(at: Configuration) -> float:
+            return float(step[:n] @ self.out_of_balance(at, force)[:n])
+
+        largest = float(np.abs(step[:n]).max())
+        whole, fall = min(1.0, self._largest_step / largest) if largest else 1.0, -slope(now)
+        if fall < 0.0:
+            step, fall = (-step, -fall) if whole < 1.0 else (step, math.inf)
+        after = None
         for length in _STEP_LENGTHS:
             try:
-                return self.at(now.x + whole * length * step)
+                after = self.at(now.x + whole * length * step)
             except InvertedError:
                 continue
-        raise InvertedError
+            if slope(after) <= fall:
+                break
+        if after is None:
+            raise InvertedError
+        return after
 
     def linearise(self, now: Configuration, force: Float, damping: float = 0.0) -> Linearisation:
         """Factor the tangent under contact forces (c, d), and keep the factor for later increments.

@@ -37,6 +37,9 @@ _ASTRAY, _DIVERGED = 0.1, 1.0
 _EXACT = 1e-10
 """Relative error of a prescribed force at which the contact of the linearised body is solved."""
 
+_CONVEX = 0.05
+"""Linear stiffness added to a tangent under which contact has no solution."""
+
 _DAMPED_FACTORS = 40
 """Largest number of damped iterations; twice as many where the body may snap."""
 
@@ -88,14 +91,18 @@ class FiniteIncrement(IncrementEquations):
         first = increment, now, force = self, *self.initial(guess)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
         linearisation, factors, spent, error = None if is_new else self.last_linearisation(), 0, 0, math.inf
+        is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors == self.most_factors:
+                if factors >= self.most_factors:
                     break
-                linearisation, factors = increment.linearise(now, force), factors + 1
+                linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
             solution, after = increment._advance(now, force, linearisation)
             spent += solution.iterations
             if after is None:
+                if factors and not is_damped:  # a tangent near a singular one, under which contact need not settle
+                    linearisation, factors, is_damped = self.linearise(now, force, _CONVEX), factors + 1, True
+                    continue
                 if factors:
                     break
                 linearisation, (increment, now, force), error = None, first, math.inf
@@ -159,7 +166,7 @@ class FiniteIncrement(IncrementEquations):
         if not solution.outcome.ok or not np.isfinite(step).all():
             return solution, None
         try:
-            return solution, (increment, increment.moved(now, step))
+            return solution, (increment, increment.moved(now, step, solution.state.force))
         except InvertedError:
             return solution, None
 

@@ -87,7 +87,7 @@ class _Trial:
         if not np.isfinite(step).all():
             return False
         try:
-            self.now = self.equations.moved(self.now, step)
+            self.now = self.equations.moved(self.now, step, self.solution.state.force)
         except InvertedError:
             return False
         self.force, self.last_error = self.solution.state.force, self.error
