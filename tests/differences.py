@@ -97,10 +97,10 @@ def differentiated(problem: Problem, variations: Sequence[Variation]) -> tuple[l
 
 
 def assert_equal_to_differences(
-    problem: Problem, ways: Mapping[str, Callable[[float], Model]], tolerance: float = 1e-6, step: float = DIFFERENCE
+    problem: Problem, ways: Mapping[str, Callable[[float], Model]], tolerance: float = 1e-6, step: float | None = None
 ) -> None:
     """Compare all derivatives with central differences of presses, whose bodies are condensed again if they change."""
-    h = step if problem.model.object.is_flat else max(step, 10.0 * DIFFERENCE)  # curved contact is solved to 1e-9
+    h = step or (DIFFERENCE if problem.model.object.is_flat else 10.0 * DIFFERENCE)  # curved contact: solved to 1e-9
     body = VariedBody(problem)
     variations = [body.variation(way(-STEP), way(STEP), STEP) for way in ways.values()]
     steps, slopes = differentiated(problem, variations)

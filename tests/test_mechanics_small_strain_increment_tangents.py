@@ -18,7 +18,7 @@ from finger3d.mechanics.march.sensitivity import derivatives, tangents
 from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.small_strain import variations
+from finger3d.mechanics.small_strain import linear_contact, variations
 from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.objects import Cylinder, Plane, Sphere
 from finger3d.progress import QUIET
@@ -127,7 +127,9 @@ def test_derivatives_beside_an_elastic_ball(monkeypatch: pytest.MonkeyPatch) -> 
 
     for module in (elastic_object, variations):
         monkeypatch.setattr(module, "object_mesh", same_cells)
-    assert_equal_to_differences(build(model), parameters(model) | other_parameters(model))
+    # with a long step a sample of the finger may cross the edge of a facet of the ball, where the trace jumps by 1e-11
+    monkeypatch.setattr(linear_contact, "_TARGET", 1e-12)
+    assert_equal_to_differences(build(model), parameters(model) | other_parameters(model), step=1e-6)
 
 
 @pytest.mark.parametrize("branch", ["keep", "paper"])
