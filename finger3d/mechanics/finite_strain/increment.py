@@ -101,7 +101,7 @@ class FiniteIncrement(IncrementEquations):
             spent += solution.iterations
             if after is None:
                 if factors and not is_damped:  # a tangent near a singular one, under which contact need not settle
-                    linearisation, factors, is_damped = self.linearise(now, force, _CONVEX), factors + 1, True
+                    linearisation, factors, is_damped = increment.linearise(now, force, _CONVEX), factors + 1, True
                     continue
                 if factors:
                     break
