@@ -19,7 +19,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
 from finger3d.objects import MeshObject, ObjectPose, Sphere
 from tests.bodies import box
-from tests.models import swept_fig9
+from tests.models import ended, small_section, swept_fig9
 
 
 def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
@@ -114,3 +114,13 @@ def test_without_contact_the_force_is_0_and_not_minus_0() -> None:
         ObjectPose(0.1), state, state, (0.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
     )
     assert str(measure(points, step)["normal_force_N"]) == "0.0"
+
+
+def test_a_point_at_the_lowest_place_of_the_object_is_on_neither_side_of_it() -> None:
+    problem, step = ended(small_section(legs=(Leg(0.2, steps=2, slide_x_mm=0.1),)))
+    friction = problem.points.friction(step.state.force)[:, 0]
+    at, most = problem.points.points[:, 0], int(np.argmax(np.abs(friction)))
+    expected = float(friction @ np.sign(at - at[most]))
+    for off in (-1e-6, 0.0, 1e-6):  # by as much as a difference of a dimension moves a point
+        numbers = measure(problem.points, replace(step, lowest=(at[most] + off, 0.0)))
+        assert numbers["outward_friction_x_N"] == pytest.approx(expected, rel=1e-12)

@@ -168,7 +168,7 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
     """
     c, d = last.force.shape
     whole = problem.symmetry.unfold(last)
-    bases, points = np.asarray(whole.bases), problem.points.points
+    bases = np.asarray(whole.bases)
     signs = problem.symmetry.mirror_sign * problem.symmetry.multiplicity[:, None]
     arms = np.pad(problem.surface.centroids, ((0, 0), (0, 3 - d)))
 
@@ -183,10 +183,10 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
 
     found = {}
     for k, axis in enumerate("xyz"[:d]):
-        along = np.broadcast_to(np.eye(d)[k], (len(points), d))
+        along = np.broadcast_to(np.eye(d)[k], (len(bases), d))
         found[f"force_{axis}_N"] = of_weights(along, tangential=False)
         if axis != "y":
-            outward = np.sign(points[:, k] - step.lowest[k // 2])[:, None] * along
+            outward = problem.points.sides_of(step.lowest)[:, [k // 2]] * along
             found[f"tangential_force_{axis}_N"] = of_weights(along, tangential=True)
             found[f"outward_friction_{axis}_N"] = of_weights(outward, tangential=True)
     for k, factor in enumerate(problem.symmetry.total_moment(np.ones(3))):

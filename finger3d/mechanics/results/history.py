@@ -26,6 +26,10 @@ _READINGS = ("gauges", "markers", "taxels", "other_readings")
 _ON_LINE = 1e-9
 """Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
 
+_AT_LOWEST = 1e-4
+"""Distance (mm) from the object's lowest place within which a point is at it, on neither side: round-off of meshers, and
+what a difference of a dimension or a pose moves it by."""
+
 
 @dataclass(frozen=True)
 class ContactPoints:
@@ -124,6 +128,11 @@ class ContactPoints:
         out[j[inner[i] & inside[j]]] = True
         return out
 
+    def sides_of(self, place: tuple[float, float]) -> Float:
+        """Return on which sides (m, 2) of a place (x, z), mm, the points are: -1, 1, or 0 at the place."""
+        apart = self.points[:, ::2] - place
+        return np.where(np.abs(apart) > _AT_LOWEST, np.sign(apart), 0.0)
+
     def to_global(self, local: Float) -> Float:
         """Vectors (m, 3) in x, y, z from vectors (m, d) in the frame."""
         out = np.zeros((len(local), 3))
@@ -221,9 +230,7 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
     points = points.with_basis_of(state)
     world = points.to_global(state.force)
     friction = points.friction(state.force)
-    x, z = points.points[:, 0], points.points[:, 2]
-    outward_x = friction[:, 0] * np.sign(x - step.lowest[0])
-    outward_z = friction[:, 2] * np.sign(z - step.lowest[1])
+    outward = (friction[:, ::2] * points.sides_of(step.lowest)).sum(axis=0)
     numbers: Tree = {
         "depth_mm": target.depth_mm,
         "slide_x_mm": target.slide_x_mm,
@@ -236,8 +243,7 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
         "friction_sum_N": float(np.linalg.norm(friction, axis=1).sum()),
         **{f"force_{axis}_N": float(force) for axis, force in zip("xyz", world.sum(axis=0), strict=True)},
         **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
-        "outward_friction_x_N": float(outward_x.sum()),
-        "outward_friction_z_N": float(outward_z.sum()),
+        **{f"outward_friction_{axis}_N": float(force) for axis, force in zip("xz", outward, strict=True)},
         **sizes,
     }
     others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
