@@ -16,8 +16,8 @@ def made(d: int) -> tuple[Mesh, BoundarySurface, np.ndarray]:
     return mesh, surface(mesh, "y+"), np.random.default_rng(d).normal(0.0, 0.05, mesh.points.shape)
 
 
-def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray) -> DeformedContact:
-    """With a tilted plane, whose normal does not turn."""
+def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray, share: float | None = None) -> DeformedContact:
+    """With a tilted plane, whose normal does not turn; it is elastic if it has a share of the compliance."""
     normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
     normal = normal / np.linalg.norm(normal)
     at = face.samples + face.interpolate @ u
@@ -28,6 +28,7 @@ def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray) -> DeformedContact
         gap=at @ normal + 1.2,
         normal=np.broadcast_to(normal, at.shape),
         axes=(),
+        object_share=None if share is None else np.full(len(face.nodes), share),
     )
 
 
@@ -38,6 +39,21 @@ def test_rows_are_the_derivative_of_the_gap(d: int) -> None:
     h = 1e-6
     slope = (contact(mesh, face, u + h * way).gap - contact(mesh, face, u - h * way).gap) / (2 * h)
     rows = contact(mesh, face, u).rows[::d]
+    assert rows @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_gap_rows_are_the_derivative_of_the_gap_along_a_normal_that_turns_with_the_body(d: int) -> None:
+    mesh, face, u = made(d)
+    random = np.random.default_rng(7)
+    way, moved, h = random.normal(size=u.shape), random.normal(size=(len(face.nodes), d)), 1e-6
+
+    def gap(u: np.ndarray) -> np.ndarray:
+        there = contact(mesh, face, u, share=0.4)
+        return there.gap + np.einsum("ck,ck->c", there.bases[:, 0], moved)
+
+    slope = (gap(u + h * way) - gap(u - h * way)) / (2 * h)
+    rows = contact(mesh, face, u, share=0.4).gap_rows(moved)
     assert rows @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
 
 
@@ -55,11 +71,9 @@ def test_softening_is_the_derivative_of_the_rows(d: int) -> None:
 
 
 @pytest.mark.parametrize("d", [2, 3])
-def test_displacements_and_nodal_forces_are_the_rows_and_their_transpose(d: int) -> None:
+def test_nodal_forces_are_those_of_the_transposed_rows(d: int) -> None:
     mesh, face, u = made(d)
-    random, at = np.random.default_rng(9), contact(mesh, face, u)
-    way, force = random.normal(size=u.shape), random.normal(size=(len(face.nodes), d))
-    assert at.displacements(way).ravel() == pytest.approx(at.rows @ way.ravel(), rel=1e-12, abs=1e-13)
+    at, force = contact(mesh, face, u), np.random.default_rng(9).normal(size=(len(face.nodes), d))
     assert at.nodal_forces(force).ravel() == pytest.approx(at.rows.T @ force.ravel(), rel=1e-12, abs=1e-13)
 
 

@@ -119,12 +119,13 @@ class _ShortProducts(ContactProblem):
 def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
     """Return the matrix (k, k) of an active set, as `finger3d.contact.newton.assemble` does.
 
-    The Delassus operator between the points that touch is overwritten: rows are combined to W P first (the operator is
-    symmetric, so these are the columns transposed), then columns are weighted, and the transpose is returned.
+    The transposed Delassus operator between the points that touch is overwritten: rows are combined to (W P)^T first,
+    then columns are weighted, and the transpose is returned.  A definite operator is symmetric.
     """
     slip_dofs = active.slip_dofs
     touched = np.concatenate([active.active_dofs, *slip_dofs])
-    matrix = _submatrix(problem, touched, precision)
+    transposed = problem.delassus if problem.is_definite else problem.delassus.T
+    matrix = _submatrix(transposed, touched, precision)
     rho, mu_e, t, a = (  # an operand in double precision would make all of it double
         cast(Array, x.astype(precision, copy=False))
         for x in (problem.augmentation.ravel(), active.slip_force_direction, active.tangent, active.turning)
@@ -216,12 +217,12 @@ def _deepest(gap: Float, closing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return gap <= np.quantile(gap[closing], _DEEP) if closing.any() else closing
 
 
-def _submatrix(problem: ContactProblem, dofs: NDArray[np.int64], precision: Precision) -> Array:
+def _submatrix(delassus: Float, dofs: NDArray[np.int64], precision: Precision) -> Array:
     """Return the Delassus operator (k, k) between directions (k,); some rows at a time stay in the cache."""
     submatrix = np.empty((len(dofs), len(dofs)), precision)
     for first in range(0, len(dofs), _ROWS_IN_CACHE):
         part = slice(first, first + _ROWS_IN_CACHE)
-        submatrix[part] = problem.delassus[dofs[part]].take(dofs, axis=1)
+        submatrix[part] = delassus[dofs[part]].take(dofs, axis=1)
     return submatrix
 
 
@@ -244,7 +245,7 @@ def _normal_contact(
     open_gap = problem.gap(force)
     for _ in range(_ACTIVE_SETS):
         points = np.flatnonzero(touches)
-        solve_normal: Solve = lu_solver(_submatrix(problem, points * d, _PRECISION[d]), reuse=d > 2)
+        solve_normal: Solve = lu_solver(_submatrix(problem.delassus, points * d, _PRECISION[d]), reuse=d > 2)
         force[:] = 0.0
         penetration: Array = (-open_gap[points]).astype(_PRECISION[d])
         force[points, 0] = normal = solve_normal(penetration)
@@ -275,7 +276,7 @@ class _ActivePoints(NamedTuple):
     def of(cls, problem: ContactProblem, points: NDArray[np.int64], solve_normal: Solve) -> _ActivePoints:
         d, k = problem.free_motion.shape[1], len(points)
         dofs = (np.arange(d)[:, None] + points * d).ravel()
-        block = _submatrix(problem, dofs, _PRECISION[d])
+        block = _submatrix(problem.delassus, dofs, _PRECISION[d])
         free, rho = (a.ravel()[dofs].astype(block.dtype) for a in (problem.free_motion, problem.augmentation))
         coupling, tangential = block[:k, k:], block[k:, k:]
         rho = rho[k:]

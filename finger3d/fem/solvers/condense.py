@@ -54,7 +54,7 @@ class Condensation:
         freeze_arrays(self)
 
     def unknowns(self, force: Float) -> Float:
-        """Return all unknowns (N, ...) under row forces (r, ...), N: displacements in mm, then pressures.
+        """Return all unknowns (N, ...) under forces (k, ...), N, on the first rows: displacements (mm), then pressures.
 
         Several forces in the columns of an array (r, k) cost less than one after another.
         """
@@ -72,7 +72,9 @@ class Condensation:
         return Elimination(scaled.reshape(-1, *load.shape[1:]), self, eliminated)
 
     def _substituted(self, eliminated: Float | None, force: Float) -> Float:
-        columns = self._row_scales[:, None] * force.reshape(len(self._row_scales), -1)
+        columns = force.reshape(len(force), -1)
+        columns = np.vstack([columns, np.zeros((len(self._row_scales) - len(force), columns.shape[1]))])
+        columns *= self._row_scales[:, None]
         whole = np.zeros((self.rows.shape[1], columns.shape[1]), order="F")  # one field after another
         whole[self._free] = self._factor.substituted(eliminated, columns) / self._scale
         return whole.reshape(-1, *force.shape[1:], order="A")
@@ -105,7 +107,7 @@ class Elimination:
         freeze_arrays(self)
 
     def unknowns(self, force: Float) -> Float:
-        """Return all unknowns (N, ...) under the loads and row forces (r, ...), N."""
+        """Return all unknowns (N, ...) under the loads and forces (k, ...), N, on the first rows."""
         return self._body._substituted(self._eliminated, force)
 
 

@@ -45,11 +45,6 @@ class _Area:
         turned = [unit] if u.shape[1] == 2 else [np.cross(moved[1], unit), np.cross(unit, moved[0])]
         return cls(face, length / initial, initial, moved, turned)
 
-    def change(self, u: Float) -> Float:
-        """Return the change (q,) of the ratio with displacements u (n, d)."""
-        total = sum(np.einsum("qk,qk->q", t, x @ u) for t, x in zip(self.turned, self.face.along, strict=True))
-        return np.asarray(total / self.initial)
-
     def transposed(self, weights: Float) -> Float:
         """Return the sum (n, d) of the derivatives with weights (q,)."""
         scaled = (weights / self.initial)[:, None]
@@ -61,30 +56,31 @@ class _Area:
         turned = np.concatenate(self.turned, axis=1) / self.initial[:, None]
         return sp.csr_matrix(block_diagonal(turned[:, None, :]) @ self.face.vector_slopes)
 
+    @cached_property
+    def normal_slopes(self) -> Float:
+        """Derivative (q, d, (d - 1) d) of the area times its normal by the tangents."""
+        d = self.moved[0].shape[1]
+        if d == 2:
+            return np.broadcast_to(np.array([[0.0, 1.0], [-1.0, 0.0]]), (len(self.ratio), d, d))
+        one, other = self.moved
+        turns = np.cross(np.eye(d), other[:, None, :]), np.cross(one[:, None, :], np.eye(d))
+        return np.asarray(np.swapaxes(np.concatenate(turns, axis=1), 1, 2))
+
     def second_derivative(self, weights: Float) -> sp.csr_matrix:
         """Return the sum (n d, n d) of the second derivatives with weights (q,).
 
-        The area is the length of a vector v of the tangents t: the tangent in 2D, the tangents' cross product in 3D.
-        With C = dv/dt and e = v / |v| its second derivative by the tangents is ``C^T (I - e e^T) C / |v| + e v''``.
+        The area is the length of its normal v.  With ``C = dv/dt`` by the tangents t, and ``e = v / |v|``, its second
+        derivative by the tangents is ``C^T (I - e e^T) C / |v| + e v''``.
         """
-        d, length = self.moved[0].shape[1], self.ratio * self.initial
-        identity = np.eye(d)
-        if d == 2:
-            unit, by_tangents = self.turned[0], np.broadcast_to(identity, (len(length), d, d))
-        else:
-            one, other = self.moved
-            unit = np.cross(one, other) / length[:, None]
-            turns = np.cross(identity, other[:, None, :]), np.cross(one[:, None, :], identity)
-            by_tangents = np.swapaxes(np.concatenate(turns, axis=1), 1, 2)
-        across = identity - unit[:, :, None] * unit[:, None, :]
-        second = np.swapaxes(by_tangents, 1, 2) @ across @ by_tangents / length[:, None, None]
+        unit, slopes, d = outward_normals(self.moved), self.normal_slopes, self.moved[0].shape[1]
+        second = np.swapaxes(slopes, 1, 2) @ _across(unit) @ slopes / (self.ratio * self.initial)[:, None, None]
         if d == 3:
-            twist = np.cross(identity, unit[:, None, :])  # e . (a x b) = b^T twist a
+            twist = np.cross(np.eye(d), unit[:, None, :])  # e . (a x b) = b^T twist a
             second[:, d:, :d] += twist
             second[:, :d, d:] += np.swapaxes(twist, 1, 2)
         second *= (weights / self.initial)[:, None, None]
-        slopes = self.face.vector_slopes
-        return sp.csr_matrix(slopes.T @ block_diagonal(second) @ slopes)
+        tangents = self.face.vector_slopes
+        return sp.csr_matrix(tangents.T @ block_diagonal(second) @ tangents)
 
 
 @dataclass(frozen=True)
@@ -96,8 +92,9 @@ class DeformedContact:
     gap : (c,) mm
     bases : (c, d, d) directions of the points
     samples_gap, samples_normal : (q,) mm, (q, d) gap and unit normal at the samples
-    follows_area : whether the gap is the mean over the deformed area; beside an elastic object it is read along the
-        common normal of both bodies
+    follows_area : whether forces are pressures on the deformed area, which a rigid object exerts; beside an elastic one
+        they act along the common normal of both bodies
+    turns : (c, d, d) derivative of the normal by the mean of the body's own normal over the deformed area
     """
 
     face: BoundarySurface
@@ -107,22 +104,11 @@ class DeformedContact:
     samples_normal: Float
     area: _Area
     follows_area: bool
+    turns: Float
 
     @cached_property
     def _mean_area(self) -> Float:
         return np.asarray(self.face.average @ self.area.ratio)
-
-    def displacements(self, u: Float) -> Float:
-        """Return the displacements (c, d) of the points along their directions, from those (n, d) of the nodes."""
-        face, area = self.face, self.area
-        out: Float = np.einsum("ctk,ck->ct", self.bases, face.trace @ u)
-        if self.follows_area:
-            # d(mean gap) = mean of d(gap) and of (gap - mean gap) d(area)
-            change = area.change(u)
-            moved = np.einsum("qk,qk->q", self.samples_normal, face.interpolate @ u)
-            weighted = face.average @ (area.ratio * moved + self.samples_gap * change)
-            out[:, 0] = (weighted - self.gap * (face.average @ change)) / self._mean_area
-        return out
 
     def nodal_forces(self, force: Float) -> Float:
         """Return the nodal forces (n, d) of forces (c, d) at the points, along their directions."""
@@ -139,18 +125,34 @@ class DeformedContact:
 
     @cached_property
     def rows(self) -> sp.csr_matrix:
-        """Rows (c d, n d) of `displacements`."""
+        """Rows (c d, n d) along which the forces act: `nodal_forces` are those of the transpose."""
         face, (c, d) = self.face, self.bases.shape[:2]
         bases = self.bases.copy()
         if self.follows_area:
             bases[:, 0] = 0.0
         rows = block_diagonal(bases) @ face.vector_trace
         if self.follows_area:
-            weight = sp.diags_array(1.0 / self._mean_area) @ face.average
-            deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.gap) @ weight
-            normal = weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative
-            rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ normal
+            rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ self._d_mean_gap
         return sp.csr_matrix(rows)
+
+    @cached_property
+    def _d_mean_gap(self) -> sp.csr_matrix:
+        """Derivative (c, n d) of the gap."""
+        weight = sp.diags_array(1.0 / self._mean_area) @ self.face.average
+        deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.gap) @ weight
+        return sp.csr_matrix(weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative)
+
+    def gap_rows(self, moved: Float) -> sp.csr_matrix:
+        """Return the derivative (c, n d) of the gap beside an elastic object.
+
+        Its material at the points has moved by (c, d), mm, which widens the gap along the common normal.  This turns
+        with the body; the normal of the object is taken as constant.
+        """
+        face, d = self.face, self.bases.shape[2]
+        mean = sp.kron(sp.diags_array(1.0 / self._mean_area) @ face.average, sp.eye_array(d))
+        turned = block_diagonal(self.area.normal_slopes / self.area.initial[:, None, None]) @ face.vector_slopes
+        widened = np.einsum("ck,ckl->cl", moved, self.turns)
+        return sp.csr_matrix(self._d_mean_gap + block_diagonal(widened[:, None, :]) @ (mean @ turned))
 
     @cached_property
     def _d_gap(self) -> sp.csr_matrix:
@@ -209,13 +211,23 @@ def deformed_contact(
         towards that of the body by this share.
     """
     area = _Area.of(face, points, displacement)
-    total = face.average @ area.ratio
-    mean_normal = (face.average @ (normal * area.ratio[:, None])) / total[:, None]
+    total = (face.average @ area.ratio)[:, None]
+    mean_normal = (face.average @ (normal * area.ratio[:, None])) / total
+    turns = np.zeros((*mean_normal.shape, mean_normal.shape[1]))
     if object_share is not None:
-        body_normal = outward_normals(area.moved)
-        body_normal = (face.average @ (body_normal * area.ratio[:, None])) / total[:, None]
-        body_normal *= (np.linalg.norm(mean_normal, axis=1) / np.linalg.norm(body_normal, axis=1))[:, None]
-        mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * body_normal
-    mean_gap = (face.average @ (gap * area.ratio)) / total
-    bases = bases_of(unit_normals(in_symmetry_planes(mean_normal, face.points, axes)))
-    return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None)
+        body_normal = (face.average @ (outward_normals(area.moved) * area.ratio[:, None])) / total
+        size = np.linalg.norm(body_normal, axis=1)[:, None]
+        body_normal, ratio = body_normal / size, np.linalg.norm(mean_normal, axis=1)[:, None] / size
+        turns = -(object_share[:, None] * ratio)[:, :, None] * _across(body_normal)
+        mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * ratio * size * body_normal
+    mean_normal = in_symmetry_planes(mean_normal, face.points, axes)
+    bases = bases_of(unit_normals(mean_normal))
+    if object_share is not None:
+        turns = _across(bases[:, 0]) @ turns / np.linalg.norm(mean_normal, axis=1)[:, None, None]
+    mean_gap = (face.average @ (gap * area.ratio)) / total[:, 0]
+    return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None, turns)
+
+
+def _across(unit: Float) -> Float:
+    """Return the projections (c, d, d) onto the planes across unit vectors (c, d)."""
+    return np.asarray(np.eye(unit.shape[1]) - unit[:, :, None] * unit[:, None, :])

@@ -217,13 +217,19 @@ class IncrementEquations:
 
         `damping` times the linear stiffness of the displacements is added.
         """
-        problem, pattern = self.problem, self.body.contact_rows
+        problem, pattern, tangent = self.problem, self.body.contact_rows, self.body.tangent(now.x)
         active = problem.system.active_dofs
-        entries = on_places(now.contact.rows[active], pattern)
-        rows = sp.csr_matrix((entries, pattern.indices, pattern.indptr), pattern.shape)
-        curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.move.end)
-        moving = now.contact.geometric_stiffness(force[:, 0], curvature)
-        tangent = self.body.tangent(now.x).less(moving)
+        rows, reads = now.contact.rows[active], np.arange(len(active))
+        if problem.system.object_compliance is None:
+            curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.move.end)
+            tangent = tangent.less(now.contact.geometric_stiffness(force[:, 0], curvature))
+        else:  # the gap is not read along the rows of the forces, since its normal turns
+            normals = np.flatnonzero(active % problem.dim == 0)
+            moved = self.displacement_of_object(now.contact.bases, force)
+            rows = sp.vstack([rows, now.contact.gap_rows(moved)[active[normals] // problem.dim]], format="csr")
+            pattern = sp.vstack([pattern, pattern[normals]], format="csr")
+            reads[normals] = len(active) + np.arange(len(normals))
+        rows = sp.csr_matrix((on_places(rows, pattern), pattern.indices, pattern.indptr), pattern.shape)
         if damping:
             n = problem.mesh.points.size
             tangent = tangent.less(-damping * problem.body.stiffness.upper[:n, :n])
@@ -231,8 +237,8 @@ class IncrementEquations:
         replaced = last.condensation if last else None
         condensed = condense(tangent, problem.body.fixed_dofs, rows, replaced=replaced)
         self.workspace.factorizations += condensed.factorizations
-        delassus = scatter_to_points(condensed.compliance, active, *force.shape)
-        linearisation = Linearisation(condensed, now.contact.bases, delassus, reusable=not damping)
+        delassus = scatter_to_points(condensed.compliance[reads], active, *force.shape)
+        linearisation = Linearisation(condensed, reads, now.contact.bases, delassus, reusable=not damping)
         self.workspace.linearisations[self._has_inclusions] = linearisation
         return linearisation
 
@@ -243,7 +249,7 @@ class IncrementEquations:
 
         Parameters
         ----------
-        displacement : (r,) mm, of the rows under the forces out of balance alone
+        displacement : (r,) mm, of the rows that are read, under the forces out of balance alone
 
         Returns
         -------
@@ -305,21 +311,20 @@ class IncrementEquations:
         problem, bases = self.problem, now.contact.bases
         u, before = (problem.surface.trace @ displacement(problem.mesh, x) for x in (now.x, self.start.body.unknowns))
         increment = u - before - carried_by_object(problem, self.move, u) - self._until_touch
+        of_object, start = self.displacement_of_object(bases, force), self.start.contact
+        increment += of_object - self.displacement_of_object(start.own_bases, start.force)
         out = np.empty_like(force)
-        out[:, 0] = now.contact.gap
-        compliance = problem.system.object_compliance
-        if compliance is not None:
-            frame = vertical_frame(problem.dim)
-            upright, earlier = (
-                np.einsum("ca,cak->ck", f, b) @ frame.T
-                for f, b in ((force, bases), (self.start.contact.force, self.start.contact.own_bases))
-            )
-            matrix = compliance.reshape(force.size, force.size)
-            whole, last = ((matrix @ f.ravel()).reshape(force.shape) @ frame for f in (upright, earlier))
-            out[:, 0] += np.einsum("ck,ck->c", bases[:, 0], whole)
-            increment = increment + whole - last
+        out[:, 0] = now.contact.gap + np.einsum("ck,ck->c", bases[:, 0], of_object)
         out[:, 1:] = np.einsum("ctk,ck->ct", bases[:, 1:], increment)
         return self.active(out.ravel())
+
+    def displacement_of_object(self, bases: Float, force: Float) -> Float:
+        """Return the displacement (c, d), mm, of the object away from the finger, under forces (c, d) at the points."""
+        frame, compliance = vertical_frame(self.problem.dim), self.problem.system.object_compliance
+        if compliance is None:
+            return np.zeros(force.shape)
+        upright = np.einsum("ca,cak->ck", force, bases) @ frame.T
+        return np.asarray((compliance.reshape(force.size, force.size) @ upright.ravel()).reshape(force.shape) @ frame)
 
     def residual(self, now: Configuration, solution: ContactState, out_of_balance: Float) -> float:
         """Return the largest violation of contact conditions, equilibrium and p = K (J - 1), dimensionless.

@@ -161,7 +161,8 @@ class FiniteIncrement(IncrementEquations):
     ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
         """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
         eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
-        increment, solution, change = self.contact(now, force, linearisation, eliminated.displacement)
+        read = eliminated.displacement[linearisation.reads]
+        increment, solution, change = self.contact(now, force, linearisation, read)
         step = eliminated.unknowns(change)
         if not solution.outcome.ok or not np.isfinite(step).all():
             return solution, None

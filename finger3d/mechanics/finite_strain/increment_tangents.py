@@ -115,7 +115,7 @@ class FiniteIncrementTangents(IncrementTangents):
             unbalanced[:n] -= slopes([end.nodal_forces for end in ends], steps)
             eliminated = linear.body.condensation.eliminated(-unbalanced)
             relative = slopes([end.relative for end in ends], steps)
-            relative[active] += eliminated.displacement
+            relative[active] += eliminated.displacement[linear.body.reads]
             change = linear.active.correction(relative, unknowns)
             step = eliminated.unknowns(-(linear.active.forces @ change)[active])
             unknowns, moved = unknowns - change, moved + step

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from finger3d._types import Float, freeze_arrays
+from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.surface.traces import BoundarySurface
@@ -53,13 +53,15 @@ class Linearisation:
 
     Attributes
     ----------
-    condensation : of the tangent, to the contact rows
+    condensation : of the tangent, to the rows of the contact forces, and others along which gaps are read
+    reads : (r,) numbers of the rows that tell the displacement along each force
     bases : (c, d, d) directions of the contact points
-    delassus : (c, d, c, d) mm/N, in these directions
+    delassus : (c, d, c, d) mm/N, in these directions; symmetric beside a rigid object
     reusable : whether an increment may begin with it; otherwise only its sparsity pattern serves
     """
 
     condensation: Condensation
+    reads: Int
     bases: Float
     delassus: Float
     reusable: bool = True

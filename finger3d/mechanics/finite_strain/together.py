@@ -166,8 +166,9 @@ def solve_together(
 def _advanced(trials: list[_Trial], linearisation: Linearisation, pool: ThreadPoolExecutor) -> list[_Trial]:
     """Advance all trials by an iteration; returns those that may converge."""
     eliminated = linearisation.condensation.eliminated(-np.column_stack([trial.out_of_balance for trial in trials]))
-    changes = _mapped(pool, lambda trial, moved: trial.contact(linearisation, moved), trials, eliminated.displacement.T)
-    none = np.zeros(len(eliminated.displacement))
+    read = eliminated.displacement[linearisation.reads]
+    changes = _mapped(pool, lambda trial, moved: trial.contact(linearisation, moved), trials, read.T)
+    none = np.zeros(len(read))
     steps = eliminated.unknowns(np.column_stack([none if change is None else change for change in changes]))
 
     def moved(trial: _Trial, step: Float, change: Float | None) -> bool:

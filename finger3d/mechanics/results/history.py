@@ -27,8 +27,8 @@ _ON_LINE = 1e-9
 """Distance from the line z = 0, in half widths, below which a vertex lies on it: round-off of its coordinates."""
 
 _AT_LOWEST = 1e-4
-"""Distance (mm) from the object's lowest place within which a point is at it, on neither side: round-off of meshers, and
-what a difference of a dimension or a pose moves it by."""
+"""Distance (mm) from the object's lowest place within which a point is at it, on neither side: round-off of meshers,
+and what a difference of a dimension or a pose moves it by."""
 
 
 @dataclass(frozen=True)
