@@ -71,7 +71,7 @@ def test_the_tangent_is_the_derivative_of_the_forces_out_of_balance(
 
 
 def test_beside_an_elastic_object_the_tangent_contains_the_turn_of_the_common_normal() -> None:
-    """One chord step from nearby leads back but for a few percent; without the turn most of the distance is left."""
+    """One chord step from nearby leads back but for a few percent; without the turn more than a fifth is left."""
     finger = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=4.0)
     model = Model(
         finger, Isotropic(1.0, 0.45), MeshOptions(0.5, 1.0, "swept"), (Leg(1.0, steps=1),), friction=Coulomb(0.25),
@@ -92,7 +92,7 @@ def test_beside_an_elastic_object_the_tangent_contains_the_turn_of_the_common_no
         nodes = increment.problem.mesh.points.size
         left.append(np.abs(away + eliminated.unknowns(change))[:nodes].max() / np.abs(away).max())
     assert left[0] < 0.05
-    assert left[1] > 0.5
+    assert left[1] > 0.2
 
 
 def test_a_step_that_passes_the_least_energy_by_far_is_halved(
