@@ -19,14 +19,14 @@ from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
-from finger3d.analyses.sensitivity import has_derivative, varied
+from finger3d.analyses.sensitivity import varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
-from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
+from finger3d.mechanics.march.sensitivity import derivatives, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
@@ -34,7 +34,8 @@ from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
-from finger3d.scene import Scene, tree
+from finger3d.scene import Scene
+from finger3d.scene.material import with_moduli_only
 
 OFFSET = "depth_offset_mm"
 """Key that is added to the measured depth; it needs no solution of its own."""
@@ -245,18 +246,15 @@ class Simulation:
         if not keys:
             return []
         scene, (problem, steps) = self.scene(point), self._pressed(point)
-        problem, given = under(problem, legs=with_increments_of(problem.model.legs, len(steps))), scene.as_dict()
-        values = [float(str(tree.value_at(given, key) or 0.0)) for key in keys]
-        if refusal(problem.model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
-            return None
+        problem = under(problem, legs=with_increments_of(problem.model.legs, len(steps)))
+        given, body = with_moduli_only(scene.as_dict()), VariedBody(problem)
         try:
-            body = VariedBody(problem)
-            variations = [varied(scene, body, key) for key in keys]
+            variations = [varied(given, scene.path, body, key) for key in keys]
             rows = [
                 derivatives(step, variations, sides, with_zones=self.with_zones)
                 for step, _, sides in tangents(problem, variations, steps)
             ]
-        except Finger3dError:  # forces that jump have no derivatives; differences of presses have
+        except Finger3dError:  # such as of forces that jump, which have differences of presses
             return None
         if not all(all(row) for row in rows):  # of a side of a kink that is not known
             return None
