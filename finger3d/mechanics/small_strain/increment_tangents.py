@@ -26,7 +26,7 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, Status
-from finger3d.contact.state import pressure
+from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -35,7 +35,7 @@ from finger3d.mechanics.march.path import Station, stations
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, are_placed_alike
-from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
+from finger3d.mechanics.small_strain.kinks import End, Sides, coefficients, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import (
     Linear,
@@ -96,19 +96,13 @@ class IncrementTangents:
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
-        sides, (here, length) = self._sides(step), self._end(step)
-        if way and is_kink(here, length):
+        sides, here = self._sides(step), self._end(step)
+        if way and here.is_kink:
 
-            def solved(status: Status) -> tuple[list[Side], list[End]]:
-                found = self._sides(step, status)
-                befores = zip(self._last, found, strict=True)
-                ends = [
-                    End(before.state.contact, side.state.contact, _coefficients(before, status))
-                    for before, side in befores
-                ]
-                return found, ends
+            def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
+                return self._sides(step, status), [before.state.contact for before in self._last]
 
-            chosen = one_sided(here, length, solved, way)
+            chosen = one_sided(here, solved, way)
             self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
             sides = [own or side for own, side in zip(chosen, sides, strict=True)]
         self.sides = sides
@@ -118,14 +112,12 @@ class IncrementTangents:
 
     def is_at_kink(self, step: StepResult) -> bool:
         """Whether the next increment, which has this result, ends as a point is about to change its status."""
-        return is_kink(*self._end(step))
+        return self._end(step).is_kink
 
-    def _end(self, step: StepResult) -> tuple[End, float]:
-        """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
-        states = [self._here.state, *(after for _, after in step.parts)]
-        before, contact = self._here._replace(state=states[-2]), states[-1].contact
-        friction = _coefficients(before, contact.status)
-        return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
+    def _end(self, step: StepResult) -> End:
+        """Return the contact of the last part of an increment."""
+        before, after = [self._here.state, *(state for _, state in step.parts)][-2:]
+        return End(self.problem, before.contact, after.contact)
 
     def _sides(self, step: StepResult, status: Status | None = None) -> list[Side]:
         """Return the sides at the end of an increment, where the points may have other statuses (c,)."""
@@ -327,16 +319,11 @@ def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
     slips = (length > 0.0) & (after.status == SLIP)
     share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
     friction = np.column_stack([np.zeros(len(along)), along * share[:, None]])
-    return [friction * _coefficients(side, after.status)[:, None] for side in sides]
+    mus = [coefficients(side.problem, side.state.contact, after.status) for side in sides]
+    return [friction * mu[:, None] for mu in mus]
 
 
 def _forces(side: Side) -> Float:
     """Return the normal force and the forces along x and z (3,) N."""
     x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
     return np.array([-y, x, z])
-
-
-def _coefficients(side: Side, status: Status) -> Float:
-    """Return the coefficients of friction (c,) of points with a status (c,) at the end of the next increment."""
-    friction, pressed = side.problem.model.friction, pressure(side.state.contact.force, side.problem.surface.area)
-    return friction.updated(friction.coefficients(status, pressed), status, pressed)

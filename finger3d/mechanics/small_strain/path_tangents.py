@@ -35,7 +35,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
-from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
+from finger3d.mechanics.small_strain.kinks import End, Sides, one_sided
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.objects import vertical_frame
 
@@ -228,23 +228,17 @@ class PathTangents:
         self, step: StepResult, share: float, place: PlaceOnPath, energies: Float
     ) -> tuple[Sides, Sides] | None:
         """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
-        count = len(self.path.bases)
+        here = End(self.path.problem, place.before.state, step.meshed_state.contact)
+        if not here.is_kink:
+            return None
 
-        def end(before: ContactState, after: ContactState, problem: Problem) -> End:
-            return End(before, after, np.full(count, problem.model.friction.mu))
-
-        def solved(status: Status) -> tuple[list[Side], list[End]]:
+        def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
             there = self.at_share(share, status)
-            sides = self.sides(step, share, there, energies, status)
             signed = [(k, t) for k, one in enumerate(self.variations) for t in (-one.step, one.step)]
             begun = [there.first.changed(there.before.state, *by) for by in signed]
-            return sides, [end(a, side.state.contact, side.problem) for a, side in zip(begun, sides, strict=True)]
+            return self.sides(step, share, there, energies, status), begun
 
-        here = end(place.before.state, step.meshed_state.contact, self.path.problem)
-        length = self.path.problem.model.largest_depth_mm
-        if not is_kink(here, length):
-            return None
-        return one_sided(here, length, solved, -1), one_sided(here, length, solved, 1)
+        return one_sided(here, solved, -1), one_sided(here, solved, 1)
 
     def motion(self, tangent: PathTangent, share: float) -> Float:
         """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
