@@ -52,7 +52,7 @@ def slopes_of(scene: Scene, problem: Problem, mus: Sequence[float], keys: Sequen
     found = []
     for mu in mus:
         friction = problem.model.friction.with_mu(mu)
-        at_mu = [replace(v, low=under(v.low, friction), high=under(v.high, friction)) for v in variations]
+        at_mu = [replace(v, ends=(under(v.ends[0], friction), under(v.ends[1], friction))) for v in variations]
         *_, (step, _, sides) = tangents(under(problem, friction), at_mu)
         found.append(derivatives(step, at_mu, sides))
     return found

@@ -26,7 +26,7 @@ from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
 from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangent, PathTangents
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
@@ -96,16 +96,16 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
 
 def _read(step: StepResult, one: Variation) -> tuple[Side, Side]:
     """Return the sides of a parameter that changes readings only at the end of an increment."""
-    state, problem = step.meshed_state, one.low
-    formulation, columns, first = formulation_of(problem.model), problem.model.columns, len(problem.system.active_dofs)
+    state, (problem, other) = step.meshed_state, one.ends
+    formulation, columns = formulation_of(problem.model), problem.model.columns
     moved = np.zeros(len(columns))
     if not problem.model.finite_strain:
-        forces = problem.row_forces(problem.upright_force(state.contact))[:, None]
-        moved = changes_of_rows([one.body], forces)[first : first + len(columns), 0, 0]
+        force = problem.upright_force(state.contact).reshape(-1, 1)
+        moved = changes_of_points(problem, [one], force)[len(force) :, 0, 0]
     found = [formulation.readings(end, state) for end in one.ends]
     low, high = (np.array([own[column] for column in columns]) for own in found)
-    side = Side(one.low, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
-    return side, side._replace(problem=one.high, readings=high + one.step * moved)
+    side = Side(problem, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
+    return side, side._replace(problem=other, readings=high + one.step * moved)
 
 
 def derivatives(

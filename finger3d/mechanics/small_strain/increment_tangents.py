@@ -44,7 +44,7 @@ from finger3d.mechanics.small_strain.linearised import (
     slopes,
     upright,
 )
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
 _STEP = 1e-6
@@ -80,7 +80,7 @@ class IncrementTangents:
         self.formulation = formulation_of(problem.model)
         self._here = Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
         self.sides = [self._here._replace(problem=end, state=self._start(end)) for end in ends]
-        self._variations = variations
+        self._variations = self._without_past = variations  # those that forces alone follow at the end of a part
         self._stations, self._number = [stations(end.model.legs) for end in ends], 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
@@ -166,35 +166,12 @@ class IncrementTangents:
         return FixedForces(*np.split(np.pad(found, ((0, 0), (0, more))), [self.problem.surface.points.size]))
 
     @cached_property
-    def _forces(self) -> list[Float]:
-        """Contact forces (c, d) at the ends of all parts of the press, in the directions of an upright object."""
-        return [self.problem.upright_force(after.contact) for step in self._results for _, after in step.parts]
-
-    def _by_contact(self, array: Float) -> dict[bytes, Float]:
-        """Return slices of an array (n, k, p) for each of `_forces`, by the contact forces."""
-        contacts = [after.contact.force.tobytes() for step in self._results for _, after in step.parts]
-        return dict(zip(contacts, np.moveaxis(array, 1, 0), strict=True))
-
-    @cached_property
     def _fixed(self) -> dict[bytes, Float]:
-        """Derivatives of displacements and readings (c d + g, p) under the forces at the ends of all parts."""
-        problem, size = self.problem, self.problem.surface.points.size
-        rows = np.stack([problem.row_forces(force) for force in self._forces], axis=1)
-        rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
-        moved = changes_of_rows([one.body for one in self._variations], rows)
-        out = np.zeros((size + len(problem.system.reading_rows), *moved.shape[1:]))
-        for k, one in enumerate(self._variations):
-            if one.body:
-                out[:, :, k] = np.concatenate(one.body.of_points(problem, rows, moved[..., k]))
-        return self._by_contact(out)
-
-    @cached_property
-    def _of_object(self) -> dict[bytes, Float]:
-        """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
-        active, forces = self.problem.system.active_dofs, np.stack([one.ravel() for one in self._forces], axis=1)
-        moved = np.zeros((*forces.shape, len(self._variations)))
-        moved[active] = changes_of_rows([one.thing for one in self._variations], forces[active])
-        return self._by_contact(moved)
+        """Derivatives (c d + g, p) of contact displacements and readings under the forces at the ends of all parts."""
+        contacts = [after.contact for step in self._results for _, after in step.parts]
+        forces = np.stack([self.problem.upright_force(contact).ravel() for contact in contacts], axis=1)
+        moved = changes_of_points(self.problem, self._without_past, forces)
+        return {contact.force.tobytes(): moved[:, k] for k, contact in enumerate(contacts)}
 
     def _reached(
         self,
@@ -260,9 +237,7 @@ class IncrementTangents:
         (c, d), p = contact.force.shape, len(sides) // 2
         delassus = part.linear.delassus.reshape(c * d, c * d)
         fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
-        at_fixed_forces = fixed.displacement.copy()
-        if any(one.thing for one in self._variations):
-            at_fixed_forces[:, : len(self._variations)] += self._of_object[contact.force.tobytes()]
+        at_fixed_forces = fixed.displacement
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
 
         def increment(problem: Problem, state: State[Any], move: Move) -> Increment:

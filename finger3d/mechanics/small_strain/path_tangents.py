@@ -36,7 +36,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
 from finger3d.mechanics.small_strain.kinks import End, Sides, one_sided
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
@@ -92,13 +92,12 @@ class Changes(NamedTuple):
 
     Attributes
     ----------
-    compliance, readings : (p,) arrays (c d, c d) and (g, c d) in the directions of an upright object, or None
+    compliance : (p,) arrays (c d + g, c d) of contact points and readings of an upright object, or None
     gap, friction : (p, c) and (p,)
     bases : (p, c, 2, 2), directions of the points, which change with the share of an elastic object in the compliance
     """
 
     compliance: list[Float | None]
-    readings: list[Float | None]
     gap: Float
     friction: Float
     bases: Float
@@ -106,25 +105,18 @@ class Changes(NamedTuple):
     @classmethod
     def of(cls, problem: Problem, variations: Sequence[Variation]) -> Changes:
         """Return what variations of a problem change."""
-        count, readings = len(problem.surface.nodes), len(problem.system.reading_rows)
-        body, active = problem.body.condensed.compliance, problem.system.active_dofs
-        forces = problem.inclusions.with_spring_forces(body, np.eye(len(body), len(active)))
-        of_finger = changes_of_rows([one.body for one in variations], forces)
-        of_object = changes_of_rows([one.thing for one in variations], np.eye(len(active)))
-        compliance, rows = list[Float | None](), list[Float | None]()
+        size, active = problem.surface.points.size, problem.system.active_dofs
+        moved = changes_of_points(problem, variations, np.eye(size)[:, active])
+        compliance, gap, bases = list[Float | None](), list[Float](), list[Float]()
         for k, one in enumerate(variations):
-            both = np.zeros((2 * count + readings, 2 * count))
-            if one.body:
-                both[:, active] = np.concatenate(one.body.of_points(problem, forces, of_finger[..., k]))
-            both[np.ix_(active, active)] += of_object[..., k]
-            compliance.append(both[: 2 * count] if one.changes_compliance else None)
-            rows.append(both[2 * count :] if one.changes_compliance else None)
-        ends = [(at_rest(one.low), at_rest(one.high)) for one in variations]
-        pairs = list(zip(variations, ends, strict=True))
-        gap = [one.difference(low.gap, high.gap) for one, (low, high) in pairs]
-        bases = [one.difference(low.own_bases, high.own_bases) for one, (low, high) in pairs]
+            whole = np.zeros((len(moved), size))
+            whole[:, active] = moved[..., k]
+            compliance.append(whole if one.body or one.thing else None)
+            low, high = (at_rest(end) for end in one.ends)
+            gap.append(one.difference(low.gap, high.gap))
+            bases.append(one.difference(low.own_bases, high.own_bases))
         friction = [one.difference(*(end.model.friction.mu for end in one.ends)) for one in variations]
-        return cls(compliance, rows, np.array(gap), np.array(friction), np.array(bases))
+        return cls(compliance, np.array(gap), np.array(friction), np.array(bases))
 
 
 class PathTangents:
@@ -151,8 +143,8 @@ class PathTangents:
     ) -> None:
         self.path, self.variations, self._changes = path, variations, changes
         self._delassus = self._local(path.problem.delassus)
-        shape = path.problem.delassus.shape
-        self._compliance = [None if own is None else self._local(own.reshape(shape)) for own in changes.compliance]
+        size = path.problem.surface.points.size
+        self._compliance = [None if own is None else self._local(own[:size]) for own in changes.compliance]
         for change, turn in zip(self._compliance, changes.bases, strict=True):
             if change is not None and turn.any():
                 change += self._turned(turn)
@@ -162,21 +154,21 @@ class PathTangents:
             path.problem.surface.average
             @ path.problem.placed(path.move.start).distance(path.problem.surface.samples)[1]
         )
-        legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
-        ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
-        end = np.array([one.difference(low, high) for one, (low, high) in zip(variations, ends, strict=True)])
-        end = end.reshape(-1, 2)
         self._weights: Float | None = None
+
+        def goal(problem: Problem) -> Float:
+            own = problem.model.legs[leg]
+            return np.array([own.slide_x_mm, -own.depth_mm, own.force_N or 0.0])
+
+        goals = np.array([one.difference(*map(goal, one.ends)) for one in variations]).reshape(-1, 3)
+        end = goals[:, :2]
         if path.problem.model.legs[leg].force_N is not None:
             self._weights = -path.count[:, None] * path.bases[:, :, 1]
             end[:, 1] = motion[:, 1]
-            at_end = [
-                one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
-            ]
             self._turned_weights = -path.count[:, None] * changes.bases[..., 1]
             begin = np.einsum("ca,pca->p", self._weights, start.force)
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
-            self._force_slopes = begin, np.array(at_end)
+            self._force_slopes = begin, goals[:, 2]
         self._motions = motion, end
         self._events, self._tangents, self._energies = [path.start], [start], [np.zeros((2, len(variations)))]
         for piece, event in enumerate(path.events):
@@ -208,8 +200,8 @@ class PathTangents:
         force = problem.upright_force(contact).ravel()
         motion, total = self.motion(place.tangent, share), energies + place.energies
         for k, one in enumerate(self.variations):
-            rows = self._changes.readings[k]
-            read = 0.0 if rows is None else rows @ force
+            rows = self._changes.compliance[k]
+            read = 0.0 if rows is None else rows[len(force) :] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
                 moved = place.tangent.changed(contact, k, t)
                 moved = replace(moved, bases=moved.own_bases + t * self._changes.bases[k])
@@ -247,9 +239,9 @@ class PathTangents:
         return out
 
     def _local(self, compliance: Float) -> Float:
-        """Return a compliance (2 c, 2 c) in the directions of the points; given (c, 2, c, 2), of an upright object."""
+        """Return a compliance (2 c, 2 c) in the directions of the points; given those of an upright object."""
         c = len(self.path.bases)
-        turned = rotated_delassus(compliance, self.path.bases @ vertical_frame(2).T, np.arange(c))
+        turned = rotated_delassus(compliance.reshape(c, 2, c, 2), self.path.bases @ vertical_frame(2).T, np.arange(c))
         return np.asarray(turned.reshape(2 * c, 2 * c))
 
     def _turned(self, turn: Float) -> Float:

@@ -118,24 +118,6 @@ class BodyChange:
         moved[first:] += self.subgrid @ forces[first:]
         return np.asarray(moved)
 
-    def of_points(self, problem: Problem, forces: Float, moved: Float) -> tuple[Float, Float]:
-        """Return the derivatives of contact displacements (c d, k) and readings (g, k) at fixed contact forces.
-
-        Parameters
-        ----------
-        forces : (r, k) N, on the rows, those of springs included
-        moved : (r, k), derivatives of the rows' displacements at these forces
-        """
-        active, compliance = problem.system.active_dofs, problem.body.condensed.compliance
-        if count := len(self.bars):
-            own = np.zeros_like(moved)
-            own[-count:] = self.bars[:, None] * forces[-count:]
-            moved = moved + compliance @ own
-            moved += compliance @ problem.inclusions.with_spring_forces(compliance, np.zeros_like(moved), moved)
-        displacement = np.zeros((problem.surface.points.size, moved.shape[1]))
-        displacement[active] = moved[: len(active)]
-        return displacement, moved[len(active) :][: len(problem.system.reading_rows)]
-
 
 @dataclass(frozen=True)
 class Variation:
@@ -143,28 +125,17 @@ class Variation:
 
     Attributes
     ----------
-    low, high : with the compliance of the press itself
+    ends : below and above, with the compliance of the press itself
     step : of the parameter
     body, thing : what changes in the finger's body, and in that of an elastic object; None if nothing does
     of_readings : whether it changes readings only, and nothing in the contact
     """
 
-    low: Problem
-    high: Problem
+    ends: tuple[Problem, Problem]
     step: float
     body: BodyChange | None
     thing: BodyChange | None
     of_readings: bool = False
-
-    @property
-    def ends(self) -> tuple[Problem, Problem]:
-        """Both problems."""
-        return self.low, self.high
-
-    @property
-    def changes_compliance(self) -> bool:
-        """Whether the finger's body changes, or an elastic object."""
-        return self.body is not None or self.thing is not None
 
     def difference(self, low: Float | float, high: Float | float) -> Float:
         """Return the central difference of two values."""
@@ -212,7 +183,7 @@ class VariedBody:
         if own.object_compliance is not None and (change or thing):
             ends = self._beside_object(ends, step, change, thing)
         of_readings = changed <= _READINGS and own.inclusions is None and own.relaxation is None
-        return Variation(ends[0], ends[1], step, change, thing, of_readings)
+        return Variation((ends[0], ends[1]), step, change, thing, of_readings)
 
     @cached_property
     def _pattern(self) -> Pattern:
@@ -262,15 +233,9 @@ class VariedBody:
         assert system.object_share is not None
         pressed = np.zeros(problem.surface.points.shape)
         pressed[:, 0] = problem.surface.area
-        slopes = np.zeros((2, *pressed.shape))
-        if change is not None:
-            forces = problem.inclusions.with_spring_forces(
-                problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
-            )
-            moved = changes_of_rows([change], forces)[..., 0]
-            slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
-        if thing is not None:
-            slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
+        bodies = [Variation((ends[0], ends[1]), step, *both) for both in ((change, None), (None, thing))]
+        moved = changes_of_points(problem, bodies, pressed.reshape(-1, 1))[: pressed.size, 0]
+        slopes = moved.T.reshape(2, *pressed.shape)
         out = []
         for end, t in zip(ends, (-step, step), strict=True):
             both = [under_pressure(end.surface, one) for one in (system.delassus - compliance, compliance)]
@@ -385,3 +350,30 @@ def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Floa
         for k, one in changed:
             moved[:, some, k] = one.moved(forces[:, some], unknowns)
     return moved
+
+
+def changes_of_points(problem: Problem, variations: Sequence[Variation], forces: Float) -> Float:
+    """Return what p parameters change in contact displacements and readings, (c d + g, k, p), at fixed contact forces.
+
+    Forces (c d, k) and displacements are in the directions of an upright object.
+    """
+    active, compliance = problem.system.active_dofs, problem.body.condensed.compliance
+    rows = np.zeros((len(compliance), forces.shape[1]))
+    rows[: len(active)] = forces[active]
+    rows = problem.inclusions.with_spring_forces(compliance, rows)
+    of_body = changes_of_rows([one.body for one in variations], rows)
+    of_thing = changes_of_rows([one.thing for one in variations], forces[active])
+    out = np.zeros((len(forces) + len(problem.system.reading_rows), *of_body.shape[1:]))
+    for k, one in enumerate(variations):
+        moved = of_body[..., k]
+        if one.body and (count := len(one.body.bars)):
+            own = np.zeros_like(moved)
+            own[-count:] = one.body.bars[:, None] * rows[-count:]
+            moved = moved + compliance @ own
+            moved += compliance @ problem.inclusions.with_spring_forces(compliance, np.zeros_like(moved), moved)
+        if one.body:
+            out[active, :, k] = moved[: len(active)]
+            out[len(forces) :, :, k] = moved[len(active) :][: len(out) - len(forces)]
+        if one.thing:
+            out[active, :, k] += of_thing[..., k]
+    return out

@@ -61,6 +61,7 @@ class ViscousTangents(IncrementTangents):
     def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
         super().__init__(problem, variations, steps)
         self._workspace = self.formulation.workspace()
+        self._without_past = [replace(one, body=None) for one in variations]  # an elastic object has none
         bodies = [one.body for one in variations for _ in one.ends]
         self._workspaces = [RelaxationWorkspace() if b else self._workspace for b in bodies]
 
@@ -95,8 +96,8 @@ class ViscousTangents(IncrementTangents):
         variables += _variables_under(response, own)
         rows = body.read(variables) + now
         follow = problem.inclusions.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
-        displacement = np.zeros((part.after.contact.force.size, len(steps) // 2))
-        displacement[active] = (rows + response.compliance @ follow)[: len(active)]
+        displacement = super()._at_fixed_forces(part, sides, steps, moves).displacement
+        displacement[active] += (rows + response.compliance @ follow)[: len(active)]
         return _FixedForces(displacement, then[len(active) :][: len(self._columns)], variables, rows)
 
     def _with_constant_bulk(
