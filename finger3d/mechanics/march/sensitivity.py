@@ -25,7 +25,7 @@ from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
 from finger3d.mechanics.small_strain.kinks import Sides
-from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangent, PathTangents
+from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangents, PlaceOnPath
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
@@ -152,21 +152,16 @@ def _increment_tangents(
 
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
-    count = len(variations)
     changes = Changes.of(problem, variations)
-    moved = np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
-    tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
-    energies, number, follower = np.zeros((2, count)), 0, None
+    place, leg, along = PlaceOnPath.at_rest(changes), 0, None
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
-        follower = follower or PathTangents(step.path, variations, changes, tangent, motion, number)
-        place = follower.at_share(station.share)
-        sides: Sides = list(follower.sides(step, station.share, place, energies))
-        both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None
+        along = along or PathTangents(step.path, variations, changes, place, leg)
+        here = along.at_share(station.share)
+        sides: Sides = list(along.sides(step, here))
+        both = along.one_sided(step, station.share) if step is steps[-1] else None
         yield step, *(both or (sides, sides))
         if station.share == 1.0:
-            tangent, energies = place.tangent, energies + place.energies
-            motion, number, follower = follower.motion(tangent, 1.0), number + 1, None
-            tangent = replace(tangent, amplitude=np.zeros(count))
+            place, leg, along = here, leg + 1, None
 
 
 def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool) -> Numbers:

@@ -76,15 +76,25 @@ class PathTangent:
 
 
 class PlaceOnPath(NamedTuple):
-    """Derivatives at a place on a path and at an event before, and those (2, p) of work and dissipation up to it.
+    """Derivatives at a place on a path.
 
-    The event is the last that is not at the same place.
+    Attributes
+    ----------
+    tangent : of the state
+    motion : (p, 2), of the displacement of the object
+    energies : (2, p), of work and dissipation up to there
     """
 
-    before: Event
-    first: PathTangent
     tangent: PathTangent
+    motion: Float
     energies: Float
+
+    @classmethod
+    def at_rest(cls, changes: Changes) -> PlaceOnPath:
+        """Return the place before the first leg."""
+        count, moved = len(changes.gap), np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
+        tangent = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count))
+        return cls(tangent, np.zeros((count, 2)), np.zeros((2, count)))
 
 
 class Changes(NamedTuple):
@@ -127,8 +137,7 @@ class PathTangents:
     path : of the leg
     variations : of p parameters
     changes : what the parameters change
-    start : derivatives of the state at the start of the leg
-    motion : (p, 2), those of the displacement of the object there
+    start : derivatives at the start of the leg
     leg : number of the leg
     """
 
@@ -137,8 +146,7 @@ class PathTangents:
         path: ExactPath,
         variations: Sequence[Variation],
         changes: Changes,
-        start: PathTangent,
-        motion: Float,
+        start: PlaceOnPath,
         leg: int,
     ) -> None:
         self.path, self.variations, self._changes = path, variations, changes
@@ -164,13 +172,14 @@ class PathTangents:
         end = goals[:, :2]
         if path.problem.model.legs[leg].force_N is not None:
             self._weights = -path.count[:, None] * path.bases[:, :, 1]
-            end[:, 1] = motion[:, 1]
+            end[:, 1] = start.motion[:, 1]
             self._turned_weights = -path.count[:, None] * changes.bases[..., 1]
-            begin = np.einsum("ca,pca->p", self._weights, start.force)
+            begin = np.einsum("ca,pca->p", self._weights, start.tangent.force)
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
             self._force_slopes = begin, goals[:, 2]
-        self._motions = motion, end
-        self._events, self._tangents, self._energies = [path.start], [start], [np.zeros((2, len(variations)))]
+        self._motions = start.motion, end
+        self._events, self._energies = [path.start], [start.energies]
+        self._tangents = [replace(start.tangent, amplitude=np.zeros(len(variations)))]
         for piece, event in enumerate(path.events):
             tangent = self._at_event(piece, event)
             self._energies.append(self._energies_at(piece, event, tangent))
@@ -179,26 +188,18 @@ class PathTangents:
 
     def at_share(self, share: float, status: Status | None = None) -> PlaceOnPath:
         """Return the derivatives at a share of the path, where the points may have other statuses (c,)."""
-        place, done = self.path.at(share)
-        piece = done - 1 if place is self._events[done] else done
+        event, done = self.path.at(share)
+        piece = done - 1 if event is self._events[done] else done
         if status is not None:
-            place = place._replace(state=replace(place.state, status=status))
-        tangent = self._solved(piece, place)
-        energies = self._energies_at(piece, place, tangent)
-        start = next((i for i in range(piece, 0, -1) if self._events[i].share < share * (1.0 - _SHORT)), 0)
-        return PlaceOnPath(self._events[start], self._tangents[start], tangent, energies)
+            event = event._replace(state=replace(event.state, status=status))
+        tangent = self._solved(piece, event)
+        return PlaceOnPath(tangent, self._motion(tangent, share), self._energies_at(piece, event, tangent))
 
-    def sides(
-        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
-    ) -> list[Side]:
-        """Return the sides (2 p,) of an increment that ends at a place.
-
-        The energies (2, p) are the derivatives of work and dissipation at the start of the path.
-        """
+    def sides(self, step: StepResult, place: PlaceOnPath, status: Status | None = None) -> list[Side]:
+        """Return the sides (2 p,) of an increment that ends at a place, where points may have other statuses (c,)."""
         problem, contact, sides = self.path.problem, step.meshed_state.contact, list[Side]()
         contact = contact if status is None else replace(contact, status=status)
         force = problem.upright_force(contact).ravel()
-        motion, total = self.motion(place.tangent, share), energies + place.energies
         for k, one in enumerate(self.variations):
             rows = self._changes.compliance[k]
             read = 0.0 if rows is None else rows[len(force) :] @ force
@@ -208,31 +209,33 @@ class PathTangents:
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
-                    step.target.changed([1, 0], t * motion[k] * [1.0, -1.0]),
+                    step.target.changed([1, 0], t * place.motion[k] * [1.0, -1.0]),
                     t * read + problem.system.reading_rows @ problem.upright_force(moved).ravel(),
-                    step.external_work_mJ + t * total[0, k],
-                    step.dissipation_mJ + t * total[1, k],
+                    step.external_work_mJ + t * place.energies[0, k],
+                    step.dissipation_mJ + t * place.energies[1, k],
                 )
                 sides.append(side)
         return sides
 
-    def one_sided(
-        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float
-    ) -> tuple[Sides, Sides] | None:
-        """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
-        here = End(self.path.problem, place.before.state, step.meshed_state.contact)
+    def one_sided(self, step: StepResult, share: float) -> tuple[Sides, Sides] | None:
+        """Return the sides of falling and of growing parameters at a kink at the end of an increment; None elsewhere.
+
+        Slip is counted from the last event that is not at the same place.
+        """
+        earlier = (i for i, event in enumerate(self._events) if i and event.share < share * (1.0 - _SHORT))
+        last = max(earlier, default=0)
+        before, tangent = self._events[last].state, self._tangents[last]
+        here = End(self.path.problem, before, step.meshed_state.contact)
         if not here.is_kink:
             return None
+        begun = [tangent.changed(before, k, t) for k, v in enumerate(self.variations) for t in (-v.step, v.step)]
 
         def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
-            there = self.at_share(share, status)
-            signed = [(k, t) for k, one in enumerate(self.variations) for t in (-one.step, one.step)]
-            begun = [there.first.changed(there.before.state, *by) for by in signed]
-            return self.sides(step, share, there, energies, status), begun
+            return self.sides(step, self.at_share(share, status), status), begun
 
         return one_sided(here, solved, -1), one_sided(here, solved, 1)
 
-    def motion(self, tangent: PathTangent, share: float) -> Float:
+    def _motion(self, tangent: PathTangent, share: float) -> Float:
         """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
         out: Float = (1.0 - share) * self._motions[0] + share * self._motions[1]
         out[:, 1] -= tangent.amplitude
@@ -330,7 +333,7 @@ class PathTangents:
         base = np.zeros((count, c, 2))
         base[:, slips, 1] = (self._changes.friction[:, None] * (sign * force[:, 0]))[:, slips]
         fixed = replace(last, amplitude=np.zeros(count))
-        free = -np.einsum("cak,pk->pca", self._closing, self.motion(fixed, share))
+        free = -np.einsum("cak,pk->pca", self._closing, self._motion(fixed, share))
         free[:, :, 0] += self._changes.gap
         free[:, :, 1] -= self._changes.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
         for k, change in enumerate(self._compliance):
