@@ -23,7 +23,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, readings_of
 from finger3d.mechanics.small_strain.kinks import Sides
 from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangents, PlaceOnPath
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
@@ -57,7 +57,7 @@ def held_normals(problem: Problem, step: StepResult) -> int:
     state, contact = step.meshed_state, step.meshed_state.contact
     if step.path is not None or problem.model.finite_strain or problem.model.object.is_flat:
         return 0
-    displacement = getattr(state.body, "displacement", state.body)  # a body that relaxes has internal variables, too
+    displacement = formulation_of(problem.model).loads(problem, state, step.target).displacement
     distance, share = problem.placed(step.target).distance, problem.system.object_share
     geometry = contact_geometry(distance, problem.surface, displacement, problem.axes, share)
     apart = np.linalg.norm(geometry.bases[:, 0] - contact.own_bases[:, 0], axis=1)
@@ -97,13 +97,11 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
 def _read(step: StepResult, one: Variation) -> tuple[Side, Side]:
     """Return the sides of a parameter that changes readings only at the end of an increment."""
     state, (problem, other) = step.meshed_state, one.ends
-    formulation, columns = formulation_of(problem.model), problem.model.columns
-    moved = np.zeros(len(columns))
+    low, high = (readings_of(end, state) for end in one.ends)
+    moved = np.zeros(len(low))
     if not problem.model.finite_strain:
         force = problem.upright_force(state.contact).reshape(-1, 1)
         moved = changes_of_points(problem, [one], force)[len(force) :, 0, 0]
-    found = [formulation.readings(end, state) for end in one.ends]
-    low, high = (np.array([own[column] for column in columns]) for own in found)
     side = Side(problem, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
     return side, side._replace(problem=other, readings=high + one.step * moved)
 

@@ -85,6 +85,8 @@ class IncrementTangents:
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
         self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
+        self._workspace, bodies = self.formulation.workspace(), [one.body for one in variations for _ in one.ends]
+        self._workspaces = [self.formulation.workspace() if body else self._workspace for body in bodies]
 
     def advance(self, step: StepResult, way: int = 0) -> Sides:
         """Return the sides at the end of the next increment, which has this result.
@@ -155,9 +157,9 @@ class IncrementTangents:
         """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
         return Linear(LinearisedIncrement.of(self.problem, before.contact, after.contact), self.problem.delassus)
 
-    def _displaced(self, state: State[Any]) -> State[Float]:
-        """Return a state whose body is the displacement (c, d) mm of the contact points."""
-        return state
+    def _workspaces_of(self, sides: Sequence[Side]) -> list[Any]:
+        """Return the workspaces of sides: their own if a parameter changes the body, else that of the press."""
+        return [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]  # some are of poses
 
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
         """Return the derivatives of the body at the end of a part of an increment under its forces."""
@@ -212,14 +214,14 @@ class IncrementTangents:
             self._leg_start_N = np.array([_forces(side) for side in self.sides])
         goals = np.array([load.forces for load in loads])
         wanted = self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
-        missing = 0.5 * np.diff((wanted - forces[: len(held)]).reshape(-1, 2, 3), axis=1)[:, 0, free]
-        stiffness = np.diff(forces[len(held) :].reshape(-1, 2, 3), axis=1)[:, 0, free].T / (2.0 * h)
+        missing = slopes(wanted - forces[: len(held)], self._steps)[free]
+        stiffness = slopes(forces[len(held) :], steps[len(held) :])[free]
         try:
-            change = np.linalg.solve(stiffness, missing.T).T
+            change = np.linalg.solve(stiffness, missing)
         except np.linalg.LinAlgError:
             raise Finger3dError("forces do not determine the pose of the object: numbers have no derivatives") from None
-        both = np.stack([-change, change], axis=1).reshape(-1, len(free))
-        return [pose.changed(free, by) for pose, by in zip(held, both, strict=True)]
+        pairs = enumerate(zip(held, self._steps, strict=True))
+        return [pose.changed(free, t * change[:, k // 2]) for k, (pose, t) in pairs]
 
     def _through(
         self, parts: Sequence[Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
@@ -236,12 +238,16 @@ class IncrementTangents:
         contact, linear, frame = part.after.contact, part.linear.active, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
         delassus = part.linear.delassus.reshape(c * d, c * d)
-        fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
-        at_fixed_forces = fixed.displacement
+        fixed = self._at_fixed_forces(part, sides, steps, moves)
+
+        def displaced(problem: Problem, state: State[Any]) -> State[Float]:
+            return replace(state, body=self.formulation.loads(problem, state, part.move.end).displacement)
+
+        there = displaced(self.problem, part.after).body
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
 
         def increment(problem: Problem, state: State[Any], move: Move) -> Increment:
-            return Increment(problem, self._displaced(state), move, body, DistanceTracker())
+            return Increment(problem, displaced(problem, state), move, body, DistanceTracker())
 
         own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
         of_place, of_means = own.slopes(contact)
@@ -255,7 +261,7 @@ class IncrementTangents:
         touches = np.flatnonzero(np.repeat(contact.status != OPEN, d))
         turned, through = (relative + d)[touches], delassus[:, touches]
         of_unknowns = linear.forces[touches].toarray()
-        force = direct[touches] + changes[turned] + of_moved[turned] @ at_fixed_forces
+        force = direct[touches] + changes[turned] + of_moved[turned] @ fixed.displacement
         if not self.problem.model.object.is_flat:  # forces turn with the directions of their points
             matrix = np.eye(len(touches)) - of_moved[turned] @ through
             both = np.linalg.solve(matrix, np.hstack([of_unknowns, force]))
@@ -263,9 +269,9 @@ class IncrementTangents:
         weights = linear.weights @ of_moved[relative]
         response = weights @ through
         matrix = response @ of_unknowns + np.diag(linear.diagonal)
-        right = linear.weights @ changes[relative] + weights @ at_fixed_forces + response @ force
+        right = linear.weights @ changes[relative] + weights @ fixed.displacement + response @ force
         unknowns = -np.linalg.solve(matrix, right)
-        moved = through @ (of_unknowns @ unknowns + force) + at_fixed_forces
+        moved = through @ (of_unknowns @ unknowns + force) + fixed.displacement
         place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame)
         means = (of_means @ place.reshape(-1, p)).reshape(c, -1, p)
         force = (linear.forces @ unknowns + direct).reshape(c, d, p)
@@ -275,14 +281,19 @@ class IncrementTangents:
             for k, (end, t) in enumerate(zip(ends, steps, strict=True))
         ]
         reached = self._reached(part, fixed, states, sides, steps, moves)
-        return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
+        return [side_after(*one) for one in zip(sides, moves, *zip(*reached, strict=True), strict=True)]
 
 
-def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:
-    """Return the side after a motion, which has reached a state and readings (g,)."""
-    state, readings = reached
+def side_after(before: Side, move: Move, state: State[Any], readings: Float) -> Side:
+    """Return the side after a motion that has led to a state with readings (g,)."""
     work, lost = energies(before.problem, [Substep(before.state, state, move)])
     return Side(before.problem, state, move.end, readings, before.work_mJ + work, before.dissipation_mJ + lost)
+
+
+def readings_of(problem: Problem, state: State[Any]) -> Float:
+    """Return the readings (g,) of a state."""
+    found = formulation_of(problem.model).readings(problem, state)
+    return np.array([found[column] for column in problem.model.columns])
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:

@@ -19,16 +19,14 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, readings_of
 from finger3d.mechanics.small_strain.linearised import Linear, LinearisedIncrement, Part, slopes
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody
-from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
+from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, Response
 from finger3d.objects import Move
 
 _Past: TypeAlias = tuple[Step, InternalVariables]
@@ -60,10 +58,7 @@ class ViscousTangents(IncrementTangents):
 
     def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
         super().__init__(problem, variations, steps)
-        self._workspace = self.formulation.workspace()
         self._without_past = [replace(one, body=None) for one in variations]  # an elastic object has none
-        bodies = [one.body for one in variations for _ in one.ends]
-        self._workspaces = [RelaxationWorkspace() if b else self._workspace for b in bodies]
 
     def _linearised(self, before: State[ViscousBody], after: State[ViscousBody], move: Move) -> _Linear:
         step = Step(self.formulation.relaxation.prony, move.duration_s)
@@ -71,9 +66,6 @@ class ViscousTangents(IncrementTangents):
         problem = replace(self.problem, system=replace(self.problem.system, delassus=body.delassus))
         active = LinearisedIncrement.of(problem, before.contact, after.contact)
         return _Linear(active, body.delassus, step, response)
-
-    def _displaced(self, state: State[ViscousBody]) -> State[Float]:
-        return State(state.contact, state.body.displacement, state.last)
 
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> _FixedForces:
         problem, memory, response = self.problem, part.after.body.memory, part.linear.response
@@ -98,7 +90,7 @@ class ViscousTangents(IncrementTangents):
         follow = problem.inclusions.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
         displacement = super()._at_fixed_forces(part, sides, steps, moves).displacement
         displacement[active] += (rows + response.compliance @ follow)[: len(active)]
-        return _FixedForces(displacement, then[len(active) :][: len(self._columns)], variables, rows)
+        return _FixedForces(displacement, then[len(active) :][: len(problem.model.columns)], variables, rows)
 
     def _with_constant_bulk(
         self,
@@ -112,11 +104,10 @@ class ViscousTangents(IncrementTangents):
     ) -> Float:
         """Enter the derivatives of displacements and dilatations (N, p) under row forces (r,); return those of rows."""
         now, rows = part.after.body.memory.elastic, np.zeros((len(forces), len(steps) // 2))
-        workspaces = [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]
         bodies = [ConstantBulkModulus(side.problem) for side in sides]
         internal = [
             one.internal_forces(*past, now, workspace)
-            for one, past, workspace in zip(bodies, pasts, workspaces, strict=True)
+            for one, past, workspace in zip(bodies, pasts, self._workspaces_of(sides), strict=True)
         ]
         load = -slopes(internal, steps)
         for k, one in enumerate(self._variations):
@@ -143,28 +134,20 @@ class ViscousTangents(IncrementTangents):
         rows = slopes([problem.row_forces(problem.upright_force(state.contact)) for state in states], steps)
         rows = problem.inclusions.with_spring_forces(response.compliance, rows, fixed.rows)
         variables = fixed.variables + _variables_under(response, rows)
-        read = (fixed.rows + response.compliance @ rows)[first:][: len(self._columns)]
-        is_pressure = np.array([column.kind == "taxel" for column in self._columns], dtype=bool)
+        read = (fixed.rows + response.compliance @ rows)[first:][: len(problem.model.columns)]
+        is_pressure = np.array([column.kind == "taxel" for column in problem.model.columns], dtype=bool)
         if is_pressure.any() and not isinstance(body, ConstantBulkModulus):  # of the relaxed stress
             read[is_pressure] = (body.read(rows)[first:][: len(read)] + fixed.readings)[is_pressure]
-        here, found = self._read(problem, part.after), list[tuple[State[Any], Float]]()
+        here, found = readings_of(problem, part.after), list[tuple[State[Any], Float]]()
         for k, (state, side, (step, past), t) in enumerate(
             zip(states, sides, _pasts(sides, moves), steps, strict=True)
         ):
             viscous = ViscousBody(state.body, step.after(past, memory.elastic + t * variables[:, k // 2]))
             after, readings = State(state.contact, viscous, state.last), here + t * read[:, k // 2]
             if isinstance(body, ConstantBulkModulus) and is_pressure.any():
-                readings[is_pressure] = self._read(side.problem, after)[is_pressure]
+                readings[is_pressure] = readings_of(side.problem, after)[is_pressure]
             found.append((after, readings))
         return found
-
-    @property
-    def _columns(self) -> tuple[Column, ...]:
-        return self.problem.model.columns
-
-    def _read(self, problem: Problem, state: State[ViscousBody]) -> Float:
-        found = formulation_of(problem.model).readings(problem, state)
-        return np.array([found[column] for column in self._columns])
 
 
 def _variables_under(response: Response, rows: Float) -> Float:
