@@ -32,6 +32,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
+from finger3d.mechanics.march.to_force import forces_on
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, are_placed_alike
@@ -209,9 +210,9 @@ class IncrementTangents:
         moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
         steps = np.array([*self._steps, *[-h, h] * len(free)])
         found = self._through(parts, [*self.sides, *[self._here] * len(moved)], steps, [*held, *moved])
-        forces = np.array([_forces(side) for side in found])
+        forces = np.array([forces_on(side.problem, side.state) for side in found])
         if loads[0].begins:
-            self._leg_start_N = np.array([_forces(side) for side in self.sides])
+            self._leg_start_N = np.array([forces_on(side.problem, side.state) for side in self.sides])
         goals = np.array([load.forces for load in loads])
         wanted = self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
         missing = slopes(wanted - forces[: len(held)], self._steps)[free]
@@ -307,9 +308,3 @@ def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
     friction = np.column_stack([np.zeros(len(along)), along * share[:, None]])
     mus = [coefficients(side.problem, side.state.contact, after.status) for side in sides]
     return [friction * mu[:, None] for mu in mus]
-
-
-def _forces(side: Side) -> Float:
-    """Return the normal force and the forces along x and z (3,) N."""
-    x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
-    return np.array([-y, x, z])

@@ -10,12 +10,6 @@ the path, and d' the derivative by a parameter p at fixed s::
 w_t* is the tangential displacement where the point began to stick.  At an event a margin m (a gap, a normal force, or
 mu r_n - |r_t|) vanishes, so that the event moves by ``ds = -dm / (dm/ds)``, and what it leaves behind changes by
 ``dw_t* = dw_t + (dw_t/ds) ds``.  Under a prescribed force the depth is one more unknown of the equations.
-
-The body enters by its compliance ``C = L K^-1 L^T``, condensed to the rows L of contact points and readings::
-
-    dC = -F^T dK F + dL F + F^T dL^T,   F = K^-1 L^T
-
-where dK and dL are central differences of assembled matrices.
 """
 
 from __future__ import annotations

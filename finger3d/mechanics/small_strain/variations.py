@@ -54,6 +54,9 @@ _OTHER_ELEMENTS = "it switches between elements for compressible and nearly inco
 _Matrices: TypeAlias = tuple[sp.csr_matrix, sp.csr_matrix]
 """Upper triangle (N, N) of the stiffness of a body, and its rows (r, N)."""
 
+_Assembled: TypeAlias = tuple[Problem, _Matrices, EmbeddedBars | None]
+"""Problem with another body on the same cells, the matrices of the body, and the bars of its foils."""
+
 
 class Side(NamedTuple):
     """A press at a parameter less or plus its step, to first order, at the end of an increment.
@@ -164,7 +167,7 @@ class VariedBody:
         for model in (low, high):
             if replace(model, **kept) != own or type(model.design) is not type(own.design):
                 raise Finger3dError("it changes the mesh")
-        models = [replace(own, **{name: getattr(model, name) for name in _CHANGES}) for model in (low, high)]
+        models = low, high
         if any(model.object != own.object or model.design != own.design for model in models):
             touches = [model.first_contact.first_contact_mm for model in (low, high)]
         else:
@@ -208,19 +211,19 @@ class VariedBody:
 
     def _changed(self, both: Sequence[_Assembled], step: float) -> tuple[list[Problem], BodyChange]:
         """Return the problems of two bodies, and what changes between these."""
-        problem, ends, (below, above) = self.problem, [one.problem for one in both], [one.bars for one in both]
-        own, condensed = problem.inclusions, problem.body.condensed
-        change = BodyChange.between(condensed, both[0].matrices, both[1].matrices, step)
+        (one, first, below), (other, last, above) = both
+        own, condensed = self.problem.inclusions, self.problem.body.condensed
+        change = BodyChange.between(condensed, first, last, step)
         if below is None or above is None:
-            return ends, change
+            return [one, other], change
         count, size = len(own.bar_stiffness), len(condensed.compliance)
         pulls = np.eye(size, count, count - size)
         slope = change.moved(pulls, condensed.unknowns(pulls))[-count:]
         of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
         low, high = below.in_mesh(of_mesh - step * slope), above.in_mesh(of_mesh + step * slope)
-        ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
         subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
         bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
+        ends = [replace(one, inclusions=low), replace(other, inclusions=high)]
         return ends, replace(change, subgrid=subgrid, bars=bars)
 
     def _beside_object(
@@ -284,7 +287,7 @@ class VariedBody:
         rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
         system = replace(end.system, surface=face, points=points)
         changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-        return _Assembled(replace(end, system=system, condensed_body=changed), (matrix.upper, rows), bars)
+        return replace(end, system=system, condensed_body=changed), (matrix.upper, rows), bars
 
     def _rows_of_readings(self, body: MeshedBody, model: Model) -> list[sp.csr_matrix]:
         """Return the condensed rows with those of the readings of a model, where they are others."""
@@ -320,14 +323,6 @@ class VariedBody:
             mesh = stretched_object(mesh, model, other) or with_points_of(mesh, object_mesh(end, thing, zone, QUIET)[0])
         matrix, rows = assembled_object(end, thing, mesh, self._object.is_whole, self._pattern_of_object)
         return matrix.upper, widened(rows, matrix.upper.shape[0])
-
-
-class _Assembled(NamedTuple):
-    """Problem with another body on the same cells, its matrices as in a `BodyChange`, and the bars of its foils."""
-
-    problem: Problem
-    matrices: _Matrices
-    bars: EmbeddedBars | None
 
 
 def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
