@@ -153,7 +153,7 @@ def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Seq
     changes = Changes.of(problem, variations)
     place, leg, along = PlaceOnPath.at_rest(changes), 0, None
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
-        along = along or PathTangents(step.path, variations, changes, place, leg)
+        along = along or PathTangents(step.path, changes, place, leg)
         here = along.at_share(station.share)
         sides: Sides = list(along.sides(step, here))
         both = along.one_sided(step, station.share) if step is steps[-1] else None

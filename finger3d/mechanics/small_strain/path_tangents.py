@@ -96,11 +96,13 @@ class Changes(NamedTuple):
 
     Attributes
     ----------
+    variations : (p,)
     compliance : (p,) arrays (c d + g, c d) of contact points and readings of an upright object, or None
     gap, friction : (p, c) and (p,)
     bases : (p, c, 2, 2), directions of the points, which change with the share of an elastic object in the compliance
     """
 
+    variations: Sequence[Variation]
     compliance: list[Float | None]
     gap: Float
     friction: Float
@@ -120,7 +122,7 @@ class Changes(NamedTuple):
             gap.append(one.difference(low.gap, high.gap))
             bases.append(one.difference(low.own_bases, high.own_bases))
         friction = [one.difference(*(end.model.friction.mu for end in one.ends)) for one in variations]
-        return cls(compliance, np.array(gap), np.array(friction), np.array(bases))
+        return cls(variations, compliance, np.array(gap), np.array(friction), np.array(bases))
 
 
 class PathTangents:
@@ -129,21 +131,13 @@ class PathTangents:
     Parameters
     ----------
     path : of the leg
-    variations : of p parameters
-    changes : what the parameters change
+    changes : what p parameters change
     start : derivatives at the start of the leg
     leg : number of the leg
     """
 
-    def __init__(
-        self,
-        path: ExactPath,
-        variations: Sequence[Variation],
-        changes: Changes,
-        start: PlaceOnPath,
-        leg: int,
-    ) -> None:
-        self.path, self.variations, self._changes = path, variations, changes
+    def __init__(self, path: ExactPath, changes: Changes, start: PlaceOnPath, leg: int) -> None:
+        self.path, self._changes, variations = path, changes, changes.variations
         self._delassus = self._local(path.problem.delassus)
         size = path.problem.surface.points.size
         self._compliance = [None if own is None else self._local(own[:size]) for own in changes.compliance]
@@ -152,10 +146,8 @@ class PathTangents:
                 change += self._turned(turn)
         # gaps close along the normal of the object, which is not that of the points if it is elastic
         self._closing = path.bases.copy()
-        self._closing[:, 0] = (
-            path.problem.surface.average
-            @ path.problem.placed(path.move.start).distance(path.problem.surface.samples)[1]
-        )
+        surface, placed = path.problem.surface, path.problem.placed(path.move.start)
+        self._closing[:, 0] = surface.average @ placed.distance(surface.samples)[1]
         self._weights: Float | None = None
 
         def goal(problem: Problem) -> Float:
@@ -186,15 +178,16 @@ class PathTangents:
         piece = done - 1 if event is self._events[done] else done
         if status is not None:
             event = event._replace(state=replace(event.state, status=status))
-        tangent = self._solved(piece, event)
-        return PlaceOnPath(tangent, self._motion(tangent, share), self._energies_at(piece, event, tangent))
+        tangent, motion = self._solved(piece, event), self._motion(share)
+        motion[:, 1] -= tangent.amplitude
+        return PlaceOnPath(tangent, motion, self._energies_at(piece, event, tangent))
 
     def sides(self, step: StepResult, place: PlaceOnPath, status: Status | None = None) -> list[Side]:
         """Return the sides (2 p,) of an increment that ends at a place, where points may have other statuses (c,)."""
         problem, contact, sides = self.path.problem, step.meshed_state.contact, list[Side]()
         contact = contact if status is None else replace(contact, status=status)
         force = problem.upright_force(contact).ravel()
-        for k, one in enumerate(self.variations):
+        for k, one in enumerate(self._changes.variations):
             rows = self._changes.compliance[k]
             read = 0.0 if rows is None else rows[len(force) :] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
@@ -222,18 +215,18 @@ class PathTangents:
         here = End(self.path.problem, before, step.meshed_state.contact)
         if not here.is_kink:
             return None
-        begun = [tangent.changed(before, k, t) for k, v in enumerate(self.variations) for t in (-v.step, v.step)]
+        begun = [
+            tangent.changed(before, k, t) for k, v in enumerate(self._changes.variations) for t in (-v.step, v.step)
+        ]
 
         def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
             return self.sides(step, self.at_share(share, status), status), begun
 
         return one_sided(here, solved, -1), one_sided(here, solved, 1)
 
-    def _motion(self, tangent: PathTangent, share: float) -> Float:
-        """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
-        out: Float = (1.0 - share) * self._motions[0] + share * self._motions[1]
-        out[:, 1] -= tangent.amplitude
-        return out
+    def _motion(self, share: float) -> Float:
+        """Return the derivatives (p, 2) of the motion of the object at a share of the path, less the amplitude."""
+        return np.asarray((1.0 - share) * self._motions[0] + share * self._motions[1])
 
     def _local(self, compliance: Float) -> Float:
         """Return a compliance (2 c, 2 c) in the directions of the points; given those of an upright object."""
@@ -319,15 +312,14 @@ class PathTangents:
     def _solved(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at a place within a piece of the path that itself does not move."""
         status, force, last = event.state.status, event.state.force, self._tangents[piece]
-        c, count, share = len(status), len(self.variations), event.share
+        c, count, share = len(status), len(self._changes.variations), event.share
         touches, sticks, slips = (np.flatnonzero(m) for m in (status != OPEN, status == STICK, status == SLIP))
         sign = np.zeros(c)
         slid = _relative(event.state)[:, 1] - _relative(self._events[piece].state)[:, 1]
         sign[slips] = np.sign(np.where(force[:, 1] != 0.0, force[:, 1], -slid))[slips]
         base = np.zeros((count, c, 2))
         base[:, slips, 1] = (self._changes.friction[:, None] * (sign * force[:, 0]))[:, slips]
-        fixed = replace(last, amplitude=np.zeros(count))
-        free = -np.einsum("cak,pk->pca", self._closing, self._motion(fixed, share))
+        free = -np.einsum("cak,pk->pca", self._closing, self._motion(share))
         free[:, :, 0] += self._changes.gap
         free[:, :, 1] -= self._changes.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
         for k, change in enumerate(self._compliance):
