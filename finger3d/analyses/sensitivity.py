@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -88,16 +88,8 @@ class Sensitivity:
 
     def as_dict(self) -> Tree:
         """Return what sensitivity.json holds."""
-        return {
-            "title": self.title,
-            "numbers": dict(self.numbers),
-            "keys": dict(self.keys),
-            "tolerances": dict(self.tolerances),
-            "derivatives": {name: dict(row) for name, row in self.derivatives.items()},
-            "derivatives_falling": {name: dict(row) for name, row in self.falling.items()},
-            "without_derivative": list(self.without),
-            "held_normals": self.held_normals,
-        }
+        names = {"falling": "derivatives_falling", "without": "without_derivative"}
+        return {names.get(name, name): value for name, value in asdict(self).items()}
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""

@@ -127,7 +127,12 @@ def derivatives(
 
 
 def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
-    growing = falling = _increment_tangents(problem, variations, steps)
+    kind = IncrementTangents if problem.model.relaxation is None else ViscousTangents
+    if problem.model.finite_strain:
+        from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
+
+        kind = FiniteIncrementTangents
+    growing = falling = kind(problem, variations, steps)
     for step in steps:
         if growing is falling and falling.is_at_kink(step):
             growing = copy(falling)
@@ -136,17 +141,6 @@ def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Seq
             yield step, sides, sides
         else:
             yield step, falling.advance(step, -1), growing.advance(step, 1)
-
-
-def _increment_tangents(
-    problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]
-) -> IncrementTangents:
-    if not problem.model.finite_strain:
-        viscous = problem.model.relaxation is not None
-        return (ViscousTangents if viscous else IncrementTangents)(problem, variations, steps)
-    from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
-
-    return FiniteIncrementTangents(problem, variations, steps)
 
 
 def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:

@@ -177,13 +177,7 @@ class IncrementTangents:
         return {contact.force.tobytes(): moved[:, k] for k, contact in enumerate(contacts)}
 
     def _reached(
-        self,
-        part: Part,
-        fixed: FixedForces,
-        states: Sequence[State[Float]],
-        sides: Sequence[Side],
-        steps: Float,
-        moves: Sequence[Move],
+        self, part: Part, fixed: FixedForces, states: Sequence[State[Float]], sides: Sequence[Side], steps: Float
     ) -> list[tuple[State[Any], Float]]:
         """Return the states of all sides at the end of a part of an increment, and their readings (g,)."""
         forces = [self.problem.upright_force(state.contact).ravel() for state in states]
@@ -281,7 +275,7 @@ class IncrementTangents:
             end.moved(t * place[..., k // 2], t * means[..., k // 2]).state(contact, t * force[..., k // 2])
             for k, (end, t) in enumerate(zip(ends, steps, strict=True))
         ]
-        reached = self._reached(part, fixed, states, sides, steps, moves)
+        reached = self._reached(part, fixed, states, sides, steps)
         return [side_after(*one) for one in zip(sides, moves, *zip(*reached, strict=True), strict=True)]
 
 

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Pattern, stiffness, times
-from finger3d.fem.mesh.parts import elasticity_of, moduli_of
+from finger3d.fem.mesh.parts import elasticity_of
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, restrict, surface
@@ -32,7 +32,6 @@ from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object
 from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share, under_pressure
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
@@ -167,16 +166,14 @@ class VariedBody:
         for model in (low, high):
             if replace(model, **kept) != own or type(model.design) is not type(own.design):
                 raise Finger3dError("it changes the mesh")
-        models = low, high
-        if any(model.object != own.object or model.design != own.design for model in models):
+        changed = {name for name in _CHANGES for model in (low, high) if getattr(model, name) != getattr(own, name)}
+        touches = [problem.system.first_contact_mm] * 2
+        if changed & {"object", "design"}:
             touches = [model.first_contact.first_contact_mm for model in (low, high)]
-        else:
-            touches = [problem.system.first_contact_mm] * 2
         ends = [
             replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
-            for model, touch in zip(models, touches, strict=True)
+            for model, touch in zip((low, high), touches, strict=True)
         ]
-        changed = {name for name in _CHANGES for model in models if getattr(model, name) != getattr(own, name)}
         change = thing = None
         if changed & {*_IN_BODY, "inclusions"}:
             ends, change = self._changed([self._assembled(end) for end in ends], step)
@@ -239,19 +236,18 @@ class VariedBody:
         bodies = [Variation((ends[0], ends[1]), step, *both) for both in ((change, None), (None, thing))]
         moved = changes_of_points(problem, bodies, pressed.reshape(-1, 1))[: pressed.size, 0]
         slopes = moved.T.reshape(2, *pressed.shape)
-        out = []
+        rate, out = None, []
+        if thing is not None and problem.model.finite_strain:
+            rate = np.zeros((pressed.size, pressed.size))
+            rate[np.ix_(active, active)] = thing.compliance(self._object_unknowns)
         for end, t in zip(ends, (-step, step), strict=True):
             both = [under_pressure(end.surface, one) for one in (system.delassus - compliance, compliance)]
             share, points = object_share(*(both + t * slopes[..., 0])), end.system.points
             of_points = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
             points = replace(points, compliance=of_points)
-            out.append(replace(end, system=replace(end.system, object_share=share, points=points)))
-        if thing is not None and problem.model.finite_strain:
-            rate = np.zeros((pressed.size, pressed.size))
-            rate[np.ix_(active, active)] = thing.compliance(self._object_unknowns)
-            changed = [compliance + t * rate.reshape(compliance.shape) for t in (-step, step)]
-            pairs = zip(out, changed, strict=True)
-            out = [replace(end, system=replace(end.system, object_compliance=one)) for end, one in pairs]
+            other = compliance if rate is None else compliance + t * rate.reshape(compliance.shape)
+            of_end = replace(end.system, object_share=share, object_compliance=other, points=points)
+            out.append(replace(end, system=of_end))
         return out
 
     def _assembled(self, end: Problem) -> _Assembled:
@@ -279,23 +275,24 @@ class VariedBody:
         bars = bars_of(model, mesh, axes)
         if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
             raise Finger3dError("it changes which foils are mirror images of each other")
-        meshed = MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic))
-        if is_other or bars:
-            parts = [local_rows(face, vertical_frame(mesh.dim))[active], *rows_of_readings(model, meshed, bars)]
-        else:
-            parts = self._rows_of_readings(meshed, model)
-        rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
-        system = replace(end.system, surface=face, points=points)
         changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-        return replace(end, system=system, condensed_body=changed), (matrix.upper, rows), bars
+        system = replace(end.system, surface=face, points=points)
+        end = replace(end, system=system, condensed_body=changed)
+        if is_other or bars:
+            readings = rows_of_readings(model, end.meshed_body, bars)
+            parts = [local_rows(face, vertical_frame(mesh.dim))[active], *readings]
+        else:
+            parts = self._rows_of_readings(end)
+        rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
+        return end, (matrix.upper, rows), bars
 
-    def _rows_of_readings(self, body: MeshedBody, model: Model) -> list[sp.csr_matrix]:
-        """Return the condensed rows with those of the readings of a model, where they are others."""
+    def _rows_of_readings(self, end: Problem) -> list[sp.csr_matrix]:
+        """Return the condensed rows with those of the readings of another problem, where they are others."""
         rows, first = self.problem.body.condensed.rows, len(self.problem.system.active_dofs)
         parts = [rows[:first]]
-        for before, reading in zip(self.problem.model.readings, model.readings, strict=True):
-            count = len(reading.columns(body.mesh.dim))
-            parts.append(rows[first : first + count] if reading == before else reading.rows(body))
+        for before, reading in zip(self.problem.model.readings, end.model.readings, strict=True):
+            count = len(reading.columns(end.dim))
+            parts.append(rows[first : first + count] if reading == before else reading.rows(end.meshed_body))
             first += count
         return parts
 

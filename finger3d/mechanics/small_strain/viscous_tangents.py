@@ -44,11 +44,12 @@ class _Linear(Linear):
 class _FixedForces(FixedForces):
     """Derivatives at fixed contact forces, those of internal variables (q, p) and of rows (r, p) without springs, too.
 
-    `readings` are those of the relaxed stress.
+    `readings` are those of the relaxed stress; `pasts` are the steps of all sides, and their internal variables before.
     """
 
     variables: Float
     rows: Float
+    pasts: Sequence[_Past]
 
 
 class ViscousTangents(IncrementTangents):
@@ -70,7 +71,12 @@ class ViscousTangents(IncrementTangents):
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> _FixedForces:
         problem, memory, response = self.problem, part.after.body.memory, part.linear.response
         body, active = self.formulation.body(problem), problem.system.active_dofs
-        forces, pasts = problem.row_forces(problem.upright_force(part.after.contact)), _pasts(sides, moves)
+        forces = problem.row_forces(problem.upright_force(part.after.contact))
+        pasts = [
+            (Step(series.prony, move.duration_s), side.state.body.memory)
+            for side, move in zip(sides, moves, strict=True)
+            if (series := side.problem.model.relaxation) is not None
+        ]
         own = np.zeros((len(forces), len(steps) // 2))  # of springs whose stiffness changes
         if count := len(springs := problem.inclusions.bar_stiffness):
             forces[-count:] = -springs * body.read(memory.elastic)[-count:]
@@ -80,7 +86,7 @@ class ViscousTangents(IncrementTangents):
         held = relaxed(part.linear.step.prony, memory)
         variables = slopes([(held + step.history_load(past)) / step.alpha for step, past in pasts], steps)
         if isinstance(body, ConstantBulkModulus):
-            now = then = self._with_constant_bulk(body, part, forces, sides, steps, pasts, variables)
+            now = then = self._with_constant_bulk(part, forces, sides, steps, pasts, variables)
         else:
             changes = [*(one.body for one in self._variations), *[None] * (len(steps) // 2 - len(self._variations))]
             both = changes_of_rows(changes, np.stack([memory.elastic, forces], axis=1))
@@ -90,17 +96,10 @@ class ViscousTangents(IncrementTangents):
         follow = problem.inclusions.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
         displacement = super()._at_fixed_forces(part, sides, steps, moves).displacement
         displacement[active] += (rows + response.compliance @ follow)[: len(active)]
-        return _FixedForces(displacement, then[len(active) :][: len(problem.model.columns)], variables, rows)
+        return _FixedForces(displacement, then[len(active) :][: len(problem.model.columns)], variables, rows, pasts)
 
     def _with_constant_bulk(
-        self,
-        body: ConstantBulkModulus,
-        part: Part,
-        forces: Float,
-        sides: Sequence[Side],
-        steps: Float,
-        pasts: Sequence[_Past],
-        variables: Float,
+        self, part: Part, forces: Float, sides: Sequence[Side], steps: Float, pasts: Sequence[_Past], variables: Float
     ) -> Float:
         """Enter the derivatives of displacements and dilatations (N, p) under row forces (r,); return those of rows."""
         now, rows = part.after.body.memory.elastic, np.zeros((len(forces), len(steps) // 2))
@@ -115,18 +114,13 @@ class ViscousTangents(IncrementTangents):
                 load[:, k] += one.body.rows.T @ forces
                 rows[:, k] = one.body.rows @ now[: len(load)]
                 rows[len(rows) - len(one.body.subgrid) :, k] += one.body.subgrid @ now[len(load) :]
+        body = ConstantBulkModulus(self.problem)
         alpha, condensed = body.condensed(part.linear.step, self._workspace)
         variables[: len(load)] = body.shape(condensed.solve(load), alpha)
         return rows
 
     def _reached(
-        self,
-        part: Part,
-        fixed: FixedForces,
-        states: Sequence[State[Float]],
-        sides: Sequence[Side],
-        steps: Float,
-        moves: Sequence[Move],
+        self, part: Part, fixed: FixedForces, states: Sequence[State[Float]], sides: Sequence[Side], steps: Float
     ) -> list[tuple[State[Any], Float]]:
         assert isinstance(fixed, _FixedForces)
         problem, response, memory = self.problem, part.linear.response, part.after.body.memory
@@ -139,9 +133,8 @@ class ViscousTangents(IncrementTangents):
         if is_pressure.any() and not isinstance(body, ConstantBulkModulus):  # of the relaxed stress
             read[is_pressure] = (body.read(rows)[first:][: len(read)] + fixed.readings)[is_pressure]
         here, found = readings_of(problem, part.after), list[tuple[State[Any], Float]]()
-        for k, (state, side, (step, past), t) in enumerate(
-            zip(states, sides, _pasts(sides, moves), steps, strict=True)
-        ):
+        of_sides = zip(states, sides, fixed.pasts, steps, strict=True)
+        for k, (state, side, (step, past), t) in enumerate(of_sides):
             viscous = ViscousBody(state.body, step.after(past, memory.elastic + t * variables[:, k // 2]))
             after, readings = State(state.contact, viscous, state.last), here + t * read[:, k // 2]
             if isinstance(body, ConstantBulkModulus) and is_pressure.any():
@@ -154,13 +147,3 @@ def _variables_under(response: Response, rows: Float) -> Float:
     """Return the internal variables (q, p) that forces (r, p) on the rows cause."""
     free = response.shape(np.zeros(len(rows)))
     return np.stack([response.shape(row) - free for row in rows.T], axis=-1)
-
-
-def _pasts(sides: Sequence[Side], moves: Sequence[Move]) -> list[_Past]:
-    """Return the steps of all sides, and their internal variables before."""
-    series = [side.problem.model.relaxation for side in sides]
-    return [
-        (Step(one.prony, move.duration_s), side.state.body.memory)
-        for one, side, move in zip(series, sides, moves, strict=True)
-        if one is not None
-    ]
