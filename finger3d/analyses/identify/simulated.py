@@ -174,12 +174,10 @@ class Simulation:
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
         if point not in self._slopes:
-            keys = [f.numbered(self.given) for f in costly]
-            self._slopes[point] = self._derivatives(point, keys)
-        known = self._slopes[point]
-        if known is None:
+            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
+        if (known := self._slopes[point]) is None:
             return None
-        by_key, offset = dict(zip((f.key for f in costly), known, strict=True)), self._offset(values, measured)
+        by_key = dict(zip((f.key for f in costly), known, strict=True))
         out = {name: np.zeros((len(measured.at), len(self.free))) for name in measured.columns}
         for k, free in enumerate(self.free):
             h = _STEP * max(abs(float(values[k])), _LEAST)
@@ -190,8 +188,8 @@ class Simulation:
                     slope = _scaled(by_key[free.key], factor)
                     changed: Curve = {n: v + t * slope[n] if n in slope else v for n, v in curve.items()}
                 else:
-                    changed = curve if free.key == OFFSET else self.curve(moved)
-                ends.append(_at_rows(changed, measured, offset + (t if free.key == OFFSET else 0.0)))
+                    changed = self.curve(moved)
+                ends.append(_at_rows(changed, measured, self._offset(moved, measured)))
             for name, column in out.items():
                 column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
         return out

@@ -81,7 +81,7 @@ class IncrementTangents:
         self.formulation = formulation_of(problem.model)
         self._here = Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
         self.sides = [self._here._replace(problem=end, state=self._start(end)) for end in ends]
-        self._variations = self._without_past = variations  # those that forces alone follow at the end of a part
+        self._variations = self._without_past = variations  # what they change follows from the present forces
         self._stations, self._number = [stations(end.model.legs) for end in ends], 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment

@@ -59,7 +59,7 @@ class ViscousTangents(IncrementTangents):
 
     def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
         super().__init__(problem, variations, steps)
-        self._without_past = [replace(one, body=None) for one in variations]  # an elastic object has none
+        self._without_past = [replace(one, body=None) for one in variations]  # an elastic object does not relax
 
     def _linearised(self, before: State[ViscousBody], after: State[ViscousBody], move: Move) -> _Linear:
         step = Step(self.formulation.relaxation.prony, move.duration_s)
