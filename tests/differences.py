@@ -109,7 +109,7 @@ def assert_equal_to_differences(
         ends = []
         near = body.variation(way(-h), way(h), h)
         for end, t in zip(near.ends, (-h, h), strict=True):
-            other = build(way(t)) if near.changes_compliance else end
+            other = build(way(t)) if near.body or near.thing else end
             ends.append((other, list(march(other))))
         for number, (low, high) in enumerate(zip(*(found for _, found in ends), strict=True)):
             assert (low.state.status == high.state.status).all()

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -34,9 +34,9 @@ from finger3d.contact.state import ContactState
 from finger3d.fem.tensors import block_diagonal
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.parts import Substep
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, upright
 from finger3d.objects import Move, vertical_frame
@@ -83,7 +83,7 @@ class SlipReference:
     by_earlier: Any
 
     @classmethod
-    def of(cls, problem: Problem, part: _Part) -> SlipReference:
+    def of(cls, problem: Problem, part: Substep) -> SlipReference:
         """Return the reference of the increment between two states."""
         d = part.after.contact.force.shape[1]
         end, bases = (state.contact.own_bases @ vertical_frame(d).T for state in (part.after, part.before))
@@ -198,19 +198,11 @@ def _resultants(problem: Problem, step: StepResult, last: ContactState) -> dict[
     return {name: np.where(moves, gradient, 0.0) for name, gradient in found.items()}
 
 
-class _Part(NamedTuple):
-    """Part of an increment: states of the meshed part before and after, and the motion of the object."""
-
-    before: State[Any]
-    after: State[Any]
-    move: Move
-
-
-def _parts(problem: Problem, steps: Sequence[StepResult]) -> list[_Part]:
+def _parts(problem: Problem, steps: Sequence[StepResult]) -> list[Substep]:
     """Return the parts that the increments were solved in."""
     ends = [(problem.origin, formulation_of(problem.model).start(problem))]
     ends += [part for step in steps for part in step.parts]
-    return [_Part(before, after, Move(start, end)) for (start, before), (end, after) in pairwise(ends)]
+    return [Substep(before, after, Move(start, end)) for (start, before), (end, after) in pairwise(ends)]
 
 
 def _at_end(zero: Float, gradient: Float) -> Float:
@@ -229,7 +221,7 @@ def _add_slip(by_displacement: Float, k: int, along: Float, reference: SlipRefer
         by_displacement[k - 2] -= reference.by_earlier.T @ along
 
 
-def _work(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -> Goal:
+def _work(problem: Problem, parts: Sequence[Substep], count: Float, zero: Float) -> Goal:
     """Return the external work: the stored energy plus the frictional dissipation of all increments."""
     c, d = parts[-1].after.contact.force.shape
     by_force, by_displacement = zero.copy(), zero.copy()
@@ -252,7 +244,7 @@ def _work(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -
     return Goal(name="external_work_mJ", by_force=by_force, by_displacement=by_displacement)
 
 
-def _dissipation(problem: Problem, parts: Sequence[_Part], count: Float, zero: Float) -> Goal:
+def _dissipation(problem: Problem, parts: Sequence[Substep], count: Float, zero: Float) -> Goal:
     """Return the dissipation, mu times the mean normal force times the slip of all increments."""
     by_force, by_displacement = zero.copy(), zero.copy()
     for k, part in enumerate(parts):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +18,13 @@ from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import stations
-from finger3d.mechanics.march.sensitivity import Numbers, derivatives, held_normals, refusal, tangents
+from finger3d.mechanics.march.sensitivity import derivatives, held_normals, refusal, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.variations import Variation, VariedBody
 from finger3d.progress import QUIET, Progress
-from finger3d.scene import Scene, Source, scene_of, tree
+from finger3d.scene import Source, scene_of, tree
 from finger3d.scene.material import with_moduli_only
 
 _KEYS = re.compile(
@@ -87,16 +88,8 @@ class Sensitivity:
 
     def as_dict(self) -> Tree:
         """Return what sensitivity.json holds."""
-        return {
-            "title": self.title,
-            "numbers": dict(self.numbers),
-            "keys": dict(self.keys),
-            "tolerances": dict(self.tolerances),
-            "derivatives": {name: dict(row) for name, row in self.derivatives.items()},
-            "derivatives_falling": {name: dict(row) for name, row in self.falling.items()},
-            "without_derivative": list(self.without),
-            "held_normals": self.held_normals,
-        }
+        names = {"falling": "derivatives_falling", "without": "without_derivative"}
+        return {names.get(name, name): value for name, value in asdict(self).items()}
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""
@@ -144,8 +137,7 @@ def sensitivity(
         If the press has no number of such a name, or its numbers have no derivatives.
     """
     scene = scene_of(scene, overrides)
-    model = scene.model()
-    names = scene.check_numbers(of)
+    model, names = scene.model(), scene.check_numbers(of)
     if text := refusal(model):
         raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")
@@ -155,42 +147,59 @@ def sensitivity(
         raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
-    keys, variations, varying = dict[str, float](), list[Variation](), VariedBody(problem)
-    for key, value in _numbers_of(with_moduli_only(scene.as_dict())):
-        if has_derivative(key, value, problem):
-            try:
-                variations.append(varied(scene, varying, key))
-            except Finger3dError:  # such as dimensions that change the cells of the mesh; it is named with the result
-                continue
-            keys[key] = value
-    *_, (step, *both) = tangents(problem, variations, pressed)
-    values = table_row(problem.points, step)
-    numbers = {name: values[name] for name in tuple(of) or names}
-    falling = growing = derivatives(step, variations, both[0])
+    given, varying, variations = with_moduli_only(scene.as_dict()), VariedBody(problem), dict[str, Variation]()
+    all_keys = dict(_numbers_of(given))
+    for key in all_keys:
+        with suppress(Finger3dError):  # such as dimensions that change the cells of the mesh; named with the result
+            variations[key] = varied(given, scene.path, varying, key)
+    titles, ways = {key: _named(key, given) for key in all_keys}, list(variations.values())
+    *_, (step, *both) = tangents(problem, ways, pressed)
+    falling = growing = derivatives(step, ways, both[0])
     if both[1] is not both[0]:
-        falling, growing = (derivatives(step, variations, sides, way) for sides, way in zip(both, (-1, 1), strict=True))
-    found = replace(_result(scene, keys, numbers, (falling, growing)), held_normals=held_normals(problem, step))
+        falling, growing = (derivatives(step, ways, sides, way) for sides, way in zip(both, (-1, 1), strict=True))
+    of = tuple(of) or names
+    slopes, others = (
+        {n: {titles[key]: row.get(n, np.nan) for key, row in zip(variations, rows, strict=True)} for n in of}
+        for rows in (growing, falling)
+    )
+    kinks = {n: {key: s for key, s in row.items() if not _is_close(s, slopes[n][key])} for n, row in others.items()}
+    values, skipped = table_row(problem.points, step), ("mesh.", "contact.", "effects.")
+    found = Sensitivity(
+        title=scene.title,
+        numbers={name: values[name] for name in of},
+        keys={titles[key]: all_keys[key] for key in variations},
+        tolerances={titles[key]: sd for key in variations if (sd := _tolerance(key, all_keys[key])) is not None},
+        derivatives=slopes,
+        falling={name: row for name, row in kinks.items() if row},
+        without=tuple(t for key, t in titles.items() if key not in variations and not t.startswith(skipped)),
+        held_normals=held_normals(problem, step),
+    )
     if out is not None:
         _write(Path(out), found)
     return found
 
 
-def varied(scene: Scene, body: VariedBody, key: str) -> Variation:
+def varied(given: TreeView, path: Path | None, body: VariedBody, key: str) -> Variation:
     """Return the variation of a condensed body with a key of its scene; one-sided where a bound is nearer than a step.
+
+    Parameters
+    ----------
+    given : tables of the scene, with moduli only (`finger3d.scene.material.with_moduli_only`)
+    path : of its file, if any
 
     Raises
     ------
     Finger3dError
         If numbers have no derivative by the key.
     """
-    given, own = with_moduli_only(scene.as_dict()), body.problem.model
-    value = float(str(tree.value_at(given, key)))
+    own, value = body.problem.model, float(str(tree.value_at(given, key) or 0.0))
+    if not _has_derivative(key, value, body.problem):
+        raise Finger3dError(f"{key}: {refusal(own) or 'numbers have no derivative by it'}")
     step = (_NU_STEP if key.endswith(".nu") else _STEP) * max(abs(value), _LEAST)
-    count = len(stations(own.legs))
-    problems = []
+    count, problems = len(stations(own.legs)), list[str]()
     for low in (value - step, value, value - 2.0 * step):
         try:
-            models = [scene_with(given, [key], [at], scene.path).model() for at in (low, low + 2.0 * step)]
+            models = [scene_with(given, [key], [at], path).model() for at in (low, low + 2.0 * step)]
             first, last = (replace(m, legs=with_increments_of(m.legs, count), mesh=own.mesh) for m in models)
             return body.variation(first, last, step)
         except Finger3dError as error:
@@ -208,47 +217,19 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
         yield from _numbers_of(child, f"{place}.{key}" if place else str(key))
 
 
-def has_derivative(key: str, value: float, problem: Problem) -> bool:
+def _has_derivative(key: str, value: float, problem: Problem) -> bool:
     """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
-    flat = problem.model.object.is_flat and not key.endswith("tilt_deg")
-    if problem.dim == 2 and key.endswith(_IN_SOLIDS):
-        return False
-    if key.endswith("turn_z_deg") and has_exact_path(problem.model):
-        return False  # beside the path there are increments
-    if key.endswith("duration_s") and problem.model.relaxation is None:
-        return False
-    if key.startswith("object.") and (has_exact_path(problem.model) or flat):
-        return False
-    mirrored = any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items())
-    return bool(_KEYS.fullmatch(key)) and not mirrored and not (key.endswith("length_mm") and value == 0.0)
-
-
-def _result(
-    scene: Scene, keys: Mapping[str, float], numbers: Numbers, both: tuple[Sequence[Numbers], Sequence[Numbers]]
-) -> Sensitivity:
-    """Return the derivatives (k,) as keys fall and grow with the names of gauges and markers in place of numbers."""
-    given = with_moduli_only(scene.as_dict())
-    titles = {key: _named(key, given) for key in keys}
-    falling, growing = (
-        {name: {titles[key]: row.get(name, np.nan) for key, row in zip(keys, rows, strict=True)} for name in numbers}
-        for rows in both
+    model = problem.model
+    flat, exact = model.object.is_flat and not key.endswith("tilt_deg"), has_exact_path(model)
+    excluded = (
+        problem.dim == 2 and key.endswith(_IN_SOLIDS),
+        key.endswith("turn_z_deg") and exact,  # beside the path there are increments
+        key.endswith("duration_s") and model.relaxation is None,
+        key.startswith("object.") and (exact or flat),
+        key.endswith("length_mm") and value == 0.0,
+        any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items()),
     )
-    kinks = {
-        name: {key: slope for key, slope in row.items() if not _is_close(slope, growing[name][key])}
-        for name, row in falling.items()
-    }
-    tolerances = {titles[key]: sd for key, value in keys.items() if (sd := _tolerance(key, value)) is not None}
-    without = [_named(key, given) for key, _ in _numbers_of(given) if key not in keys]
-    skipped = ("mesh.", "contact.", "effects.")
-    return Sensitivity(
-        title=scene.title,
-        numbers=numbers,
-        keys={titles[key]: value for key, value in keys.items()},
-        tolerances=tolerances,
-        derivatives=growing,
-        falling={name: row for name, row in kinks.items() if row},
-        without=tuple(key for key in without if not key.startswith(skipped)),
-    )
+    return not refusal(model) and bool(_KEYS.fullmatch(key)) and not any(excluded)
 
 
 def _is_close(one: float, other: float) -> bool:

@@ -37,16 +37,9 @@ def sensitivity(
     if json_:
         print_json(found.as_dict())
         return
-    head = [
-        "number",
-        "key",
-        "value",
-        "derivative",
-        *(["derivative_falling"] if found.falling else []),
-        "change",
-        "effect",
-    ]
-    print_columns(head, [[_text(row[name]) for name in head] for row in found.rows()])
+    rows = found.rows()
+    head = [name for name in rows[0] if found.falling or name != "derivative_falling"]
+    print_columns(head, [[_text(row[name]) for name in head] for row in rows])
     print("change: standard deviation of the key in a careful set-up where one is known, else 1 % of its value")
     if found.falling:
         print("the press ends at a kink, so that some derivatives differ as the key grows and as it falls")

@@ -19,14 +19,14 @@ from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
-from finger3d.analyses.sensitivity import has_derivative, varied
+from finger3d.analyses.sensitivity import varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
-from finger3d.mechanics.march.sensitivity import derivatives, refusal, tangents
+from finger3d.mechanics.march.sensitivity import derivatives, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
@@ -34,7 +34,8 @@ from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
-from finger3d.scene import Scene, tree
+from finger3d.scene import Scene
+from finger3d.scene.material import with_moduli_only
 
 OFFSET = "depth_offset_mm"
 """Key that is added to the measured depth; it needs no solution of its own."""
@@ -173,12 +174,10 @@ class Simulation:
         curve, (point, factor) = self.curve(values), self._point(values)
         costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
         if point not in self._slopes:
-            keys = [f.numbered(self.given) for f in costly]
-            self._slopes[point] = self._derivatives(point, keys)
-        known = self._slopes[point]
-        if known is None:
+            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
+        if (known := self._slopes[point]) is None:
             return None
-        by_key, offset = dict(zip((f.key for f in costly), known, strict=True)), self._offset(values, measured)
+        by_key = dict(zip((f.key for f in costly), known, strict=True))
         out = {name: np.zeros((len(measured.at), len(self.free))) for name in measured.columns}
         for k, free in enumerate(self.free):
             h = _STEP * max(abs(float(values[k])), _LEAST)
@@ -189,8 +188,8 @@ class Simulation:
                     slope = _scaled(by_key[free.key], factor)
                     changed: Curve = {n: v + t * slope[n] if n in slope else v for n, v in curve.items()}
                 else:
-                    changed = curve if free.key == OFFSET else self.curve(moved)
-                ends.append(_at_rows(changed, measured, offset + (t if free.key == OFFSET else 0.0)))
+                    changed = self.curve(moved)
+                ends.append(_at_rows(changed, measured, self._offset(moved, measured)))
             for name, column in out.items():
                 column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
         return out
@@ -245,18 +244,15 @@ class Simulation:
         if not keys:
             return []
         scene, (problem, steps) = self.scene(point), self._pressed(point)
-        problem, given = under(problem, legs=with_increments_of(problem.model.legs, len(steps))), scene.as_dict()
-        values = [float(str(tree.value_at(given, key) or 0.0)) for key in keys]
-        if refusal(problem.model) or not all(has_derivative(k, v, problem) for k, v in zip(keys, values, strict=True)):
-            return None
+        problem = under(problem, legs=with_increments_of(problem.model.legs, len(steps)))
+        given, body = with_moduli_only(scene.as_dict()), VariedBody(problem)
         try:
-            body = VariedBody(problem)
-            variations = [varied(scene, body, key) for key in keys]
+            variations = [varied(given, scene.path, body, key) for key in keys]
             rows = [
                 derivatives(step, variations, sides, with_zones=self.with_zones)
                 for step, _, sides in tangents(problem, variations, steps)
             ]
-        except Finger3dError:  # forces that jump have no derivatives; differences of presses have
+        except Finger3dError:  # such as of forces that jump, which have differences of presses
             return None
         if not all(all(row) for row in rows):  # of a side of a kink that is not known
             return None

@@ -18,12 +18,13 @@ from finger3d._types import Float
 from finger3d.analyses.free_keys import FIRST_BOX, LEAST_GAIN, next_box
 from finger3d.analyses.optimise.task import Objective, ObjectiveTable
 from finger3d.analyses.pressed_body import under
-from finger3d.analyses.sensitivity import has_derivative, varied
+from finger3d.analyses.sensitivity import varied
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.sensitivity import Numbers, derivatives, refusal, tangents
+from finger3d.mechanics.march.sensitivity import Numbers, derivatives, tangents
 from finger3d.mechanics.small_strain.variations import VariedBody
-from finger3d.scene import Scene, tree
+from finger3d.scene import Scene
+from finger3d.scene.material import with_moduli_only
 
 _LEAST_BOX = 1e-3
 """Half edge of the last box, over the ranges of the keys."""
@@ -43,15 +44,15 @@ def slopes_of(scene: Scene, problem: Problem, mus: Sequence[float], keys: Sequen
     Finger3dError
         If the numbers have no derivative by a key.
     """
-    given, why = scene.as_dict(), refusal(problem.model)
-    for key in keys:
-        if why or not has_derivative(key, float(str(tree.value_at(given, key) or 0.0)), problem):
-            raise Finger3dError(f"--method gradient: {key}: {why or 'numbers have no derivative by it'}")
-    body = VariedBody(problem)
-    variations, found = [varied(scene, body, key) for key in keys], []
+    given, body = with_moduli_only(scene.as_dict()), VariedBody(problem)
+    try:
+        variations = [varied(given, scene.path, body, key) for key in keys]
+    except Finger3dError as error:
+        raise Finger3dError(f"--method gradient: {error}") from None
+    found = []
     for mu in mus:
         friction = problem.model.friction.with_mu(mu)
-        at_mu = [replace(v, low=under(v.low, friction), high=under(v.high, friction)) for v in variations]
+        at_mu = [replace(v, ends=(under(v.ends[0], friction), under(v.ends[1], friction))) for v in variations]
         *_, (step, _, sides) = tangents(under(problem, friction), at_mu)
         found.append(derivatives(step, at_mu, sides))
     return found

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,9 +28,9 @@ from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, Linearisation, contact_of
-from finger3d.mechanics.march.parts import Substep, energies
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, rubbed
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, readings_of, rubbed, side_after
 from finger3d.mechanics.small_strain.linearised import LinearisedIncrement, Part, slopes
 from finger3d.mechanics.small_strain.variations import Side
 from finger3d.objects import Move, vertical_frame
@@ -65,19 +64,9 @@ class FiniteIncrementTangents(IncrementTangents):
 
     formulation: FiniteStrain
 
-    @cached_property
-    def _workspaces(self) -> list[FiniteStrainWorkspace]:
-        """Workspaces (2 p,) with the bodies below and above each parameter; that of the press where it changes none."""
-        bodies = [one.body for one in self._variations for _ in one.ends]
-        return [FiniteStrainWorkspace() if body else self._own for body in bodies]
-
-    @cached_property
-    def _own(self) -> FiniteStrainWorkspace:
-        return self.formulation.workspace()
-
     def _linearised(self, before: State[DeformedBody], after: State[DeformedBody], move: Move) -> _Linear:
         problem, contact = self.problem, after.contact
-        workspace = FiniteStrainWorkspace(bodies=self._own.bodies)
+        workspace = FiniteStrainWorkspace(bodies=self._workspace.bodies)
         equations = self.formulation.equations(problem, before, move, workspace)
         linearisation = equations.linearise(equations.at(after.body.unknowns), contact.force)
         delassus, compliance = linearisation.delassus, problem.system.object_compliance
@@ -92,11 +81,12 @@ class FiniteIncrementTangents(IncrementTangents):
         problem, contact, x = self.problem, part.after.contact, part.after.body.unknowns
         linear, active, size = part.linear, problem.system.active_dofs, steps[1::2]
         p, n, largest = len(size), problem.mesh.points.size, np.abs(contact.force).max(initial=0.0)
-        workspaces = [*self._workspaces, *[self._own] * (len(sides) - len(self._workspaces))]  # those of poses
-        formulations = [FiniteStrain(self.formulation.law, side.problem.model.relaxation) for side in sides]
+        formulations: list[Any] = [formulation_of(side.problem.model) for side in sides]
         equations = [
             formulation.equations(side.problem, side.state, move, workspace)
-            for formulation, side, move, workspace in zip(formulations, sides, moves, workspaces, strict=True)
+            for formulation, side, move, workspace in zip(
+                formulations, sides, moves, self._workspaces_of(sides), strict=True
+            )
         ]
         internal = np.zeros((len(x), p))
         for k, pair in enumerate(zip(equations[::2], equations[1::2], strict=True)):
@@ -123,7 +113,7 @@ class FiniteIncrementTangents(IncrementTangents):
             both = zip((step[:n], change), scales, strict=True)
             errors.append(np.max([np.abs(by).max(axis=0, initial=0.0) / scale for by, scale in both], axis=0))
             if _are_converged(errors):
-                return [end.side(*rest) for end, rest in zip(ends, zip(sides, formulations, strict=True), strict=True)]
+                return [end.side(side, own) for end, side, own in zip(ends, sides, formulations, strict=True)]
         raise Finger3dError(f"at depth {moves[0].end.depth_mm:.4g} mm the derivatives of an increment do not converge")
 
 
@@ -148,12 +138,8 @@ class _End:
 
     def side(self, before: Side, formulation: FiniteStrain) -> Side:
         """Return the side at the end of the part."""
-        problem, move = before.problem, self.equations.move
         state = formulation.remembered(self.equations, self.equations.reached(self.now, self.contact))
-        work, lost = energies(problem, [Substep(before.state, state, move)])
-        found = formulation.readings(problem, state)
-        read = np.array([found[column] for column in problem.model.columns])
-        return Side(problem, state, move.end, read, before.work_mJ + work, before.dissipation_mJ + lost)
+        return side_after(before, self.equations.move, state, readings_of(before.problem, state))
 
 
 def _scale(derivatives: Float, value: float, size: Float) -> Float:

@@ -23,10 +23,10 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import in_order
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import IncrementTangents, readings_of
 from finger3d.mechanics.small_strain.kinks import Sides
-from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangent, PathTangents
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.path_tangents import Changes, PathTangents, PlaceOnPath
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.mechanics.small_strain.viscous_tangents import ViscousTangents
 
 _NONE = ("largest_penetration_mm", "iterations", "residual", "time_s")
@@ -57,7 +57,7 @@ def held_normals(problem: Problem, step: StepResult) -> int:
     state, contact = step.meshed_state, step.meshed_state.contact
     if step.path is not None or problem.model.finite_strain or problem.model.object.is_flat:
         return 0
-    displacement = getattr(state.body, "displacement", state.body)  # a body that relaxes has internal variables, too
+    displacement = formulation_of(problem.model).loads(problem, state, step.target).displacement
     distance, share = problem.placed(step.target).distance, problem.system.object_share
     geometry = contact_geometry(distance, problem.surface, displacement, problem.axes, share)
     apart = np.linalg.norm(geometry.bases[:, 0] - contact.own_bases[:, 0], axis=1)
@@ -96,16 +96,14 @@ def tangents(problem: Problem, variations: Sequence[Variation], steps: Sequence[
 
 def _read(step: StepResult, one: Variation) -> tuple[Side, Side]:
     """Return the sides of a parameter that changes readings only at the end of an increment."""
-    state, problem = step.meshed_state, one.low
-    formulation, columns, first = formulation_of(problem.model), problem.model.columns, len(problem.system.active_dofs)
-    moved = np.zeros(len(columns))
+    state, (problem, other) = step.meshed_state, one.ends
+    low, high = (readings_of(end, state) for end in one.ends)
+    moved = np.zeros(len(low))
     if not problem.model.finite_strain:
-        forces = problem.row_forces(problem.upright_force(state.contact))[:, None]
-        moved = changes_of_rows([one.body], forces)[first : first + len(columns), 0, 0]
-    found = [formulation.readings(end, state) for end in one.ends]
-    low, high = (np.array([own[column] for column in columns]) for own in found)
-    side = Side(one.low, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
-    return side, side._replace(problem=one.high, readings=high + one.step * moved)
+        force = problem.upright_force(state.contact).reshape(-1, 1)
+        moved = changes_of_points(problem, [one], force)[len(force) :, 0, 0]
+    side = Side(problem, state, step.target, low - one.step * moved, step.external_work_mJ, step.dissipation_mJ)
+    return side, side._replace(problem=other, readings=high + one.step * moved)
 
 
 def derivatives(
@@ -129,7 +127,12 @@ def derivatives(
 
 
 def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
-    growing = falling = _increment_tangents(problem, variations, steps)
+    kind = IncrementTangents if problem.model.relaxation is None else ViscousTangents
+    if problem.model.finite_strain:
+        from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
+
+        kind = FiniteIncrementTangents
+    growing = falling = kind(problem, variations, steps)
     for step in steps:
         if growing is falling and falling.is_at_kink(step):
             growing = copy(falling)
@@ -140,33 +143,17 @@ def _by_increments(problem: Problem, variations: Sequence[Variation], steps: Seq
             yield step, falling.advance(step, -1), growing.advance(step, 1)
 
 
-def _increment_tangents(
-    problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]
-) -> IncrementTangents:
-    if not problem.model.finite_strain:
-        viscous = problem.model.relaxation is not None
-        return (ViscousTangents if viscous else IncrementTangents)(problem, variations, steps)
-    from finger3d.mechanics.finite_strain.increment_tangents import FiniteIncrementTangents
-
-    return FiniteIncrementTangents(problem, variations, steps)
-
-
 def _on_exact_path(problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> Tangents:
-    count = len(variations)
     changes = Changes.of(problem, variations)
-    moved = np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
-    tangent, motion = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count)), np.zeros((count, 2))
-    energies, number, follower = np.zeros((2, count)), 0, None
+    place, leg, along = PlaceOnPath.at_rest(changes), 0, None
     for station, step in zip(stations(problem.model.legs), steps, strict=True):
-        follower = follower or PathTangents(step.path, variations, changes, tangent, motion, number)
-        place = follower.at_share(station.share)
-        sides: Sides = list(follower.sides(step, station.share, place, energies))
-        both = follower.one_sided(step, station.share, place, energies) if step is steps[-1] else None
+        along = along or PathTangents(step.path, changes, place, leg)
+        here = along.at_share(station.share)
+        sides: Sides = list(along.sides(step, here))
+        both = along.one_sided(step, station.share) if step is steps[-1] else None
         yield step, *(both or (sides, sides))
         if station.share == 1.0:
-            tangent, energies = place.tangent, energies + place.energies
-            motion, number, follower = follower.motion(tangent, 1.0), number + 1, None
-            tangent = replace(tangent, amplitude=np.zeros(count))
+            place, leg, along = here, leg + 1, None
 
 
 def _of_numbers(step: StepResult, one: Variation, low: Side | None, high: Side | None, with_zones: bool) -> Numbers:

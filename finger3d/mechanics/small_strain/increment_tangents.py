@@ -26,16 +26,17 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, Status
-from finger3d.contact.state import pressure
+from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import Substep, energies
 from finger3d.mechanics.march.path import Station, stations
+from finger3d.mechanics.march.to_force import forces_on
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.contact_slopes import ContactEnd, are_placed_alike
-from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
+from finger3d.mechanics.small_strain.kinks import End, Sides, coefficients, one_sided
 from finger3d.mechanics.small_strain.linear_contact import Increment, LinearBody
 from finger3d.mechanics.small_strain.linearised import (
     Linear,
@@ -44,7 +45,7 @@ from finger3d.mechanics.small_strain.linearised import (
     slopes,
     upright,
 )
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
 _STEP = 1e-6
@@ -80,11 +81,13 @@ class IncrementTangents:
         self.formulation = formulation_of(problem.model)
         self._here = Side(problem, self.formulation.start(problem), problem.origin, np.zeros(0), 0.0, 0.0)
         self.sides = [self._here._replace(problem=end, state=self._start(end)) for end in ends]
-        self._variations = variations
+        self._variations = self._without_past = variations  # what they change follows from the present forces
         self._stations, self._number = [stations(end.model.legs) for end in ends], 0
         self._leg_start_N, self._left = np.zeros((len(ends), 3)), np.zeros((len(ends), 2))
         self._last: Sequence[Side] = self.sides  # at the beginning of the last part of an increment
         self._is_unknown = np.zeros(len(ends), dtype=bool)  # since a kink
+        self._workspace, bodies = self.formulation.workspace(), [one.body for one in variations for _ in one.ends]
+        self._workspaces = [self.formulation.workspace() if body else self._workspace for body in bodies]
 
     def advance(self, step: StepResult, way: int = 0) -> Sides:
         """Return the sides at the end of the next increment, which has this result.
@@ -96,19 +99,13 @@ class IncrementTangents:
         Finger3dError
             If the equations of an active set are singular, or the geometry of the contact has no derivative.
         """
-        sides, (here, length) = self._sides(step), self._end(step)
-        if way and is_kink(here, length):
+        sides, here = self._sides(step), self._end(step)
+        if way and here.is_kink:
 
-            def solved(status: Status) -> tuple[list[Side], list[End]]:
-                found = self._sides(step, status)
-                befores = zip(self._last, found, strict=True)
-                ends = [
-                    End(before.state.contact, side.state.contact, _coefficients(before, status))
-                    for before, side in befores
-                ]
-                return found, ends
+            def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
+                return self._sides(step, status), [before.state.contact for before in self._last]
 
-            chosen = one_sided(here, length, solved, way)
+            chosen = one_sided(here, solved, way)
             self._is_unknown = self._is_unknown | np.array([side is None for side in chosen], dtype=bool)
             sides = [own or side for own, side in zip(chosen, sides, strict=True)]
         self.sides = sides
@@ -118,14 +115,12 @@ class IncrementTangents:
 
     def is_at_kink(self, step: StepResult) -> bool:
         """Whether the next increment, which has this result, ends as a point is about to change its status."""
-        return is_kink(*self._end(step))
+        return self._end(step).is_kink
 
-    def _end(self, step: StepResult) -> tuple[End, float]:
-        """Return the contact of the last part of an increment, and the length that its gaps are compared with."""
-        states = [self._here.state, *(after for _, after in step.parts)]
-        before, contact = self._here._replace(state=states[-2]), states[-1].contact
-        friction = _coefficients(before, contact.status)
-        return End(before.state.contact, contact, friction), self.problem.model.largest_depth_mm
+    def _end(self, step: StepResult) -> End:
+        """Return the contact of the last part of an increment."""
+        before, after = [self._here.state, *(state for _, state in step.parts)][-2:]
+        return End(self.problem, before.contact, after.contact)
 
     def _sides(self, step: StepResult, status: Status | None = None) -> list[Side]:
         """Return the sides at the end of an increment, where the points may have other statuses (c,)."""
@@ -163,9 +158,9 @@ class IncrementTangents:
         """Return the equations of a part of an increment that ends as the object has moved so from its beginning."""
         return Linear(LinearisedIncrement.of(self.problem, before.contact, after.contact), self.problem.delassus)
 
-    def _displaced(self, state: State[Any]) -> State[Float]:
-        """Return a state whose body is the displacement (c, d) mm of the contact points."""
-        return state
+    def _workspaces_of(self, sides: Sequence[Side]) -> list[Any]:
+        """Return the workspaces of sides: their own if a parameter changes the body, else that of the press."""
+        return [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]  # some are of poses
 
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> FixedForces:
         """Return the derivatives of the body at the end of a part of an increment under its forces."""
@@ -174,44 +169,15 @@ class IncrementTangents:
         return FixedForces(*np.split(np.pad(found, ((0, 0), (0, more))), [self.problem.surface.points.size]))
 
     @cached_property
-    def _forces(self) -> list[Float]:
-        """Contact forces (c, d) at the ends of all parts of the press, in the directions of an upright object."""
-        return [self.problem.upright_force(after.contact) for step in self._results for _, after in step.parts]
-
-    def _by_contact(self, array: Float) -> dict[bytes, Float]:
-        """Return slices of an array (n, k, p) for each of `_forces`, by the contact forces."""
-        contacts = [after.contact.force.tobytes() for step in self._results for _, after in step.parts]
-        return dict(zip(contacts, np.moveaxis(array, 1, 0), strict=True))
-
-    @cached_property
     def _fixed(self) -> dict[bytes, Float]:
-        """Derivatives of displacements and readings (c d + g, p) under the forces at the ends of all parts."""
-        problem, size = self.problem, self.problem.surface.points.size
-        rows = np.stack([problem.row_forces(force) for force in self._forces], axis=1)
-        rows = problem.inclusions.with_spring_forces(problem.body.condensed.compliance, rows)
-        moved = changes_of_rows([one.body for one in self._variations], rows)
-        out = np.zeros((size + len(problem.system.reading_rows), *moved.shape[1:]))
-        for k, one in enumerate(self._variations):
-            if one.body:
-                out[:, :, k] = np.concatenate(one.body.of_points(problem, rows, moved[..., k]))
-        return self._by_contact(out)
-
-    @cached_property
-    def _of_object(self) -> dict[bytes, Float]:
-        """Derivatives (c d, p) of the displacement of an elastic object under the forces, by these; see `_fixed`."""
-        active, forces = self.problem.system.active_dofs, np.stack([one.ravel() for one in self._forces], axis=1)
-        moved = np.zeros((*forces.shape, len(self._variations)))
-        moved[active] = changes_of_rows([one.thing for one in self._variations], forces[active])
-        return self._by_contact(moved)
+        """Derivatives (c d + g, p) of contact displacements and readings under the forces at the ends of all parts."""
+        contacts = [after.contact for step in self._results for _, after in step.parts]
+        forces = np.stack([self.problem.upright_force(contact).ravel() for contact in contacts], axis=1)
+        moved = changes_of_points(self.problem, self._without_past, forces)
+        return {contact.force.tobytes(): moved[:, k] for k, contact in enumerate(contacts)}
 
     def _reached(
-        self,
-        part: Part,
-        fixed: FixedForces,
-        states: Sequence[State[Float]],
-        sides: Sequence[Side],
-        steps: Float,
-        moves: Sequence[Move],
+        self, part: Part, fixed: FixedForces, states: Sequence[State[Float]], sides: Sequence[Side], steps: Float
     ) -> list[tuple[State[Any], Float]]:
         """Return the states of all sides at the end of a part of an increment, and their readings (g,)."""
         forces = [self.problem.upright_force(state.contact).ravel() for state in states]
@@ -238,19 +204,19 @@ class IncrementTangents:
         moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
         steps = np.array([*self._steps, *[-h, h] * len(free)])
         found = self._through(parts, [*self.sides, *[self._here] * len(moved)], steps, [*held, *moved])
-        forces = np.array([_forces(side) for side in found])
+        forces = np.array([forces_on(side.problem, side.state) for side in found])
         if loads[0].begins:
-            self._leg_start_N = np.array([_forces(side) for side in self.sides])
+            self._leg_start_N = np.array([forces_on(side.problem, side.state) for side in self.sides])
         goals = np.array([load.forces for load in loads])
         wanted = self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
-        missing = 0.5 * np.diff((wanted - forces[: len(held)]).reshape(-1, 2, 3), axis=1)[:, 0, free]
-        stiffness = np.diff(forces[len(held) :].reshape(-1, 2, 3), axis=1)[:, 0, free].T / (2.0 * h)
+        missing = slopes(wanted - forces[: len(held)], self._steps)[free]
+        stiffness = slopes(forces[len(held) :], steps[len(held) :])[free]
         try:
-            change = np.linalg.solve(stiffness, missing.T).T
+            change = np.linalg.solve(stiffness, missing)
         except np.linalg.LinAlgError:
             raise Finger3dError("forces do not determine the pose of the object: numbers have no derivatives") from None
-        both = np.stack([-change, change], axis=1).reshape(-1, len(free))
-        return [pose.changed(free, by) for pose, by in zip(held, both, strict=True)]
+        pairs = enumerate(zip(held, self._steps, strict=True))
+        return [pose.changed(free, t * change[:, k // 2]) for k, (pose, t) in pairs]
 
     def _through(
         self, parts: Sequence[Part], sides: Sequence[Side], steps: Float, poses: Sequence[ObjectPose]
@@ -267,14 +233,16 @@ class IncrementTangents:
         contact, linear, frame = part.after.contact, part.linear.active, vertical_frame(self.problem.dim)
         (c, d), p = contact.force.shape, len(sides) // 2
         delassus = part.linear.delassus.reshape(c * d, c * d)
-        fixed, there = self._at_fixed_forces(part, sides, steps, moves), self._displaced(part.after).body
-        at_fixed_forces = fixed.displacement.copy()
-        if any(one.thing for one in self._variations):
-            at_fixed_forces[:, : len(self._variations)] += self._of_object[contact.force.tobytes()]
+        fixed = self._at_fixed_forces(part, sides, steps, moves)
+
+        def displaced(problem: Problem, state: State[Any]) -> State[Float]:
+            return replace(state, body=self.formulation.loads(problem, state, part.move.end).displacement)
+
+        there = displaced(self.problem, part.after).body
         body = LinearBody(self.problem.delassus, np.zeros_like(there))
 
         def increment(problem: Problem, state: State[Any], move: Move) -> Increment:
-            return Increment(problem, self._displaced(state), move, body, DistanceTracker())
+            return Increment(problem, displaced(problem, state), move, body, DistanceTracker())
 
         own = ContactEnd.of(increment(self.problem, part.before, part.move), there)
         of_place, of_means = own.slopes(contact)
@@ -288,7 +256,7 @@ class IncrementTangents:
         touches = np.flatnonzero(np.repeat(contact.status != OPEN, d))
         turned, through = (relative + d)[touches], delassus[:, touches]
         of_unknowns = linear.forces[touches].toarray()
-        force = direct[touches] + changes[turned] + of_moved[turned] @ at_fixed_forces
+        force = direct[touches] + changes[turned] + of_moved[turned] @ fixed.displacement
         if not self.problem.model.object.is_flat:  # forces turn with the directions of their points
             matrix = np.eye(len(touches)) - of_moved[turned] @ through
             both = np.linalg.solve(matrix, np.hstack([of_unknowns, force]))
@@ -296,9 +264,9 @@ class IncrementTangents:
         weights = linear.weights @ of_moved[relative]
         response = weights @ through
         matrix = response @ of_unknowns + np.diag(linear.diagonal)
-        right = linear.weights @ changes[relative] + weights @ at_fixed_forces + response @ force
+        right = linear.weights @ changes[relative] + weights @ fixed.displacement + response @ force
         unknowns = -np.linalg.solve(matrix, right)
-        moved = through @ (of_unknowns @ unknowns + force) + at_fixed_forces
+        moved = through @ (of_unknowns @ unknowns + force) + fixed.displacement
         place = np.einsum("ckp,kl->clp", moved.reshape(c, d, p), frame)
         means = (of_means @ place.reshape(-1, p)).reshape(c, -1, p)
         force = (linear.forces @ unknowns + direct).reshape(c, d, p)
@@ -307,15 +275,20 @@ class IncrementTangents:
             end.moved(t * place[..., k // 2], t * means[..., k // 2]).state(contact, t * force[..., k // 2])
             for k, (end, t) in enumerate(zip(ends, steps, strict=True))
         ]
-        reached = self._reached(part, fixed, states, sides, steps, moves)
-        return [_side(*one) for one in zip(sides, moves, reached, strict=True)]
+        reached = self._reached(part, fixed, states, sides, steps)
+        return [side_after(*one) for one in zip(sides, moves, *zip(*reached, strict=True), strict=True)]
 
 
-def _side(before: Side, move: Move, reached: tuple[State[Any], Float]) -> Side:
-    """Return the side after a motion, which has reached a state and readings (g,)."""
-    state, readings = reached
+def side_after(before: Side, move: Move, state: State[Any], readings: Float) -> Side:
+    """Return the side after a motion that has led to a state with readings (g,)."""
     work, lost = energies(before.problem, [Substep(before.state, state, move)])
     return Side(before.problem, state, move.end, readings, before.work_mJ + work, before.dissipation_mJ + lost)
+
+
+def readings_of(problem: Problem, state: State[Any]) -> Float:
+    """Return the readings (g,) of a state."""
+    found = formulation_of(problem.model).readings(problem, state)
+    return np.array([found[column] for column in problem.model.columns])
 
 
 def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
@@ -327,16 +300,5 @@ def rubbed(part: Part, sides: Sequence[Side]) -> list[Float]:
     slips = (length > 0.0) & (after.status == SLIP)
     share = np.divide(after.force[:, 0], length, out=np.zeros_like(length), where=slips)
     friction = np.column_stack([np.zeros(len(along)), along * share[:, None]])
-    return [friction * _coefficients(side, after.status)[:, None] for side in sides]
-
-
-def _forces(side: Side) -> Float:
-    """Return the normal force and the forces along x and z (3,) N."""
-    x, y, z = side.problem.world_force(side.state.contact).sum(axis=0)
-    return np.array([-y, x, z])
-
-
-def _coefficients(side: Side, status: Status) -> Float:
-    """Return the coefficients of friction (c,) of points with a status (c,) at the end of the next increment."""
-    friction, pressed = side.problem.model.friction, pressure(side.state.contact.force, side.problem.surface.area)
-    return friction.updated(friction.coefficients(status, pressed), status, pressed)
+    mus = [coefficients(side.problem, side.state.contact, after.status) for side in sides]
+    return [friction * mu[:, None] for mu in mus]

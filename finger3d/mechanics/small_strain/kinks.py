@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
-from finger3d.contact.state import ContactState
+from finger3d.contact.state import ContactState, pressure
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.mechanics.small_strain.variations import Side
 
@@ -30,11 +31,16 @@ Sides: TypeAlias = list[Side | None]
 
 
 class End(NamedTuple):
-    """Contact at the beginning and the end of a motion, and its coefficients of friction (c,)."""
+    """Contact of a press at the beginning and at the end of a motion."""
 
+    problem: Problem
     before: ContactState
     after: ContactState
-    friction: Float
+
+    @property
+    def friction(self) -> Float:
+        """Coefficients of friction (c,)."""
+        return coefficients(self.problem, self.before, self.after.status)
 
     @property
     def margins(self) -> Float:
@@ -46,23 +52,29 @@ class End(NamedTuple):
         slip = np.divide(slip, length, out=np.zeros_like(slip), where=length > 0.0)
         return np.stack([self.after.gap, normal, self.friction * normal - length, slip])
 
+    @property
+    def sizes(self) -> Float:
+        """What margins are compared with, (4, 1): the depth (mm), and the largest force (N)."""
+        length, force = self.problem.model.largest_depth_mm, float(np.abs(self.after.force).max(initial=0.0))
+        return np.array([length, force, force, length])[:, None]
 
-Solved: TypeAlias = Callable[[Status], tuple[Sequence[Side], Sequence[End]]]
-"""The sides (2 p,) and their ends if the points had these statuses (c,) at the end of an increment."""
+    @property
+    def is_kink(self) -> bool:
+        """Whether a point is on the border of its set."""
+        at_zero = self.margins <= _ZERO * self.sizes
+        return bool(_mended(self.after.status, at_zero.astype(np.float64), at_zero, self.friction)[1].any())
 
 
-def is_kink(here: End, length: float) -> bool:
-    """Whether a point is on the border of its set; gaps are compared with a length (mm)."""
-    at_zero = here.margins <= _ZERO * _sizes(here, length)
-    return bool(_mended(here.after.status, at_zero.astype(np.float64), at_zero, here.friction)[1].any())
+Solved: TypeAlias = Callable[[Status], tuple[Sequence[Side], Sequence[ContactState]]]
+"""The sides (2 p,) if the points had these statuses (c,) at the end of a motion, and their contact at its beginning."""
 
 
-def one_sided(here: End, length: float, solved: Solved, way: int) -> Sides:
+def one_sided(here: End, solved: Solved, way: int) -> Sides:
     """Return the sides at a kink with the active sets of falling (`way` -1) or growing (1) parameters.
 
     Points that begin to touch are taken to stick; sides are not known where one of them would slip.
     """
-    size, known = _sizes(here, length), dict[bytes, tuple[Sequence[Side], Sequence[End]]]()
+    size, known = here.sizes, dict[bytes, tuple[Sequence[Side], Sequence[ContactState]]]()
     at_zero = here.margins <= _ZERO * size
 
     def found(number: int) -> Sides:
@@ -70,8 +82,9 @@ def one_sided(here: End, length: float, solved: Solved, way: int) -> Sides:
         for change in range(_MOST):
             if status.tobytes() not in known:
                 known[status.tobytes()] = solved(status)
-            sides, ends = known[status.tobytes()]
-            changes = ends[number + (way > 0)].margins - here.margins
+            sides, befores = known[status.tobytes()]
+            side = sides[number + (way > 0)]
+            changes = End(side.problem, befores[number + (way > 0)], side.state.contact).margins - here.margins
             least = np.maximum(_NO_CHANGE * np.abs(changes).max(axis=1, keepdims=True), _ROUND_OFF * size)
             violation = np.where(changes < -least, -changes / size, 0.0)
             better, by = _mended(status, violation, at_zero, here.friction)
@@ -85,10 +98,10 @@ def one_sided(here: End, length: float, solved: Solved, way: int) -> Sides:
     return [side for number in range(0, len(nominal[0]), 2) for side in found(number)]
 
 
-def _sizes(here: End, length: float) -> Float:
-    """Return what margins (4, c) are compared with, (4, 1)."""
-    force = float(np.abs(here.after.force).max(initial=0.0))
-    return np.array([length, force, force, length])[:, None]
+def coefficients(problem: Problem, before: ContactState, status: Status) -> Float:
+    """Return the coefficients of friction (c,) of points with a status (c,) at the end of an increment."""
+    friction, pressed = problem.model.friction, pressure(before.force, problem.surface.area)
+    return friction.updated(friction.coefficients(status, pressed), status, pressed)
 
 
 def _mended(status: Status, violation: Float, at_zero: NDArray[np.bool_], friction: Float) -> tuple[Status, Float]:

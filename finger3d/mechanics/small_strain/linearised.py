@@ -123,7 +123,7 @@ class Linear:
     delassus: Float
 
 
-def slopes(values: Sequence[Float], steps: Float) -> Float:
+def slopes(values: Sequence[Float] | Float, steps: Float) -> Float:
     """Return the derivatives (k, p) of values (2 p, ...) below and above parameters, by their steps (2 p,)."""
     array = np.reshape(values, (len(steps), -1))
     return np.asarray((array[1::2] - array[::2]).T / (2.0 * steps[1::2]))

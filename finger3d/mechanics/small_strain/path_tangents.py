@@ -10,12 +10,6 @@ the path, and d' the derivative by a parameter p at fixed s::
 w_t* is the tangential displacement where the point began to stick.  At an event a margin m (a gap, a normal force, or
 mu r_n - |r_t|) vanishes, so that the event moves by ``ds = -dm / (dm/ds)``, and what it leaves behind changes by
 ``dw_t* = dw_t + (dw_t/ds) ds``.  Under a prescribed force the depth is one more unknown of the equations.
-
-The body enters by its compliance ``C = L K^-1 L^T``, condensed to the rows L of contact points and readings::
-
-    dC = -F^T dK F + dL F + F^T dL^T,   F = K^-1 L^T
-
-where dK and dL are central differences of assembled matrices.
 """
 
 from __future__ import annotations
@@ -35,8 +29,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.elastic import at_rest
 from finger3d.mechanics.small_strain.exact_path import ExactPath
-from finger3d.mechanics.small_strain.kinks import End, Sides, is_kink, one_sided
-from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
+from finger3d.mechanics.small_strain.kinks import End, Sides, one_sided
+from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.objects import vertical_frame
 
 _SAME_PLACE = 1e-12
@@ -76,15 +70,25 @@ class PathTangent:
 
 
 class PlaceOnPath(NamedTuple):
-    """Derivatives at a place on a path and at an event before, and those (2, p) of work and dissipation up to it.
+    """Derivatives at a place on a path.
 
-    The event is the last that is not at the same place.
+    Attributes
+    ----------
+    tangent : of the state
+    motion : (p, 2), of the displacement of the object
+    energies : (2, p), of work and dissipation up to there
     """
 
-    before: Event
-    first: PathTangent
     tangent: PathTangent
+    motion: Float
     energies: Float
+
+    @classmethod
+    def at_rest(cls, changes: Changes) -> PlaceOnPath:
+        """Return the place before the first leg."""
+        count, moved = len(changes.gap), np.stack([changes.gap, np.zeros_like(changes.gap)], axis=2)
+        tangent = PathTangent(np.zeros_like(moved), moved, np.zeros(count), np.zeros(count))
+        return cls(tangent, np.zeros((count, 2)), np.zeros((2, count)))
 
 
 class Changes(NamedTuple):
@@ -92,13 +96,14 @@ class Changes(NamedTuple):
 
     Attributes
     ----------
-    compliance, readings : (p,) arrays (c d, c d) and (g, c d) in the directions of an upright object, or None
+    variations : (p,)
+    compliance : (p,) arrays (c d + g, c d) of contact points and readings of an upright object, or None
     gap, friction : (p, c) and (p,)
     bases : (p, c, 2, 2), directions of the points, which change with the share of an elastic object in the compliance
     """
 
+    variations: Sequence[Variation]
     compliance: list[Float | None]
-    readings: list[Float | None]
     gap: Float
     friction: Float
     bases: Float
@@ -106,25 +111,18 @@ class Changes(NamedTuple):
     @classmethod
     def of(cls, problem: Problem, variations: Sequence[Variation]) -> Changes:
         """Return what variations of a problem change."""
-        count, readings = len(problem.surface.nodes), len(problem.system.reading_rows)
-        body, active = problem.body.condensed.compliance, problem.system.active_dofs
-        forces = problem.inclusions.with_spring_forces(body, np.eye(len(body), len(active)))
-        of_finger = changes_of_rows([one.body for one in variations], forces)
-        of_object = changes_of_rows([one.thing for one in variations], np.eye(len(active)))
-        compliance, rows = list[Float | None](), list[Float | None]()
+        size, active = problem.surface.points.size, problem.system.active_dofs
+        moved = changes_of_points(problem, variations, np.eye(size)[:, active])
+        compliance, gap, bases = list[Float | None](), list[Float](), list[Float]()
         for k, one in enumerate(variations):
-            both = np.zeros((2 * count + readings, 2 * count))
-            if one.body:
-                both[:, active] = np.concatenate(one.body.of_points(problem, forces, of_finger[..., k]))
-            both[np.ix_(active, active)] += of_object[..., k]
-            compliance.append(both[: 2 * count] if one.changes_compliance else None)
-            rows.append(both[2 * count :] if one.changes_compliance else None)
-        ends = [(at_rest(one.low), at_rest(one.high)) for one in variations]
-        pairs = list(zip(variations, ends, strict=True))
-        gap = [one.difference(low.gap, high.gap) for one, (low, high) in pairs]
-        bases = [one.difference(low.own_bases, high.own_bases) for one, (low, high) in pairs]
+            whole = np.zeros((len(moved), size))
+            whole[:, active] = moved[..., k]
+            compliance.append(whole if one.body or one.thing else None)
+            low, high = (at_rest(end) for end in one.ends)
+            gap.append(one.difference(low.gap, high.gap))
+            bases.append(one.difference(low.own_bases, high.own_bases))
         friction = [one.difference(*(end.model.friction.mu for end in one.ends)) for one in variations]
-        return cls(compliance, rows, np.array(gap), np.array(friction), np.array(bases))
+        return cls(variations, compliance, np.array(gap), np.array(friction), np.array(bases))
 
 
 class PathTangents:
@@ -133,52 +131,41 @@ class PathTangents:
     Parameters
     ----------
     path : of the leg
-    variations : of p parameters
-    changes : what the parameters change
-    start : derivatives of the state at the start of the leg
-    motion : (p, 2), those of the displacement of the object there
+    changes : what p parameters change
+    start : derivatives at the start of the leg
     leg : number of the leg
     """
 
-    def __init__(
-        self,
-        path: ExactPath,
-        variations: Sequence[Variation],
-        changes: Changes,
-        start: PathTangent,
-        motion: Float,
-        leg: int,
-    ) -> None:
-        self.path, self.variations, self._changes = path, variations, changes
+    def __init__(self, path: ExactPath, changes: Changes, start: PlaceOnPath, leg: int) -> None:
+        self.path, self._changes, variations = path, changes, changes.variations
         self._delassus = self._local(path.problem.delassus)
-        shape = path.problem.delassus.shape
-        self._compliance = [None if own is None else self._local(own.reshape(shape)) for own in changes.compliance]
+        size = path.problem.surface.points.size
+        self._compliance = [None if own is None else self._local(own[:size]) for own in changes.compliance]
         for change, turn in zip(self._compliance, changes.bases, strict=True):
             if change is not None and turn.any():
                 change += self._turned(turn)
         # gaps close along the normal of the object, which is not that of the points if it is elastic
         self._closing = path.bases.copy()
-        self._closing[:, 0] = (
-            path.problem.surface.average
-            @ path.problem.placed(path.move.start).distance(path.problem.surface.samples)[1]
-        )
-        legs = [[end.model.legs[leg] for end in one.ends] for one in variations]
-        ends = [[np.array([own.slide_x_mm, -own.depth_mm]) for own in pair] for pair in legs]
-        end = np.array([one.difference(low, high) for one, (low, high) in zip(variations, ends, strict=True)])
-        end = end.reshape(-1, 2)
+        surface, placed = path.problem.surface, path.problem.placed(path.move.start)
+        self._closing[:, 0] = surface.average @ placed.distance(surface.samples)[1]
         self._weights: Float | None = None
+
+        def goal(problem: Problem) -> Float:
+            own = problem.model.legs[leg]
+            return np.array([own.slide_x_mm, -own.depth_mm, own.force_N or 0.0])
+
+        goals = np.array([one.difference(*map(goal, one.ends)) for one in variations]).reshape(-1, 3)
+        end = goals[:, :2]
         if path.problem.model.legs[leg].force_N is not None:
             self._weights = -path.count[:, None] * path.bases[:, :, 1]
-            end[:, 1] = motion[:, 1]
-            at_end = [
-                one.difference(*(own.force_N or 0.0 for own in p)) for one, p in zip(variations, legs, strict=True)
-            ]
+            end[:, 1] = start.motion[:, 1]
             self._turned_weights = -path.count[:, None] * changes.bases[..., 1]
-            begin = np.einsum("ca,pca->p", self._weights, start.force)
+            begin = np.einsum("ca,pca->p", self._weights, start.tangent.force)
             begin += np.einsum("pca,ca->p", self._turned_weights, path.start.state.force)
-            self._force_slopes = begin, np.array(at_end)
-        self._motions = motion, end
-        self._events, self._tangents, self._energies = [path.start], [start], [np.zeros((2, len(variations)))]
+            self._force_slopes = begin, goals[:, 2]
+        self._motions = start.motion, end
+        self._events, self._energies = [path.start], [start.energies]
+        self._tangents = [replace(start.tangent, amplitude=np.zeros(len(variations)))]
         for piece, event in enumerate(path.events):
             tangent = self._at_event(piece, event)
             self._energies.append(self._energies_at(piece, event, tangent))
@@ -187,75 +174,64 @@ class PathTangents:
 
     def at_share(self, share: float, status: Status | None = None) -> PlaceOnPath:
         """Return the derivatives at a share of the path, where the points may have other statuses (c,)."""
-        place, done = self.path.at(share)
-        piece = done - 1 if place is self._events[done] else done
+        event, done = self.path.at(share)
+        piece = done - 1 if event is self._events[done] else done
         if status is not None:
-            place = place._replace(state=replace(place.state, status=status))
-        tangent = self._solved(piece, place)
-        energies = self._energies_at(piece, place, tangent)
-        start = next((i for i in range(piece, 0, -1) if self._events[i].share < share * (1.0 - _SHORT)), 0)
-        return PlaceOnPath(self._events[start], self._tangents[start], tangent, energies)
+            event = event._replace(state=replace(event.state, status=status))
+        tangent, motion = self._solved(piece, event), self._motion(share)
+        motion[:, 1] -= tangent.amplitude
+        return PlaceOnPath(tangent, motion, self._energies_at(piece, event, tangent))
 
-    def sides(
-        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float, status: Status | None = None
-    ) -> list[Side]:
-        """Return the sides (2 p,) of an increment that ends at a place.
-
-        The energies (2, p) are the derivatives of work and dissipation at the start of the path.
-        """
+    def sides(self, step: StepResult, place: PlaceOnPath, status: Status | None = None) -> list[Side]:
+        """Return the sides (2 p,) of an increment that ends at a place, where points may have other statuses (c,)."""
         problem, contact, sides = self.path.problem, step.meshed_state.contact, list[Side]()
         contact = contact if status is None else replace(contact, status=status)
         force = problem.upright_force(contact).ravel()
-        motion, total = self.motion(place.tangent, share), energies + place.energies
-        for k, one in enumerate(self.variations):
-            rows = self._changes.readings[k]
-            read = 0.0 if rows is None else rows @ force
+        for k, one in enumerate(self._changes.variations):
+            rows = self._changes.compliance[k]
+            read = 0.0 if rows is None else rows[len(force) :] @ force
             for end, t in zip(one.ends, (-one.step, one.step), strict=True):
                 moved = place.tangent.changed(contact, k, t)
                 moved = replace(moved, bases=moved.own_bases + t * self._changes.bases[k])
                 side = Side(
                     end,
                     replace(step.meshed_state, contact=moved),
-                    step.target.changed([1, 0], t * motion[k] * [1.0, -1.0]),
+                    step.target.changed([1, 0], t * place.motion[k] * [1.0, -1.0]),
                     t * read + problem.system.reading_rows @ problem.upright_force(moved).ravel(),
-                    step.external_work_mJ + t * total[0, k],
-                    step.dissipation_mJ + t * total[1, k],
+                    step.external_work_mJ + t * place.energies[0, k],
+                    step.dissipation_mJ + t * place.energies[1, k],
                 )
                 sides.append(side)
         return sides
 
-    def one_sided(
-        self, step: StepResult, share: float, place: PlaceOnPath, energies: Float
-    ) -> tuple[Sides, Sides] | None:
-        """Return the sides of falling and of growing parameters at a kink at the end of an increment; see `sides`."""
-        count = len(self.path.bases)
+    def one_sided(self, step: StepResult, share: float) -> tuple[Sides, Sides] | None:
+        """Return the sides of falling and of growing parameters at a kink at the end of an increment; None elsewhere.
 
-        def end(before: ContactState, after: ContactState, problem: Problem) -> End:
-            return End(before, after, np.full(count, problem.model.friction.mu))
-
-        def solved(status: Status) -> tuple[list[Side], list[End]]:
-            there = self.at_share(share, status)
-            sides = self.sides(step, share, there, energies, status)
-            signed = [(k, t) for k, one in enumerate(self.variations) for t in (-one.step, one.step)]
-            begun = [there.first.changed(there.before.state, *by) for by in signed]
-            return sides, [end(a, side.state.contact, side.problem) for a, side in zip(begun, sides, strict=True)]
-
-        here = end(place.before.state, step.meshed_state.contact, self.path.problem)
-        length = self.path.problem.model.largest_depth_mm
-        if not is_kink(here, length):
+        Slip is counted from the last event that is not at the same place.
+        """
+        earlier = (i for i, event in enumerate(self._events) if i and event.share < share * (1.0 - _SHORT))
+        last = max(earlier, default=0)
+        before, tangent = self._events[last].state, self._tangents[last]
+        here = End(self.path.problem, before, step.meshed_state.contact)
+        if not here.is_kink:
             return None
-        return one_sided(here, length, solved, -1), one_sided(here, length, solved, 1)
+        begun = [
+            tangent.changed(before, k, t) for k, v in enumerate(self._changes.variations) for t in (-v.step, v.step)
+        ]
 
-    def motion(self, tangent: PathTangent, share: float) -> Float:
-        """Return the derivatives (p, 2) of the displacement of the object at a share of the path."""
-        out: Float = (1.0 - share) * self._motions[0] + share * self._motions[1]
-        out[:, 1] -= tangent.amplitude
-        return out
+        def solved(status: Status) -> tuple[list[Side], list[ContactState]]:
+            return self.sides(step, self.at_share(share, status), status), begun
+
+        return one_sided(here, solved, -1), one_sided(here, solved, 1)
+
+    def _motion(self, share: float) -> Float:
+        """Return the derivatives (p, 2) of the motion of the object at a share of the path, less the amplitude."""
+        return np.asarray((1.0 - share) * self._motions[0] + share * self._motions[1])
 
     def _local(self, compliance: Float) -> Float:
-        """Return a compliance (2 c, 2 c) in the directions of the points; given (c, 2, c, 2), of an upright object."""
+        """Return a compliance (2 c, 2 c) in the directions of the points; given those of an upright object."""
         c = len(self.path.bases)
-        turned = rotated_delassus(compliance, self.path.bases @ vertical_frame(2).T, np.arange(c))
+        turned = rotated_delassus(compliance.reshape(c, 2, c, 2), self.path.bases @ vertical_frame(2).T, np.arange(c))
         return np.asarray(turned.reshape(2 * c, 2 * c))
 
     def _turned(self, turn: Float) -> Float:
@@ -336,15 +312,14 @@ class PathTangents:
     def _solved(self, piece: int, event: Event) -> PathTangent:
         """Return the derivatives at a place within a piece of the path that itself does not move."""
         status, force, last = event.state.status, event.state.force, self._tangents[piece]
-        c, count, share = len(status), len(self.variations), event.share
+        c, count, share = len(status), len(self._changes.variations), event.share
         touches, sticks, slips = (np.flatnonzero(m) for m in (status != OPEN, status == STICK, status == SLIP))
         sign = np.zeros(c)
         slid = _relative(event.state)[:, 1] - _relative(self._events[piece].state)[:, 1]
         sign[slips] = np.sign(np.where(force[:, 1] != 0.0, force[:, 1], -slid))[slips]
         base = np.zeros((count, c, 2))
         base[:, slips, 1] = (self._changes.friction[:, None] * (sign * force[:, 0]))[:, slips]
-        fixed = replace(last, amplitude=np.zeros(count))
-        free = -np.einsum("cak,pk->pca", self._closing, self.motion(fixed, share))
+        free = -np.einsum("cak,pk->pca", self._closing, self._motion(share))
         free[:, :, 0] += self._changes.gap
         free[:, :, 1] -= self._changes.bases[:, :, 1] @ self.path.pose(event).displacement[:2]
         for k, change in enumerate(self._compliance):

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Pattern, stiffness, times
-from finger3d.fem.mesh.parts import elasticity_of, moduli_of
+from finger3d.fem.mesh.parts import elasticity_of
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.traces import BoundarySurface, joined, local_rows, restrict, surface
@@ -32,7 +32,6 @@ from finger3d.mechanics.discretise.moved_mesh import stretched, stretched_object
 from finger3d.mechanics.discretise.problem import CondensedObject, Problem, object_share, under_pressure
 from finger3d.mechanics.discretise.symmetry import unfold_points
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, vertical_frame
 from finger3d.progress import QUIET
@@ -53,6 +52,9 @@ _OTHER_ELEMENTS = "it switches between elements for compressible and nearly inco
 
 _Matrices: TypeAlias = tuple[sp.csr_matrix, sp.csr_matrix]
 """Upper triangle (N, N) of the stiffness of a body, and its rows (r, N)."""
+
+_Assembled: TypeAlias = tuple[Problem, _Matrices, EmbeddedBars | None]
+"""Problem with another body on the same cells, the matrices of the body, and the bars of its foils."""
 
 
 class Side(NamedTuple):
@@ -118,24 +120,6 @@ class BodyChange:
         moved[first:] += self.subgrid @ forces[first:]
         return np.asarray(moved)
 
-    def of_points(self, problem: Problem, forces: Float, moved: Float) -> tuple[Float, Float]:
-        """Return the derivatives of contact displacements (c d, k) and readings (g, k) at fixed contact forces.
-
-        Parameters
-        ----------
-        forces : (r, k) N, on the rows, those of springs included
-        moved : (r, k), derivatives of the rows' displacements at these forces
-        """
-        active, compliance = problem.system.active_dofs, problem.body.condensed.compliance
-        if count := len(self.bars):
-            own = np.zeros_like(moved)
-            own[-count:] = self.bars[:, None] * forces[-count:]
-            moved = moved + compliance @ own
-            moved += compliance @ problem.inclusions.with_spring_forces(compliance, np.zeros_like(moved), moved)
-        displacement = np.zeros((problem.surface.points.size, moved.shape[1]))
-        displacement[active] = moved[: len(active)]
-        return displacement, moved[len(active) :][: len(problem.system.reading_rows)]
-
 
 @dataclass(frozen=True)
 class Variation:
@@ -143,28 +127,17 @@ class Variation:
 
     Attributes
     ----------
-    low, high : with the compliance of the press itself
+    ends : below and above, with the compliance of the press itself
     step : of the parameter
     body, thing : what changes in the finger's body, and in that of an elastic object; None if nothing does
     of_readings : whether it changes readings only, and nothing in the contact
     """
 
-    low: Problem
-    high: Problem
+    ends: tuple[Problem, Problem]
     step: float
     body: BodyChange | None
     thing: BodyChange | None
     of_readings: bool = False
-
-    @property
-    def ends(self) -> tuple[Problem, Problem]:
-        """Both problems."""
-        return self.low, self.high
-
-    @property
-    def changes_compliance(self) -> bool:
-        """Whether the finger's body changes, or an elastic object."""
-        return self.body is not None or self.thing is not None
 
     def difference(self, low: Float | float, high: Float | float) -> Float:
         """Return the central difference of two values."""
@@ -193,16 +166,14 @@ class VariedBody:
         for model in (low, high):
             if replace(model, **kept) != own or type(model.design) is not type(own.design):
                 raise Finger3dError("it changes the mesh")
-        models = [replace(own, **{name: getattr(model, name) for name in _CHANGES}) for model in (low, high)]
-        if any(model.object != own.object or model.design != own.design for model in models):
+        changed = {name for name in _CHANGES for model in (low, high) if getattr(model, name) != getattr(own, name)}
+        touches = [problem.system.first_contact_mm] * 2
+        if changed & {"object", "design"}:
             touches = [model.first_contact.first_contact_mm for model in (low, high)]
-        else:
-            touches = [problem.system.first_contact_mm] * 2
         ends = [
             replace(problem, model=model, system=replace(problem.system, first_contact_mm=touch))
-            for model, touch in zip(models, touches, strict=True)
+            for model, touch in zip((low, high), touches, strict=True)
         ]
-        changed = {name for name in _CHANGES for model in models if getattr(model, name) != getattr(own, name)}
         change = thing = None
         if changed & {*_IN_BODY, "inclusions"}:
             ends, change = self._changed([self._assembled(end) for end in ends], step)
@@ -212,7 +183,7 @@ class VariedBody:
         if own.object_compliance is not None and (change or thing):
             ends = self._beside_object(ends, step, change, thing)
         of_readings = changed <= _READINGS and own.inclusions is None and own.relaxation is None
-        return Variation(ends[0], ends[1], step, change, thing, of_readings)
+        return Variation((ends[0], ends[1]), step, change, thing, of_readings)
 
     @cached_property
     def _pattern(self) -> Pattern:
@@ -237,19 +208,19 @@ class VariedBody:
 
     def _changed(self, both: Sequence[_Assembled], step: float) -> tuple[list[Problem], BodyChange]:
         """Return the problems of two bodies, and what changes between these."""
-        problem, ends, (below, above) = self.problem, [one.problem for one in both], [one.bars for one in both]
-        own, condensed = problem.inclusions, problem.body.condensed
-        change = BodyChange.between(condensed, both[0].matrices, both[1].matrices, step)
+        (one, first, below), (other, last, above) = both
+        own, condensed = self.problem.inclusions, self.problem.body.condensed
+        change = BodyChange.between(condensed, first, last, step)
         if below is None or above is None:
-            return ends, change
+            return [one, other], change
         count, size = len(own.bar_stiffness), len(condensed.compliance)
         pulls = np.eye(size, count, count - size)
         slope = change.moved(pulls, condensed.unknowns(pulls))[-count:]
         of_mesh = condensed.compliance[-count:, -count:] - own.subgrid_compliance[-count:, -count:]
         low, high = below.in_mesh(of_mesh - step * slope), above.in_mesh(of_mesh + step * slope)
-        ends = [replace(end, inclusions=added) for end, added in zip(ends, (low, high), strict=True)]
         subgrid = (high.subgrid_compliance - low.subgrid_compliance) / (2.0 * step)
         bars = (high.bar_stiffness - low.bar_stiffness) / (2.0 * step * own.bar_stiffness)
+        ends = [replace(one, inclusions=low), replace(other, inclusions=high)]
         return ends, replace(change, subgrid=subgrid, bars=bars)
 
     def _beside_object(
@@ -262,28 +233,21 @@ class VariedBody:
         assert system.object_share is not None
         pressed = np.zeros(problem.surface.points.shape)
         pressed[:, 0] = problem.surface.area
-        slopes = np.zeros((2, *pressed.shape))
-        if change is not None:
-            forces = problem.inclusions.with_spring_forces(
-                problem.body.condensed.compliance, problem.row_forces(pressed)[:, None]
-            )
-            moved = changes_of_rows([change], forces)[..., 0]
-            slopes[0] = change.of_points(problem, forces, moved)[0].reshape(pressed.shape)
-        if thing is not None:
-            slopes[1].reshape(-1)[active] = changes_of_rows([thing], pressed.ravel()[active, None])[:, 0, 0]
-        out = []
+        bodies = [Variation((ends[0], ends[1]), step, *both) for both in ((change, None), (None, thing))]
+        moved = changes_of_points(problem, bodies, pressed.reshape(-1, 1))[: pressed.size, 0]
+        slopes = moved.T.reshape(2, *pressed.shape)
+        rate, out = None, []
+        if thing is not None and problem.model.finite_strain:
+            rate = np.zeros((pressed.size, pressed.size))
+            rate[np.ix_(active, active)] = thing.compliance(self._object_unknowns)
         for end, t in zip(ends, (-step, step), strict=True):
             both = [under_pressure(end.surface, one) for one in (system.delassus - compliance, compliance)]
             share, points = object_share(*(both + t * slopes[..., 0])), end.system.points
             of_points = points.compliance * (1.0 - system.object_share[image]) / (1.0 - share[image])
             points = replace(points, compliance=of_points)
-            out.append(replace(end, system=replace(end.system, object_share=share, points=points)))
-        if thing is not None and problem.model.finite_strain:
-            rate = np.zeros((pressed.size, pressed.size))
-            rate[np.ix_(active, active)] = thing.compliance(self._object_unknowns)
-            changed = [compliance + t * rate.reshape(compliance.shape) for t in (-step, step)]
-            pairs = zip(out, changed, strict=True)
-            out = [replace(end, system=replace(end.system, object_compliance=one)) for end, one in pairs]
+            other = compliance if rate is None else compliance + t * rate.reshape(compliance.shape)
+            of_end = replace(end.system, object_share=share, object_compliance=other, points=points)
+            out.append(replace(end, system=of_end))
         return out
 
     def _assembled(self, end: Problem) -> _Assembled:
@@ -311,23 +275,24 @@ class VariedBody:
         bars = bars_of(model, mesh, axes)
         if bars and len(bars.bar_stiffness) != len(problem.inclusions.bar_stiffness):
             raise Finger3dError("it changes which foils are mirror images of each other")
-        meshed = MeshedBody(mesh, axes, matrix, thickness, moduli_of(elastic))
-        if is_other or bars:
-            parts = [local_rows(face, vertical_frame(mesh.dim))[active], *rows_of_readings(model, meshed, bars)]
-        else:
-            parts = self._rows_of_readings(meshed, model)
-        rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
-        system = replace(end.system, surface=face, points=points)
         changed = replace(body, mesh=mesh, elastic=elastic, stiffness=matrix, thickness=thickness)
-        return _Assembled(replace(end, system=system, condensed_body=changed), (matrix.upper, rows), bars)
+        system = replace(end.system, surface=face, points=points)
+        end = replace(end, system=system, condensed_body=changed)
+        if is_other or bars:
+            readings = rows_of_readings(model, end.meshed_body, bars)
+            parts = [local_rows(face, vertical_frame(mesh.dim))[active], *readings]
+        else:
+            parts = self._rows_of_readings(end)
+        rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in parts], format="csr")
+        return end, (matrix.upper, rows), bars
 
-    def _rows_of_readings(self, body: MeshedBody, model: Model) -> list[sp.csr_matrix]:
-        """Return the condensed rows with those of the readings of a model, where they are others."""
+    def _rows_of_readings(self, end: Problem) -> list[sp.csr_matrix]:
+        """Return the condensed rows with those of the readings of another problem, where they are others."""
         rows, first = self.problem.body.condensed.rows, len(self.problem.system.active_dofs)
         parts = [rows[:first]]
-        for before, reading in zip(self.problem.model.readings, model.readings, strict=True):
-            count = len(reading.columns(body.mesh.dim))
-            parts.append(rows[first : first + count] if reading == before else reading.rows(body))
+        for before, reading in zip(self.problem.model.readings, end.model.readings, strict=True):
+            count = len(reading.columns(end.dim))
+            parts.append(rows[first : first + count] if reading == before else reading.rows(end.meshed_body))
             first += count
         return parts
 
@@ -357,14 +322,6 @@ class VariedBody:
         return matrix.upper, widened(rows, matrix.upper.shape[0])
 
 
-class _Assembled(NamedTuple):
-    """Problem with another body on the same cells, its matrices as in a `BodyChange`, and the bars of its foils."""
-
-    problem: Problem
-    matrices: _Matrices
-    bars: EmbeddedBars | None
-
-
 def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Float:
     """Return what p parameters change in the rows' displacements (r, k, p) at fixed forces (r, k) on them.
 
@@ -385,3 +342,30 @@ def changes_of_rows(changes: Sequence[BodyChange | None], forces: Float) -> Floa
         for k, one in changed:
             moved[:, some, k] = one.moved(forces[:, some], unknowns)
     return moved
+
+
+def changes_of_points(problem: Problem, variations: Sequence[Variation], forces: Float) -> Float:
+    """Return what p parameters change in contact displacements and readings, (c d + g, k, p), at fixed contact forces.
+
+    Forces (c d, k) and displacements are in the directions of an upright object.
+    """
+    active, compliance = problem.system.active_dofs, problem.body.condensed.compliance
+    rows = np.zeros((len(compliance), forces.shape[1]))
+    rows[: len(active)] = forces[active]
+    rows = problem.inclusions.with_spring_forces(compliance, rows)
+    of_body = changes_of_rows([one.body for one in variations], rows)
+    of_thing = changes_of_rows([one.thing for one in variations], forces[active])
+    out = np.zeros((len(forces) + len(problem.system.reading_rows), *of_body.shape[1:]))
+    for k, one in enumerate(variations):
+        moved = of_body[..., k]
+        if one.body and (count := len(one.body.bars)):
+            own = np.zeros_like(moved)
+            own[-count:] = one.body.bars[:, None] * rows[-count:]
+            moved = moved + compliance @ own
+            moved += compliance @ problem.inclusions.with_spring_forces(compliance, np.zeros_like(moved), moved)
+        if one.body:
+            out[active, :, k] = moved[: len(active)]
+            out[len(forces) :, :, k] = moved[len(active) :][: len(out) - len(forces)]
+        if one.thing:
+            out[active, :, k] += of_thing[..., k]
+    return out

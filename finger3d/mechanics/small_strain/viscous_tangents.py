@@ -19,16 +19,14 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents
+from finger3d.mechanics.small_strain.increment_tangents import FixedForces, IncrementTangents, readings_of
 from finger3d.mechanics.small_strain.linearised import Linear, LinearisedIncrement, Part, slopes
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step, relaxed
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_rows
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic, ViscousBody
-from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, RelaxationWorkspace, Response
+from finger3d.mechanics.small_strain.viscoelastic_body import ConstantBulkModulus, Response
 from finger3d.objects import Move
 
 _Past: TypeAlias = tuple[Step, InternalVariables]
@@ -46,11 +44,12 @@ class _Linear(Linear):
 class _FixedForces(FixedForces):
     """Derivatives at fixed contact forces, those of internal variables (q, p) and of rows (r, p) without springs, too.
 
-    `readings` are those of the relaxed stress.
+    `readings` are those of the relaxed stress; `pasts` are the steps of all sides, and their internal variables before.
     """
 
     variables: Float
     rows: Float
+    pasts: Sequence[_Past]
 
 
 class ViscousTangents(IncrementTangents):
@@ -60,9 +59,7 @@ class ViscousTangents(IncrementTangents):
 
     def __init__(self, problem: Problem, variations: Sequence[Variation], steps: Sequence[StepResult]) -> None:
         super().__init__(problem, variations, steps)
-        self._workspace = self.formulation.workspace()
-        bodies = [one.body for one in variations for _ in one.ends]
-        self._workspaces = [RelaxationWorkspace() if b else self._workspace for b in bodies]
+        self._without_past = [replace(one, body=None) for one in variations]  # an elastic object does not relax
 
     def _linearised(self, before: State[ViscousBody], after: State[ViscousBody], move: Move) -> _Linear:
         step = Step(self.formulation.relaxation.prony, move.duration_s)
@@ -71,13 +68,15 @@ class ViscousTangents(IncrementTangents):
         active = LinearisedIncrement.of(problem, before.contact, after.contact)
         return _Linear(active, body.delassus, step, response)
 
-    def _displaced(self, state: State[ViscousBody]) -> State[Float]:
-        return State(state.contact, state.body.displacement, state.last)
-
     def _at_fixed_forces(self, part: Part, sides: Sequence[Side], steps: Float, moves: Sequence[Move]) -> _FixedForces:
         problem, memory, response = self.problem, part.after.body.memory, part.linear.response
         body, active = self.formulation.body(problem), problem.system.active_dofs
-        forces, pasts = problem.row_forces(problem.upright_force(part.after.contact)), _pasts(sides, moves)
+        forces = problem.row_forces(problem.upright_force(part.after.contact))
+        pasts = [
+            (Step(series.prony, move.duration_s), side.state.body.memory)
+            for side, move in zip(sides, moves, strict=True)
+            if (series := side.problem.model.relaxation) is not None
+        ]
         own = np.zeros((len(forces), len(steps) // 2))  # of springs whose stiffness changes
         if count := len(springs := problem.inclusions.bar_stiffness):
             forces[-count:] = -springs * body.read(memory.elastic)[-count:]
@@ -87,7 +86,7 @@ class ViscousTangents(IncrementTangents):
         held = relaxed(part.linear.step.prony, memory)
         variables = slopes([(held + step.history_load(past)) / step.alpha for step, past in pasts], steps)
         if isinstance(body, ConstantBulkModulus):
-            now = then = self._with_constant_bulk(body, part, forces, sides, steps, pasts, variables)
+            now = then = self._with_constant_bulk(part, forces, sides, steps, pasts, variables)
         else:
             changes = [*(one.body for one in self._variations), *[None] * (len(steps) // 2 - len(self._variations))]
             both = changes_of_rows(changes, np.stack([memory.elastic, forces], axis=1))
@@ -95,27 +94,19 @@ class ViscousTangents(IncrementTangents):
         variables += _variables_under(response, own)
         rows = body.read(variables) + now
         follow = problem.inclusions.with_spring_forces(response.compliance, np.zeros_like(rows), rows)
-        displacement = np.zeros((part.after.contact.force.size, len(steps) // 2))
-        displacement[active] = (rows + response.compliance @ follow)[: len(active)]
-        return _FixedForces(displacement, then[len(active) :][: len(self._columns)], variables, rows)
+        displacement = super()._at_fixed_forces(part, sides, steps, moves).displacement
+        displacement[active] += (rows + response.compliance @ follow)[: len(active)]
+        return _FixedForces(displacement, then[len(active) :][: len(problem.model.columns)], variables, rows, pasts)
 
     def _with_constant_bulk(
-        self,
-        body: ConstantBulkModulus,
-        part: Part,
-        forces: Float,
-        sides: Sequence[Side],
-        steps: Float,
-        pasts: Sequence[_Past],
-        variables: Float,
+        self, part: Part, forces: Float, sides: Sequence[Side], steps: Float, pasts: Sequence[_Past], variables: Float
     ) -> Float:
         """Enter the derivatives of displacements and dilatations (N, p) under row forces (r,); return those of rows."""
         now, rows = part.after.body.memory.elastic, np.zeros((len(forces), len(steps) // 2))
-        workspaces = [*self._workspaces, *[self._workspace] * (len(sides) - len(self._workspaces))]
         bodies = [ConstantBulkModulus(side.problem) for side in sides]
         internal = [
             one.internal_forces(*past, now, workspace)
-            for one, past, workspace in zip(bodies, pasts, workspaces, strict=True)
+            for one, past, workspace in zip(bodies, pasts, self._workspaces_of(sides), strict=True)
         ]
         load = -slopes(internal, steps)
         for k, one in enumerate(self._variations):
@@ -123,18 +114,13 @@ class ViscousTangents(IncrementTangents):
                 load[:, k] += one.body.rows.T @ forces
                 rows[:, k] = one.body.rows @ now[: len(load)]
                 rows[len(rows) - len(one.body.subgrid) :, k] += one.body.subgrid @ now[len(load) :]
+        body = ConstantBulkModulus(self.problem)
         alpha, condensed = body.condensed(part.linear.step, self._workspace)
         variables[: len(load)] = body.shape(condensed.solve(load), alpha)
         return rows
 
     def _reached(
-        self,
-        part: Part,
-        fixed: FixedForces,
-        states: Sequence[State[Float]],
-        sides: Sequence[Side],
-        steps: Float,
-        moves: Sequence[Move],
+        self, part: Part, fixed: FixedForces, states: Sequence[State[Float]], sides: Sequence[Side], steps: Float
     ) -> list[tuple[State[Any], Float]]:
         assert isinstance(fixed, _FixedForces)
         problem, response, memory = self.problem, part.linear.response, part.after.body.memory
@@ -142,41 +128,22 @@ class ViscousTangents(IncrementTangents):
         rows = slopes([problem.row_forces(problem.upright_force(state.contact)) for state in states], steps)
         rows = problem.inclusions.with_spring_forces(response.compliance, rows, fixed.rows)
         variables = fixed.variables + _variables_under(response, rows)
-        read = (fixed.rows + response.compliance @ rows)[first:][: len(self._columns)]
-        is_pressure = np.array([column.kind == "taxel" for column in self._columns], dtype=bool)
+        read = (fixed.rows + response.compliance @ rows)[first:][: len(problem.model.columns)]
+        is_pressure = np.array([column.kind == "taxel" for column in problem.model.columns], dtype=bool)
         if is_pressure.any() and not isinstance(body, ConstantBulkModulus):  # of the relaxed stress
             read[is_pressure] = (body.read(rows)[first:][: len(read)] + fixed.readings)[is_pressure]
-        here, found = self._read(problem, part.after), list[tuple[State[Any], Float]]()
-        for k, (state, side, (step, past), t) in enumerate(
-            zip(states, sides, _pasts(sides, moves), steps, strict=True)
-        ):
+        here, found = readings_of(problem, part.after), list[tuple[State[Any], Float]]()
+        of_sides = zip(states, sides, fixed.pasts, steps, strict=True)
+        for k, (state, side, (step, past), t) in enumerate(of_sides):
             viscous = ViscousBody(state.body, step.after(past, memory.elastic + t * variables[:, k // 2]))
             after, readings = State(state.contact, viscous, state.last), here + t * read[:, k // 2]
             if isinstance(body, ConstantBulkModulus) and is_pressure.any():
-                readings[is_pressure] = self._read(side.problem, after)[is_pressure]
+                readings[is_pressure] = readings_of(side.problem, after)[is_pressure]
             found.append((after, readings))
         return found
-
-    @property
-    def _columns(self) -> tuple[Column, ...]:
-        return self.problem.model.columns
-
-    def _read(self, problem: Problem, state: State[ViscousBody]) -> Float:
-        found = formulation_of(problem.model).readings(problem, state)
-        return np.array([found[column] for column in self._columns])
 
 
 def _variables_under(response: Response, rows: Float) -> Float:
     """Return the internal variables (q, p) that forces (r, p) on the rows cause."""
     free = response.shape(np.zeros(len(rows)))
     return np.stack([response.shape(row) - free for row in rows.T], axis=-1)
-
-
-def _pasts(sides: Sequence[Side], moves: Sequence[Move]) -> list[_Past]:
-    """Return the steps of all sides, and their internal variables before."""
-    series = [side.problem.model.relaxation for side in sides]
-    return [
-        (Step(one.prony, move.duration_s), side.state.body.memory)
-        for one, side, move in zip(series, sides, moves, strict=True)
-        if one is not None
-    ]
