@@ -25,3 +25,10 @@ def test_too_few_candidate_points_are_noticed(domain: Domain) -> None:
     assert 0 in beyond_candidates(usual).face
     # the first increments stay within the few points
     assert checks[0][0].within_candidates
+
+
+def test_penetration_is_compared_to_the_depth_that_was_reached() -> None:
+    problem = build(fig9(domain="plane-strain", gauges=(), legs=(Leg(3.0, steps=10), Leg(1.0, steps=2))))
+    steps = list(march(problem))
+    for count, depth in ((2, 0.6), (12, 3.0)):  # as of a press that ended early, and of the whole one
+        assert [check.depth_mm for check in check_surface(problem, steps[:count])] == pytest.approx([depth] * count)

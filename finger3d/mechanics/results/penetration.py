@@ -92,10 +92,8 @@ def penetration_advice(problem: Problem, checks: Sequence[SurfaceCheck]) -> list
 
 
 def reached_depth(model: Model, steps: Sequence[StepResult]) -> float:
-    """Return the largest depth (mm) of a press: that of its steps where a force is given, whose depth is a forecast."""
-    if all(leg.force_N is None for leg in model.legs):
-        return model.largest_depth_mm
-    return max((step.target.depth_mm for step in steps), default=model.largest_depth_mm)
+    """Return the largest depth (mm) of the steps of a press, which may end early; that of its legs without steps."""
+    return max((step.target.depth_mm for step in steps), default=0.0) or model.largest_depth_mm
 
 
 def resolving_edge(check: SurfaceCheck) -> float:
