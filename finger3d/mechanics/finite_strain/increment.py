@@ -27,8 +27,9 @@ from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Move
 
-_ITERATIONS, _FACTORS = 60, 5
-"""Largest number of iterations and of new factors before an iteration is given up."""
+_ITERATIONS, _FACTORS, _SNAP_FACTORS = 60, 5, 15
+"""Largest number of iterations and of new factors before an iteration is given up, and of those where the body may
+snap: steps that go down in energy lead to the other equilibrium."""
 
 _SHORTEST = 0.125
 """Shortest part, over the increment, in which the path is followed."""
@@ -113,6 +114,10 @@ class FiniteIncrement(IncrementEquations):
         self.workspace.factorizations += rough.factorizations
         return part, replace(solution, iterations=spent)
 
+    @property
+    def _may_snap(self) -> bool:
+        return self.motion <= _SNAPS * self.length_scale
+
     def _part(self, share: float, depth: float) -> Self:
         """Return the increment up to a share of it, where a depth (mm) is expected."""
         return self if share == 1.0 else replace(self, move=self.move.cut(share)[0])
@@ -130,14 +135,15 @@ class FiniteIncrement(IncrementEquations):
         is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors >= _FACTORS:
+                if factors >= (_SNAP_FACTORS if self._may_snap else _FACTORS):
                     break
                 linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
-            longest = increment._largest_step if factors and error > _ASTRAY else math.inf
+            is_astray = factors and error > _ASTRAY and not self._may_snap
+            longest = increment._largest_step if is_astray else math.inf
             solution, after = increment._advance(now, force, linearisation, longest)
             spent += solution.iterations
             if after is None:
-                if factors and not is_damped and not solution.outcome.ok:  # contact need not settle near a singular one
+                if factors and not is_damped:  # a tangent near a singular one, under which contact need not settle
                     linearisation, factors, is_damped = increment.linearise(now, force, _CONVEX), factors + 1, True
                     continue
                 if factors:
@@ -164,7 +170,7 @@ class FiniteIncrement(IncrementEquations):
         """
         now, force = self.at(self.start.body.unknowns), self.start.contact.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
-        may_snap, rises, snapped = self.motion <= _SNAPS * self.length_scale, 0, False
+        may_snap, rises, snapped = self._may_snap, 0, False
         least, stalls = math.inf, 0
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
