@@ -11,11 +11,9 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.parts import Substep
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.to_force import (
-    approached,
     by_power_law,
     expected_depth,
     forces_on,
@@ -64,23 +62,6 @@ def test_a_later_depth_is_that_of_the_power_law() -> None:
     assert expected_depth(problem, part, Move(pose, ObjectPose(0.3)), (now, 2.0 * now)) == pytest.approx(
         by_power_law((0.025, normal_force(problem, before)), (0.1, now), 2.0 * now), rel=1e-14
     )
-
-
-def test_a_force_out_of_reach_of_one_increment_is_approached_in_halves() -> None:
-    problem = build(LargeDeformation().apply(small_section(legs=(Leg(1.2, steps=4),))))
-    deep = list(march(problem))[-1]
-    wanted, formulation = measure(problem.points, deep)["normal_force_N"], formulation_of(problem.model)
-    workspace, start = formulation.workspace(), formulation.start(problem)
-    move = Move(ObjectPose(0.0), ObjectPose(1.2))
-    assert increment_to_force(problem, (start, None), move, wanted, workspace) is None
-    rough = workspace.rough()
-    end = approached(problem, rough, start, move, (0.0, wanted))
-    assert rough.factorizations > 0
-    assert end is not None
-    assert end[0].start == move.start
-    assert end[0].end.depth_mm == pytest.approx(1.2, rel=3e-3)  # 1.1e-3: it slips in other increments than the press
-    assert normal_force(problem, end[1].state) == pytest.approx(wanted, rel=1e-3)
-    assert approached(problem, workspace, start, move, (0.0, wanted), cuts=0) is None
 
 
 def test_a_relaxing_body_has_the_force_at_the_depth_where_it_is_reached() -> None:

@@ -150,27 +150,31 @@ class IncrementEquations:
         c, d = delassus.shape[:2]
         return augmentation_parameters(delassus.reshape(c * d, c * d), d)
 
-    def initial(self, guess: Float | None) -> tuple[Configuration, Float]:
-        """Return the configuration and the contact forces (c, d) where the iteration begins."""
-        for x, force in self._extrapolated(guess):
+    def initial(self, guess: Float | None, expected: Float | None = None) -> tuple[Configuration, Float]:
+        """Return the configuration and the contact forces (c, d) where the iteration begins, N.
+
+        It is at expected unknowns (N,), else at extrapolated ones, else at those of the start.
+        """
+        force = self.start.contact.force if guess is None else guess
+        for x in self._extrapolated() if expected is None else [expected]:
             try:
                 return self.at(x), force
             except InvertedError:
                 continue
-        return self.at(self.start.body.unknowns), self.start.contact.force if guess is None else guess
+        return self.at(self.start.body.unknowns), force
 
-    def _extrapolated(self, guess: Float | None) -> Iterator[tuple[Float, Float]]:
-        """Yield expected unknowns (N,) and contact forces (c, d)."""
+    def _extrapolated(self) -> Iterator[Float]:
+        """Yield unknowns (N,) at which the increment may end: of a similar press, and of the path continued."""
         start = self.start
         unknowns = start.body.unknowns
         if self.workspace.ends and self.move in self.workspace.ends:
             first, last = self.workspace.ends[self.move]
-            yield unknowns + last - first, start.contact.force if guess is None else guess
+            yield unknowns + last - first
         if start.body.previous is not None:
             before, x = start.body.previous
             ratio = self.move.length_ratio(before)
             if ratio is not None:
-                yield unknowns + ratio * (unknowns - x), start.contact.force if guess is None else guess
+                yield unknowns + ratio * (unknowns - x)
 
     def at(self, x: Float) -> Configuration:
         """Return the configuration at unknowns (N,); raises InvertedError."""

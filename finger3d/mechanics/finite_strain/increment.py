@@ -1,14 +1,16 @@
 """One increment of contact at finite strain: Newton's method for equilibrium around the contact solution.
 
 Iterations reuse the tangent of an earlier configuration, also one of an earlier increment or press, while they converge
-(chord method, Ortega and Rheinboldt 1970, sec. 7.1).
+(chord method, Ortega and Rheinboldt 1970, sec. 7.1).  Where they do not converge from afar, the path of equilibrium is
+followed roughly, from which the iteration begins nearer (continuation, Allgower and Georg 1990).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -25,14 +27,19 @@ from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Move
 
-_ITERATIONS, _FACTORS = 60, 15
-"""Largest number of iterations and of new factors in an increment."""
+_ITERATIONS, _FACTORS, _SNAP_FACTORS = 60, 5, 15
+"""Largest number of iterations and of new factors before an iteration is given up, and of those where the body may
+snap: steps that go down in energy lead to the other equilibrium."""
+
+_SHORTEST = 0.125
+"""Shortest part, over the increment, in which the path is followed."""
 
 _SLOW = 0.35
 """Ratio of successive residuals above which the tangent is factored again; a factor costs about five iterations."""
 
 _ASTRAY, _DIVERGED = 0.1, 1.0
-"""Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
+"""Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up.  From the
+first on it is given up too if a step with a new tangent is too long: the tangent is nearly singular there."""
 
 _EXACT = 1e-10
 """Relative error of a prescribed force at which the contact of the linearised body is solved."""
@@ -69,11 +76,9 @@ change and value), and share below which none is added."""
 class FiniteIncrement(IncrementEquations):
     """An increment solved by itself."""
 
-    most_factors: ClassVar[int] = _FACTORS
-
     def solve(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
-        _, solution = self._iterate(guess)
+        _, solution = self._followed(guess)
         if solution.outcome.ok or solution.detail:
             return solution
         damped = self._iterate_damped()
@@ -82,22 +87,60 @@ class FiniteIncrement(IncrementEquations):
             detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
         return replace(damped, iterations=solution.iterations + damped.iterations, detail=detail)
 
-    def _iterate(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
-        """Iterate from the configuration extrapolated, with a new tangent where the residual falls slowly.
+    def _followed(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
+        """Iterate to the end of the increment; where that does not converge, roughly to a point halfway to it first.
+
+        The solution is that of the whole increment, as the points serve to extrapolate from only.  The increment that
+        is returned has the motion that was found, if that is unknown.
+        """
+        rough, spent = self.workspace.rough(), 0
+        begin = np.append(self.start.body.unknowns, self.move.start.depth_mm)
+        points, shares = [(0.0, begin)], [1.0]
+        while shares:
+            last, share = points[-1][0], shares[-1]
+            there = _extrapolated(points[-2:], share) if len(points) > 1 else None
+            part = self._part(share, self.move.at(share).depth_mm if there is None else float(there[-1]))
+            part = part if share == 1.0 else replace(part, workspace=rough)
+            part, solution = part._iterate(guess, None if there is None else there[:-1])
+            spent += solution.iterations
+            if solution.outcome.ok:
+                points.append((shares.pop(), np.append(solution.state.body.unknowns, part.move.end.depth_mm)))
+                guess = solution.state.contact.force
+            elif solution.detail or share - last <= _SHORTEST:
+                break
+            else:
+                shares.append(0.5 * (last + share))
+                guess = None if there is None else guess
+        self.workspace.factorizations += rough.factorizations
+        return part, replace(solution, iterations=spent)
+
+    @property
+    def _may_snap(self) -> bool:
+        return self.motion <= _SNAPS * self.length_scale
+
+    def _part(self, share: float, depth: float) -> Self:
+        """Return the increment up to a share of it, where a depth (mm) is expected."""
+        return self if share == 1.0 else replace(self, move=self.move.cut(share)[0])
+
+    def _iterate(
+        self, guess: Float | None, expected: Float | None = None
+    ) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
+        """Iterate from expected unknowns (N,), else from those extrapolated, with a new tangent where that is slow.
 
         If it does not converge with the tangent of an earlier increment, the iteration starts again with a new one.
-        The increment that is returned has the motion that was found, if that is unknown.
         """
-        first = increment, now, force = self, *self.initial(guess)
+        first = increment, now, force = self, *self.initial(guess, expected)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
         linearisation, factors, spent, error = None if is_new else self.last_linearisation(), 0, 0, math.inf
         is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors >= self.most_factors:
+                if factors >= (_SNAP_FACTORS if self._may_snap else _FACTORS):
                     break
                 linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
-            solution, after = increment._advance(now, force, linearisation)
+            is_astray = factors and error > _ASTRAY and not self._may_snap
+            longest = increment._largest_step if is_astray else math.inf
+            solution, after = increment._advance(now, force, linearisation, longest)
             spent += solution.iterations
             if after is None:
                 if factors and not is_damped:  # a tangent near a singular one, under which contact need not settle
@@ -127,7 +170,7 @@ class FiniteIncrement(IncrementEquations):
         """
         now, force = self.at(self.start.body.unknowns), self.start.contact.force
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
-        may_snap, rises, snapped = self.motion <= _SNAPS * self.length_scale, 0, False
+        may_snap, rises, snapped = self._may_snap, 0, False
         least, stalls = math.inf, 0
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
             solution, after = self._advance(now, force, self.linearise(now, force, damping))
@@ -157,19 +200,29 @@ class FiniteIncrement(IncrementEquations):
         return self.residual(now, state, self.out_of_balance(now, state.force))
 
     def _advance(
-        self, now: Configuration, force: Float, linearisation: Linearisation
+        self, now: Configuration, force: Float, linearisation: Linearisation, longest: float = math.inf
     ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
-        """Return the contact solution, and the next configuration; None if there is no solution, or a cell inverts."""
+        """Return the contact solution, and the next configuration.
+
+        There is none if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
+        """
         eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
         read = eliminated.displacement[linearisation.reads]
         increment, solution, change = self.contact(now, force, linearisation, read)
         step = eliminated.unknowns(change)
-        if not solution.outcome.ok or not np.isfinite(step).all():
+        length = float(np.abs(step[: self.problem.mesh.points.size]).max())
+        if not solution.outcome.ok or not np.isfinite(step).all() or length > longest:
             return solution, None
         try:
             return solution, (increment, increment.moved(now, step, solution.state.force))
         except InvertedError:
             return solution, None
+
+
+def _extrapolated(points: Sequence[tuple[float, Float]], share: float) -> Float:
+    """Return the place (k,) at a share of a path, on the line through two points at other shares."""
+    (s0, x0), (s1, x1) = points
+    return np.asarray(x1 + (share - s1) / (s1 - s0) * (x1 - x0))
 
 
 @dataclass(frozen=True)
@@ -188,8 +241,6 @@ class IncrementToForce(FiniteIncrement):
     rate : of the force by the depth in the last iteration, N/mm
     """
 
-    most_factors: ClassVar[int] = 4
-
     wanted: float
     depths: tuple[float, float] = (-math.inf, math.inf)
     rate: float = math.nan
@@ -199,11 +250,19 @@ class IncrementToForce(FiniteIncrement):
 
         The state of the solution is without internal variables.
         """
-        (start, end), far = (pose.depth_mm for pose in (self.move.start, self.move.end)), self._largest_step
-        rise = self.wanted + float(self.problem.world_force(self.start.contact)[:, 1].sum())
-        rate = rise / (end - start) if rise * (end - start) > 0.0 else self.wanted / self.length_scale
-        increment, solution = replace(self, rate=rate, depths=(end - far, end + far))._iterate(guess)
+        increment, solution = self._part(1.0, self.move.end.depth_mm)._followed(guess)
         return increment.move, solution
+
+    def _part(self, share: float, depth: float) -> Self:
+        """Return the increment up to a share of the root of the force, with which the depth of contact grows."""
+        before = -float(self.problem.world_force(self.start.contact)[:, 1].sum())
+        wanted = (share * math.sqrt(self.wanted) + (1.0 - share) * math.sqrt(max(before, 0.0))) ** 2
+        pose = self.move.end if share == 1.0 else self.move.at(share)
+        start, far = self.move.start, self._largest_step
+        rise, way = wanted - before, depth - start.depth_mm
+        rate = rise / way if rise * way > 0.0 else self.wanted / self.length_scale
+        move = Move(start, replace(pose, depth_mm=depth))
+        return replace(self, move=move, wanted=wanted, rate=rate, depths=(depth - far, depth + far))
 
     def _error(self, now: Configuration, state: ContactState) -> float:
         return max(super()._error(now, state), abs(self._force(now, state.force) / self.wanted - 1.0))

@@ -22,12 +22,6 @@ from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import Progress
 
-_CUTS = 3
-"""Times that an increment which approaches a force is halved, at most."""
-
-_STRETCH = 3.0
-"""Ratio of depths from which an increment is halved at once."""
-
 _NEAR = 0.2
 """Least ratio of a trial's force to the prescribed one, or back, from which the iteration to that begins."""
 
@@ -148,30 +142,26 @@ class ToForce:
 class ToForceAtFiniteStrain(ToForce):
     """An increment to a normal force at finite strain, where every iteration from afar costs a factorisation.
 
-    The force is approached roughly; parts and end of the increment begin their iterations near that solution, until the
-    parts are at their shares of the depth.  Trials begin at the end that is expected from those before them.
+    Where contact begins, the force is approached roughly; the parts of the increment begin their iterations near that
+    solution, until they are at their shares of the depth.  Trials begin at the end that is expected from those before.
     """
 
     tolerance: ClassVar[float] = target(finite_strain=True)
 
     def _directly(self, depth: float) -> Trial | None:
-        press, problem = self._press, self._press.problem
-        *earlier, last = press.moves_to(self._pose(depth))
-        end = None if earlier else super()._directly(depth)
-        if end is not None:
-            return end
-        rough, state, parts, may_go_on = press.workspace.rough(), press.state, list[Substep](), True
-        if earlier:
-            found, parts = press.solved(state, earlier, workspace=rough)
-            state, may_go_on = found.state, found.outcome.ok
-        forces = normal_force(problem, state), self._wanted
-        near = approached(problem, rough, state, last, forces) if may_go_on else None
+        press, pose = self._press, self._pose(depth)
+        *earlier, last = press.moves_to(pose)
+        if not earlier:
+            return self._to_force(press.state, last, press.expected_force(pose), [])
+        rough = press.workspace.rough()
+        found, parts = press.solved(press.state, earlier, workspace=rough)
+        start = found.state, None
+        near = increment_to_force(press.problem, start, last, self._wanted, rough) if found.outcome.ok else None
         press.workspace.factorizations += rough.factorizations
         if near is None:
             return None
-        pose, solution = near[0].end, near[1]
-        trial = self._noted(pose.depth_mm, solution, [*parts, Substep(state, solution.state, Move(last.start, pose))])
-        end = adapted(trial, depth, self._repeated) if earlier else self._from_last(self._parts[trial.depth])
+        trial = self._noted(near[0].end.depth_mm, near[1], [*parts, Substep(found.state, near[1].state, near[0])])
+        end = adapted(trial, depth, self._repeated)
         return end if end is not trial else None
 
     def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
@@ -202,44 +192,6 @@ class ToForceAtFiniteStrain(ToForce):
         *before, last = parts
         start = expecting(last.before, last.move, (last.after, last.after), 0.0)
         return self._to_force(start, last.move, last.after.contact.force, before)
-
-
-def approached(
-    problem: Problem,
-    workspace: Any,
-    state: State[Any],
-    move: Move,
-    forces: tuple[float, float],
-    cuts: int = _CUTS,
-) -> tuple[Move, ContactSolution[State[Any]]] | None:
-    """Approach a normal force at finite strain in halves, which are halved again where they do not converge.
-
-    They are halves of the square root of the force, in proportion to which the depth grows under a cylinder, more or
-    less.
-
-    Parameters
-    ----------
-    move : to the depth that is expected
-    forces : before and at the end, N
-    cuts : times that it is halved, at most
-
-    Returns
-    -------
-    The whole motion, and a rough solution; None if there is none.
-    """
-    if cuts == 0:
-        return None
-    middle = (0.5 * sum(math.sqrt(max(force, 0.0)) for force in forces)) ** 2
-    there = move.cut(0.5)[0]
-    for before, after in ((forces[0], middle), (middle, forces[1])):
-        end = increment_to_force(problem, (state, None), there, after, workspace)
-        end = end or approached(problem, workspace, state, there, (before, after), cuts - 1)
-        if end is None:
-            return None
-        there, solution = end
-        state = solution.state
-        there = Move(there.end, replace(move.end, depth_mm=2.0 * there.end.depth_mm - move.start.depth_mm))
-    return Move(move.start, there.start), solution
 
 
 def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: tuple[float, float]) -> float:
