@@ -274,3 +274,19 @@ def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.Capture
     assert "10000 N asked; the largest force is" in error
     summary = json.loads((tmp_path / "far" / "summary.json").read_text())
     assert "prescribed force is not reached" in summary["outcome"]
+
+
+def test_an_increment_that_failed_tells_what_it_led_to_until_then() -> None:
+    """The body holds no more than 2 N, at 2 mm: parts of an increment converge up to a hundredth of a mm before."""
+
+    def trial(depth: float, good: Sequence[Trial]) -> Trial:
+        if depth < 2.0:
+            return Trial(depth, ContactSolution(REST, Outcome.CONVERGED, 0.0, 1, "none"), depth)
+        before = Trial(1.99, ContactSolution(REST, Outcome.CONVERGED, 0.0, 1, "none"), 1.99)
+        return Trial(2.0, ContactSolution(REST, Outcome.NEWTON, 0.0, 1, "none"), np.nan, before)
+
+    search = DepthSearch(trial, 4.0, 0.0, 10.0, begin=Trial(0.0, ContactSolution(REST, Outcome.CONVERGED, 0, 0, ""), 0))
+    found = search.run(8.0).solution
+    assert found.outcome is Outcome.NEWTON
+    assert "4 N asked; the largest force is 1.99" in found.detail
+    assert len(search.failed) + len(search.good) <= 4

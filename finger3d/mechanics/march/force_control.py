@@ -74,11 +74,13 @@ class Trial:
     depth : mm
     solution : of the increment
     force : normal force at its end, N; NaN if the increment failed
+    before : what an increment that failed led to until then; None if it failed at once
     """
 
     depth: float
     solution: ContactSolution[State[Any]]
     force: float
+    before: Trial | None = None
 
     @property
     def ok(self) -> bool:
@@ -210,6 +212,8 @@ class DepthSearch:
         if trial.ok and (trial.force < -FORCE_TOLERANCE * self.wanted or (pushed and trial.force <= 0.0)):
             trial = _passed_through(trial)
         (self.good if trial.ok else self.failed).append(trial)
+        if trial.before is not None:
+            self.good.append(trial.before)
         return trial
 
     def _bracket(self) -> tuple[Trial | None, Trial | None]:

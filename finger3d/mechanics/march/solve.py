@@ -111,7 +111,7 @@ class Press:
         self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
         self._left: Float = np.zeros(2)  # slides at the start of the leg, less those of the path
         self._stiffness: Float | None = None  # of the last increment under tangential forces
-        self._before: tuple[State[Any], float, float] | None = None
+        self._before: tuple[State[Any], float, float] | None = None  # None if the last increment was cut
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
@@ -148,7 +148,8 @@ class Press:
                 end = self._to_pose(move.end, None)
         else:
             end = (self._to_force if station.load.is_normal else self._to_forces)(move, station.load)
-        self._before = self.state, self._work, self._dissipation
+        was_cut = len(end.parts) > len(self.moves_to(end.pose))
+        self._before = None if was_cut else (self.state, self._work, self._dissipation)
         self._add_energies(end)
         self._previous = Move(self.pose, end.pose), self.state.contact.force
         self._last_part = end.parts[-1] if end.parts else None

@@ -166,6 +166,12 @@ class ToForceAtFiniteStrain(ToForce):
 
     def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
         trial = super()._tried(depth, good)
+        *parts, failed = self._parts[depth]
+        if trial.solution.outcome is Outcome.NEWTON and parts:
+            last = parts[-1]
+            until_then = replace(trial.solution, state=last.after, outcome=Outcome.CONVERGED, residual=0.0)
+            before = self._noted(last.move.end.depth_mm, until_then, parts)
+            return replace(trial, depth=failed.move.end.depth_mm, before=before)
         end = self._from_last(self._parts[depth]) if is_near(trial.force, self._wanted) else None
         return trial if end is None else adapted(end, depth, self._repeated)
 
