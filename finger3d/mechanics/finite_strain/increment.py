@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -27,9 +28,9 @@ from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Move
 
-_ITERATIONS, _FACTORS, _SNAP_FACTORS = 60, 5, 15
-"""Largest number of iterations and of new factors before an iteration is given up, and of those where the body may
-snap: steps that go down in energy lead to the other equilibrium."""
+_ITERATIONS, _FACTORS, _PATIENT_FACTORS = 60, 5, 15
+"""Largest number of iterations and of new factors before an iteration is given up, and of those where the path cannot
+be followed, or the body may snap: steps that go down in energy may lead to the equilibrium all the same."""
 
 _SHORTEST = 0.125
 """Shortest part, over the increment, in which the path is followed."""
@@ -78,14 +79,17 @@ class FiniteIncrement(IncrementEquations):
 
     def solve(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and the contact conditions hold; the state is without internal variables."""
-        _, solution = self._followed(guess)
-        if solution.outcome.ok or solution.detail:
-            return solution
+        patiently, spent = partial(self._iterate, patient=True), 0
+        for attempt in (patiently,) if self._may_snap else (self._followed, patiently):
+            _, solution = attempt(guess)
+            spent += solution.iterations
+            if solution.outcome.ok or solution.detail:
+                return replace(solution, iterations=spent)
         damped = self._iterate_damped()
         detail = damped.detail
         if damped.outcome is Outcome.NEWTON:
             detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
-        return replace(damped, iterations=solution.iterations + damped.iterations, detail=detail)
+        return replace(damped, iterations=spent + damped.iterations, detail=detail)
 
     def _followed(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
         """Iterate to the end of the increment; where that does not converge, roughly to a point halfway to it first.
@@ -123,11 +127,12 @@ class FiniteIncrement(IncrementEquations):
         return self if share == 1.0 else replace(self, move=self.move.cut(share)[0])
 
     def _iterate(
-        self, guess: Float | None, expected: Float | None = None
+        self, guess: Float | None, expected: Float | None = None, patient: bool = False
     ) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
         """Iterate from expected unknowns (N,), else from those extrapolated, with a new tangent where that is slow.
 
-        If it does not converge with the tangent of an earlier increment, the iteration starts again with a new one.
+        A patient iteration shortens steps that are too long, and goes on.  One that does not converge with the tangent of
+        an earlier increment starts again with a new one.
         """
         first = increment, now, force = self, *self.initial(guess, expected)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
@@ -135,10 +140,10 @@ class FiniteIncrement(IncrementEquations):
         is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors >= (_SNAP_FACTORS if self._may_snap else _FACTORS):
+                if factors >= (_PATIENT_FACTORS if patient else _FACTORS):
                     break
                 linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
-            is_astray = factors and error > _ASTRAY and not self._may_snap
+            is_astray = factors and error > _ASTRAY and not patient
             longest = increment._largest_step if is_astray else math.inf
             solution, after = increment._advance(now, force, linearisation, longest)
             spent += solution.iterations
