@@ -131,8 +131,8 @@ class FiniteIncrement(IncrementEquations):
     ) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
         """Iterate from expected unknowns (N,), else from those extrapolated, with a new tangent where that is slow.
 
-        A patient iteration shortens steps that are too long, and goes on.  One that does not converge with the tangent of
-        an earlier increment starts again with a new one.
+        A patient iteration shortens steps that are too long, and goes on.  One that does not converge with the tangent
+        of an earlier increment starts again with a new one.
         """
         first = increment, now, force = self, *self.initial(guess, expected)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
