@@ -25,11 +25,12 @@ ball.  In the first part points move freely until one of them touches, which say
 
 @dataclass(frozen=True)
 class Substep:
-    """A converged part of an increment: states before and after, and the motion of the object."""
+    """A converged part of an increment: states before and after, the motion of the object, and the residual."""
 
     before: State[Any]
     after: State[Any]
     move: Move
+    residual: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def _solved(
 ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
     whole = formulation_of(problem.model).increment(problem, state, move, guess, workspace)
     if whole.outcome.ok or cuts == 0:
-        return whole, [Substep(state, whole.state, move)]
+        return whole, [Substep(state, whole.state, move, whole.residual)]
     halves, parts = solved_in_turn(problem, workspace, state, move.cut(0.5), cuts - 1)
     method = SNAPPED if halves.method == SNAPPED else "cut back"
     return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts

@@ -109,7 +109,8 @@ class ToForce:
         if found is None or found[0].end.depth_mm > self._deepest:
             return None
         move, solution = found
-        return self._noted(move.end.depth_mm, solution, [*before, Substep(start, solution.state, move)])
+        part = Substep(start, solution.state, move, solution.residual)
+        return self._noted(move.end.depth_mm, solution, [*before, part])
 
     def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
         """Return the increment to a depth (mm), after other trials."""
@@ -131,7 +132,10 @@ class ToForce:
         return replace(self._move.end, depth_mm=depth)
 
     def _noted(self, depth: float, solution: ContactSolution[State[Any]], parts: list[Substep]) -> Trial:
-        reached = normal_force(self._press.problem, solution.state) if solution.outcome.ok else math.nan
+        reached = math.nan
+        if solution.outcome.ok:
+            reached = normal_force(self._press.problem, solution.state)
+            solution = replace(solution, residual=max(part.residual for part in parts))
         self._trials.append(Trial(depth, solution, reached))
         self._parts[depth] = parts
         text = f"{reached:.5g} N" if solution.outcome.ok else "no solution"
@@ -160,16 +164,18 @@ class ToForceAtFiniteStrain(ToForce):
         press.workspace.factorizations += rough.factorizations
         if near is None:
             return None
-        trial = self._noted(near[0].end.depth_mm, near[1], [*parts, Substep(found.state, near[1].state, near[0])])
-        end = adapted(trial, depth, self._repeated)
-        return end if end is not trial else None
+        last, end = near
+        part = Substep(found.state, end.state, last, end.residual)
+        trial = self._noted(last.end.depth_mm, end, [*parts, part])
+        exact = adapted(trial, depth, self._repeated)
+        return exact if exact is not trial else None
 
     def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
         trial = super()._tried(depth, good)
         *parts, failed = self._parts[depth]
         if trial.solution.outcome is Outcome.NEWTON and parts:
             last = parts[-1]
-            until_then = replace(trial.solution, state=last.after, outcome=Outcome.CONVERGED, residual=0.0)
+            until_then = replace(trial.solution, state=last.after, outcome=Outcome.CONVERGED)
             before = self._noted(last.move.end.depth_mm, until_then, parts)
             return replace(trial, depth=failed.move.end.depth_mm, before=before)
         end = self._from_last(self._parts[depth]) if is_near(trial.force, self._wanted) else None
@@ -190,7 +196,7 @@ class ToForceAtFiniteStrain(ToForce):
         whole = len(its_parts) == len(earlier) + 1
         moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
         found, parts = press.solved(press.state, moves, near=near)
-        parts += [Substep(found.state, trial.solution.state, last)] if whole else []
+        parts += [Substep(found.state, trial.solution.state, last, trial.solution.residual)] if whole else []
         return self._from_last(parts) if found.outcome.ok else None
 
     def _from_last(self, parts: Sequence[Substep]) -> Trial | None:
