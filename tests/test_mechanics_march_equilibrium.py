@@ -15,6 +15,7 @@ from finger3d.errors import Outcome
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane, Sphere
@@ -61,6 +62,28 @@ def test_a_slope_steeper_than_friction_holds_nothing_as_small_as_is_asked() -> N
     steps, _ = pressed(finger)
     assert steps[-1].outcome is Outcome.SLIPS
     assert steps[-1].detail.endswith("but slides down its slope under less")
+
+
+@pytest.mark.parametrize(
+    ("steps", "outcome", "detail"),
+    [
+        (1, Outcome.FORCE_NOT_REACHED, "0.02 N are missing where the object leaves the finger"),
+        (2, Outcome.SLIPS, "0.02 N asked; the contact pushes 0.00168 N the other way"),
+    ],
+)
+def test_a_slope_without_friction_pushes_one_way_until_it_leaves_the_finger(
+    steps: int, outcome: Outcome, detail: str
+) -> None:
+    finger = block(
+        design=designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0), mesh=MeshOptions(0.4, 1.6),
+        object=Plane(tilt=np.radians(-2.0)), friction=Coulomb(0.0), domain="plane-strain",
+        legs=(Leg(0.5, steps=2), Leg(0.5, steps=steps, force_x_N=0.02)),
+    )  # fmt: skip
+    problem = build(finger)
+    *_, before, last = march(problem)
+    assert (last.outcome, last.detail) == (outcome, detail)
+    assert before.outcome.ok
+    assert measure(problem.points, before)["force_x_N"] < 0.0
 
 
 @pytest.mark.parametrize(

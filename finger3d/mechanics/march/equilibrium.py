@@ -62,6 +62,11 @@ class PoseTrial:
         status = self.solution.state.contact.status
         return self.ok and bool((status == SLIP).any()) and not (status == STICK).any()
 
+    @property
+    def touches(self) -> bool:
+        """Whether any point is in contact."""
+        return bool(self.solution.state.contact.force.any())
+
 
 @dataclass
 class PoseSearch:
@@ -110,7 +115,7 @@ class PoseSearch:
             refused = 0 if lowered else refused + (fresh or refused > 0)
             if lowered:
                 best = trial
-            elif refused > _REFUSED:
+            if refused > _REFUSED or not best.touches:
                 break
         if not best.ok or self._error(best) <= _LAST_DIGITS * self.target:
             return best
@@ -161,11 +166,12 @@ class PoseSearch:
             if self._cannot_hold(trial):
                 return trial
             starts_to_slip = trial.slips and not best.slips
-            if trial.ok and self._error(trial) < _LESS * self._error(best):
+            changes_sign = (self.wanted - trial.forces)[k] * (self.wanted - best.forces)[k] < 0.0
+            lowered = trial.ok and self._error(trial) < _LESS * self._error(best)
+            if lowered and (trial.touches or not changes_sign):
                 if not starts_to_slip:
                     return trial
                 slipping = slipping or trial
-            changes_sign = (self.wanted - trial.forces)[k] * (self.wanted - best.forces)[k] < 0.0
             if not beyond or not trial.ok or starts_to_slip or changes_sign:
                 beyond = share
             else:
@@ -184,7 +190,10 @@ class PoseSearch:
             held = self.largest(trial) * now
             slides_down = held > _MUCH * asked
             share = "but slides down its slope under less" if slides_down else f"{100.0 * held / asked:.4g} % of it"
-            detail = f"{asked:.6g} N asked; the contact holds at most {held:.9g} N, {share}"
+            holds = f"holds at most {held:.9g} N, {share}" if held > 0.0 else f"pushes {-held:.3g} N the other way"
+            detail = f"{asked:.6g} N asked; the contact {holds}"
         else:
-            detail = f"the nearest forces differ by {self._error(trial) * self.scale_N:.3g} N"
+            missing = self._error(trial) * self.scale_N
+            nearest = f"the nearest forces differ by {missing:.3g} N"
+            detail = nearest if trial.touches else f"{missing:.3g} N are missing where the object leaves the finger"
         return replace(trial, solution=replace(trial.solution, outcome=outcome, detail=detail))
