@@ -14,6 +14,7 @@ from finger3d._types import Float
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_type
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of
@@ -82,6 +83,17 @@ def test_a_rigid_part_is_the_limit_of_a_stiff_one(effect: str) -> None:
     off = 1.0 - np.array(forces[:2]) / forces[2]
     assert 0.0 < off[1] < off[0] < 0.1
     assert off[0] / off[1] == pytest.approx(10.0, rel=0.1)
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "plane-stress"])
+@pytest.mark.parametrize("effect", ["large_deformation", "viscosity"])
+def test_a_part_of_steel_in_silicone_settles_at_large_deformation(domain: str, effect: str) -> None:
+    model = tip(effect, domain=domain, legs=(Leg(0.02, steps=3, duration_s=1.0),))
+    model = model if effect == "large_deformation" else LargeDeformation().apply(model)
+    rigid, steel = (
+        numbers(replace(model, parts=(("core", Isotropic(0.5 * ratio, 0.3)),))) for ratio in (RIGID_RATIO, 1e7)
+    )
+    np.testing.assert_allclose(steel, rigid, rtol=5e-5)  # forces deviate by some 2e-5 at RIGID_RATIO
 
 
 def test_a_solid_with_a_stiff_core_is_stiffer_and_settles_with_friction() -> None:

@@ -51,24 +51,30 @@ class Bars:
         vectors = self.directions + (self.relative @ u.ravel()).reshape(self.directions.shape)
         return vectors, np.linalg.norm(vectors, axis=1)
 
+    def _whole_strain(self, u: Float) -> Float:
+        """Strain (b,) of bars and surroundings; at rest without round-off, which a small force would not exceed."""
+        vectors, length = self._vectors(u)
+        apart = (self.relative @ u.ravel()).reshape(vectors.shape)
+        return np.asarray(np.einsum("bk,bk->b", apart, vectors + self.directions) / (length + 1.0))
+
     def _stiffness(self, relaxation: BarRelaxation | None) -> Float:
         factor = 1.0 if relaxation is None else relaxation.factor
         return np.asarray(np.linalg.inv(np.diag(1.0 / self.stiffness) + self.yielding / factor))
 
     def tension(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
         """Return the forces times lengths (b,) N mm at displacements u (n, d) mm."""
-        strain = self._vectors(u)[1] - 1.0
+        strain = self._whole_strain(u)
         if relaxation is not None:
             strain = strain - relaxation.past / relaxation.factor
         return np.asarray(self._stiffness(relaxation) @ strain)
 
     def strain(self, u: Float, yielded: Float) -> Float:
         """Return the strain (b,) of the bars themselves, less that by which their surroundings have yielded (b,)."""
-        return np.asarray(self._vectors(u)[1] - 1.0 - yielded)
+        return np.asarray(self._whole_strain(u) - yielded)
 
     def yielded(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
         """Return the strain (b,) by which the surroundings have yielded."""
-        return np.asarray(self._vectors(u)[1] - 1.0 - self.tension(u, relaxation) / self.stiffness)
+        return np.asarray(self._whole_strain(u) - self.tension(u, relaxation) / self.stiffness)
 
     def forces(self, u: Float, relaxation: BarRelaxation | None = None) -> Float:
         """Return the internal nodal forces (n d,) N of the bars."""

@@ -32,6 +32,12 @@ _THICKNESS_ITERATIONS, _THICKNESS_ERROR = 60, 1e-9
 its square."""
 
 
+_STIFF = 1e4
+"""Young's modulus, over the least of all parts, from which a part strains so little (less than 1e-4) that the stress of
+every law is that of Hooke's law for the Green-Lagrange strain.  That has no round-off of F = 1 + H, in which the forces
+of a part 1e5 times as stiff as another one are lost."""
+
+
 @dataclass(frozen=True)
 class Relaxing:
     """Relaxation of the stress over one increment of time: ``a_iso S_iso + a_vol S_vol - S_past``.
@@ -58,13 +64,15 @@ class Relaxing:
 class Hyperelastic:
     """A hyperelastic material: isochoric law, bulk modulus (MPa), and which form is used.
 
-    In an inhomogeneous body law and bulk modulus (m,) belong to m points, at which the material is evaluated.
+    In an inhomogeneous body law and bulk modulus (m,) belong to m points, at which the material is evaluated; `stiff`
+    (s,) are the numbers of those in parts far stiffer than others.
     """
 
     law: IsochoricLaw
     bulk: float | Float
     mixed: bool
     plane_stress: bool = False
+    stiff: Int | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -90,13 +98,15 @@ class Hyperelastic:
         bulk = np.array([_bulk_modulus(g, m.nu) for g, m in zip(shear, materials, strict=True)])
         mixed = any(material.is_nearly_incompressible for material in materials)
         everywhere = Inhomogeneous(law.with_shear(float(shear[0])), (shear / shear[0])[part])
-        return cls(everywhere, bulk[part], mixed and not plane_stress, plane_stress)
+        young = np.array([material.E_MPa for material in materials])
+        stiff = np.flatnonzero((young >= _STIFF * young.min())[part])
+        return cls(everywhere, bulk[part], mixed and not plane_stress, plane_stress, stiff if len(stiff) else None)
 
     def of_points(self, points: slice) -> Hyperelastic:
-        """Return the material at some of the points of a body; itself if it is homogeneous."""
+        """Return the material at some of the points of a body, without stiff ones; itself if it is homogeneous."""
         if not isinstance(self.law, Inhomogeneous):
             return self
-        return replace(self, law=self.law.of_points(points), bulk=np.asarray(self.bulk)[points])
+        return replace(self, law=self.law.of_points(points), bulk=np.asarray(self.bulk)[points], stiff=None)
 
     def deformation(self, slope: Float, relaxing: Relaxing | None = None) -> Float:
         """Return F (..., 3, 3) from displacement gradients (..., d, d), row the component.
@@ -166,19 +176,44 @@ class Hyperelastic:
             )
         return np.asarray(a_vol * (self.bulk * (determinant(f) - 1.0) if p is None else p))
 
-    def stress(self, f: Float, p: Float | None, relaxing: Relaxing | None = None) -> Float:
+    def stress(self, f: Float, p: Float | None, relaxing: Relaxing | None = None, slope: Float | None = None) -> Float:
         """Return the first Piola-Kirchhoff stress (..., 3, 3) MPa.
 
         Parameters
         ----------
         f : (..., 3, 3) from `deformation`
         p : (...,) MPa, the pressure of the mixed form; None in the displacement form
+        slope : (..., d, d), the displacement gradients of f, without the round-off of f at stiff points
         """
         isochoric, cof = self.law.stress(f), cofactor(f)
         spherical = self._spherical(f, cof, isochoric, p, relaxing)[..., None, None]
         if relaxing is None:
-            return np.asarray(isochoric + spherical * cof)
-        return np.asarray(relaxing.isochoric * isochoric + spherical * cof - f @ relaxing.past)
+            stress = np.asarray(isochoric + spherical * cof)
+        else:
+            stress = np.asarray(relaxing.isochoric * isochoric + spherical * cof - f @ relaxing.past)
+        if self.stiff is not None and slope is not None:
+            stress[self.stiff] = self._stress_at_stiff_points(slope, f, p, relaxing)
+        return stress
+
+    def _stress_at_stiff_points(self, slope: Float, f: Float, p: Float | None, relaxing: Relaxing | None) -> Float:
+        """Return the first Piola-Kirchhoff stress (s, 3, 3) MPa of Hooke's law for the Green-Lagrange strain."""
+        points, d, law = self.stiff, slope.shape[-1], self.law
+        a_iso, a_vol, past = _factors(relaxing)
+        relative = law.relative if isinstance(law, Inhomogeneous) else np.ones(len(f))
+        shear = 2.0 * a_iso * law.shear * relative[points]
+        bulk, past = a_vol * np.asarray(self.bulk)[points], np.broadcast_to(past, f.shape)[points]
+        h = np.zeros_like(past)
+        h[:, :d, :d] = slope[points]
+        strain = 0.5 * (h + np.swapaxes(h, 1, 2) + np.swapaxes(h, 1, 2) @ h)
+        dilatation = np.trace(strain, axis1=1, axis2=2)
+        if self.plane_stress:
+            across = (past[:, 2, 2] + (shear / 3.0 - bulk) * dilatation) / (2.0 / 3.0 * shear + bulk)
+            strain[:, 2, 2], dilatation = across, dilatation + across
+        unit = np.eye(3)
+        second = shear[:, None, None] * (strain - dilatation[:, None, None] / 3.0 * unit) - past
+        if p is None:
+            return np.asarray(f[points] @ (second + (bulk * dilatation)[:, None, None] * unit))
+        return np.asarray(f[points] @ second + (a_vol * p[points])[:, None, None] * cofactor(f[points]))
 
     def stress_and_tangent(self, f: Float, p: Float | None, relaxing: Relaxing | None = None) -> tuple[Float, Float]:
         """Return the first Piola-Kirchhoff stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F, MPa."""
@@ -307,8 +342,9 @@ class TotalLagrangian:
         d = self.mesh.dim
         p = self.pressures(x)
         gradient, weights, hats = self._operators
-        f = self.deformation(x, relaxing)
-        stress = self.material.stress(f, p, relaxing)[:, :d, :d] * weights.reshape(-1, 1, 1)
+        slopes = self.slopes(x)
+        f = self.material.deformation(slopes, relaxing)
+        stress = self.material.stress(f, p, relaxing, slopes)[:, :d, :d] * weights.reshape(-1, 1, 1)
         force = gradient.T @ np.ascontiguousarray(np.swapaxes(stress, 1, 2)).reshape(-1, d)
         if hats is None or p is None:
             return np.asarray(force.ravel())

@@ -31,8 +31,7 @@ It keeps the pressures finite at nu = 0, where another part of the body is nearl
 RIGID_RATIO = 1e5
 """Young's modulus of a rigid part over the largest of the other parts.
 
-Forces deviate by some 2e-5 from those of a part that keeps its shape exactly. A larger ratio would leave round-off in
-the equilibrium at finite strain: 1e6 did not converge.
+Forces deviate by some 2e-5 from those of a part that keeps its shape exactly.
 """
 
 
