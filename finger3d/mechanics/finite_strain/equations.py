@@ -216,16 +216,20 @@ class IncrementEquations:
             raise InvertedError
         return after
 
-    def linearise(self, now: Configuration, force: Float, damping: float = 0.0) -> Linearisation:
+    def linearise(self, now: Configuration, force: Float, damping: float = 0.0, local: bool = False) -> Linearisation:
         """Factor the tangent under contact forces (c, d), and keep the factor for later increments.
 
-        `damping` times the linear stiffness of the displacements is added.
+        Parameters
+        ----------
+        damping : multiple of the linear stiffness of the displacements that is added
+        local : whether the curvature of the object is that of its facets, see `curvature_of`
         """
         problem, pattern, tangent = self.problem, self.body.contact_rows, self.body.tangent(now.x)
         active = problem.system.active_dofs
         rows, reads = now.contact.rows[active], np.arange(len(active))
         if problem.system.object_compliance is None:
-            curvature = curvature_of(problem, problem.surface, displacement(problem.mesh, now.x), self.move.end)
+            u = displacement(problem.mesh, now.x)
+            curvature = curvature_of(problem, problem.surface, u, self.move.end, local)
             tangent = tangent.less(now.contact.geometric_stiffness(force[:, 0], curvature))
         else:  # the gap is not read along the rows of the forces, since its normal turns
             normals = np.flatnonzero(active % problem.dim == 0)

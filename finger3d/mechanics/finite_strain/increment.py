@@ -142,7 +142,8 @@ class FiniteIncrement(IncrementEquations):
             if linearisation is None:
                 if factors >= (_PATIENT_FACTORS if patient else _FACTORS):
                     break
-                linearisation, factors, is_damped = increment.linearise(now, force), factors + 1, False
+                linearisation = increment.linearise(now, force, local=factors % 2 == 1)
+                factors, is_damped = factors + 1, False
             is_astray = factors and error > _ASTRAY and not patient
             longest = increment._largest_step if is_astray else math.inf
             solution, after = increment._advance(now, force, linearisation, longest)

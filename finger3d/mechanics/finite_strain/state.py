@@ -24,8 +24,9 @@ TARGET_RESIDUAL = 5e-9
 _ROUGH = 1e-3
 """Residual of a solution near which others begin."""
 
-_CURVATURE_STEP = 0.1
-"""Step of the differences of the object's normals, over the edge length of the mesh."""
+_CURVATURE_STEP, _LOCAL_STEP = 0.1, 1e-3
+"""Steps of the differences of the object's normals, over the edge length of the mesh: one in which an edge of the
+object counts as round, and one that mostly stays on the same facet."""
 
 
 @dataclass(frozen=True)
@@ -107,17 +108,20 @@ def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: Object
     )
 
 
-def curvature_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> Float | None:
+def curvature_of(
+    problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose, local: bool = False
+) -> Float | None:
     """Return the second derivatives (q, d, d) 1/mm of the distance at the samples of a face; None for a flat object.
 
-    They are differences over a fraction of an edge, so that an edge of the object counts as round.
+    They are differences over a fraction of an edge of the mesh, so that an edge of the object counts as round, unless
+    those of its facets are asked for, `local`.
     """
     if problem.model.object.is_flat:
         return None
     d, placed = problem.dim, problem.placed(target)
     samples = face.samples + face.interpolate @ u
     tangents = bases_of(placed.distance(samples)[1])[:, 1:]
-    out, step = np.zeros((len(samples), d, d)), _CURVATURE_STEP * problem.model.mesh.size_mm
+    out, step = np.zeros((len(samples), d, d)), (_LOCAL_STEP if local else _CURVATURE_STEP) * problem.model.mesh.size_mm
     for t in range(d - 1):
         ahead, behind = (placed.distance(samples + sign * step * tangents[:, t])[1] for sign in (1.0, -1.0))
         turn = np.einsum("qk,qtk->qt", ahead - behind, tangents) / (2.0 * step)
