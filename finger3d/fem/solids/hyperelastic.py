@@ -25,17 +25,12 @@ from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.solids.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
+from finger3d.fem.solids.stiff import STIFF, hookean_stress
 from finger3d.fem.tensors import InvertedError, cofactor, determinant
 
 _THICKNESS_ITERATIONS, _THICKNESS_ERROR = 60, 1e-9
 """Iterations for the stretch of the thickness at most, and relative change of it in the last: the next change would be
 its square."""
-
-
-_STIFF = 1e4
-"""Young's modulus, over the least of all parts, from which a part strains so little (less than 1e-4) that the stress of
-every law is that of Hooke's law for the Green-Lagrange strain.  That has no round-off of F = 1 + H, in which the forces
-of a part 1e5 times as stiff as another one are lost."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +94,7 @@ class Hyperelastic:
         mixed = any(material.is_nearly_incompressible for material in materials)
         everywhere = Inhomogeneous(law.with_shear(float(shear[0])), (shear / shear[0])[part])
         young = np.array([material.E_MPa for material in materials])
-        stiff = np.flatnonzero((young >= _STIFF * young.min())[part])
+        stiff = np.flatnonzero((young >= STIFF * young.min())[part])
         return cls(everywhere, bulk[part], mixed and not plane_stress, plane_stress, stiff if len(stiff) else None)
 
     def of_points(self, points: slice) -> Hyperelastic:
@@ -196,24 +191,12 @@ class Hyperelastic:
         return stress
 
     def _stress_at_stiff_points(self, slope: Float, f: Float, p: Float | None, relaxing: Relaxing | None) -> Float:
-        """Return the first Piola-Kirchhoff stress (s, 3, 3) MPa of Hooke's law for the Green-Lagrange strain."""
-        points, d, law = self.stiff, slope.shape[-1], self.law
+        points, law = self.stiff, self.law
         a_iso, a_vol, past = _factors(relaxing)
         relative = law.relative if isinstance(law, Inhomogeneous) else np.ones(len(f))
-        shear = 2.0 * a_iso * law.shear * relative[points]
-        bulk, past = a_vol * np.asarray(self.bulk)[points], np.broadcast_to(past, f.shape)[points]
-        h = np.zeros_like(past)
-        h[:, :d, :d] = slope[points]
-        strain = 0.5 * (h + np.swapaxes(h, 1, 2) + np.swapaxes(h, 1, 2) @ h)
-        dilatation = np.trace(strain, axis1=1, axis2=2)
-        if self.plane_stress:
-            across = (past[:, 2, 2] + (shear / 3.0 - bulk) * dilatation) / (2.0 / 3.0 * shear + bulk)
-            strain[:, 2, 2], dilatation = across, dilatation + across
-        unit = np.eye(3)
-        second = shear[:, None, None] * (strain - dilatation[:, None, None] / 3.0 * unit) - past
-        if p is None:
-            return np.asarray(f[points] @ (second + (bulk * dilatation)[:, None, None] * unit))
-        return np.asarray(f[points] @ second + (a_vol * p[points])[:, None, None] * cofactor(f[points]))
+        moduli = a_iso * law.shear * relative[points], a_vol * np.asarray(self.bulk)[points]
+        past, pressure = np.broadcast_to(past, f.shape)[points], None if p is None else a_vol * p[points]
+        return hookean_stress(slope[points], f[points], pressure, moduli, past, self.plane_stress)
 
     def stress_and_tangent(self, f: Float, p: Float | None, relaxing: Relaxing | None = None) -> tuple[Float, Float]:
         """Return the first Piola-Kirchhoff stress (..., 3, 3) and its derivative (..., 3, 3, 3, 3) by F, MPa."""
