@@ -199,7 +199,8 @@ def warm_start(problem: ContactProblem, expected: Float) -> Float:
         points, normal, solve_normal = _normal_contact(problem, expected, touches & (touched | _deepest(gap, closing)))
         if len(points) and expected.shape[1] > 1:
             active = _ActivePoints.of(problem, points, solve_normal)
-            guess[points] = _alternate(active, normal, expected[points, 1:].astype(normal.dtype))
+            with np.errstate(over="ignore", invalid="ignore"):  # a guess that is not finite is no better than none
+                guess[points] = _alternate(active, normal, expected[points, 1:].astype(normal.dtype))
         else:
             guess[points, 0] = normal
     except np.linalg.LinAlgError:  # a body without support, or an indefinite operator

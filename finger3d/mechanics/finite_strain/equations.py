@@ -45,7 +45,8 @@ from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_
 from finger3d.objects import Move, vertical_frame
 
 _NEGLIGIBLE = 1e-6
-"""Force, over the shear modulus times the square of the depth, below which contact is negligible."""
+"""Force, over the shear modulus times the square of the depth or of an edge of the mesh, below which contact is
+negligible, or round-off."""
 
 _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
@@ -141,7 +142,8 @@ class IncrementEquations:
         """Smallest force (N) by which the residual is divided; without contact all forces are round-off."""
         before = float(np.linalg.norm(self.start.contact.force, axis=1).max())
         shear, width = self.body.solid.material.law.shear, self.body.solid.thickness
-        area = self.length_scale * (width if self.problem.dim == 2 else self.length_scale)
+        length = max(self.length_scale, self.problem.model.mesh.size_mm)
+        area = length * (width if self.problem.dim == 2 else length)
         return max(before, _NEGLIGIBLE * shear * area)
 
     @cached_property

@@ -36,7 +36,7 @@ from finger3d.mechanics.small_strain.exact_path import ExactPath, NormalForce, h
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 
-_CUTS = 6
+CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
 
 
@@ -46,6 +46,7 @@ def march(
     workspace: Workspace | None = None,
     cancel: Event | None = None,
     report: Progress = QUIET,
+    cuts: int = CUTS,
 ) -> Iterator[StepResult]:
     """Yield the result of every increment of all legs; ends after the first that does not converge.
 
@@ -56,14 +57,14 @@ def march(
     problem : Problem
     near : sequence of (c, d) arrays, N
         Contact forces at the ends of the increments of a similar press, as initial guesses.
-    workspace, cancel, report : see `Press`
+    workspace, cancel, report, cuts : see `Press`
 
     Raises
     ------
     CancelledError
         If `cancel` is set.
     """
-    press = Press(problem, workspace, cancel, report)
+    press = Press(problem, workspace, cancel, report, cuts)
     for number, station in enumerate(stations(problem.model.legs)):
         yield press.advance(station, near[number] if number < len(near) else None)
         if press.has_failed:
@@ -82,6 +83,8 @@ class Press:
         Once it is set, the press ends before its next increment.
     report : Progress, optional
         Receives remarks on the depth and the force of every trial while a prescribed force is searched for.
+    cuts : int, optional
+        Times that an increment which does not converge is halved, at most.
 
     Attributes
     ----------
@@ -95,13 +98,14 @@ class Press:
         workspace: Workspace | None = None,
         cancel: Event | None = None,
         report: Progress = QUIET,
+        cuts: int = CUTS,
     ) -> None:
         model, self.problem, self.formulation = problem.model, problem, formulation_of(problem.model)
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed, self._cancel, self._report = False, cancel, report
         self._is_exact = has_exact_path(model) and problem.contact_geometry is None
-        self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else _CUTS
+        self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else cuts
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None
         self._path: ExactPath | None = None

@@ -59,6 +59,9 @@ _LEAST_RUNS = 3
 _FALL = 1.5
 """Power of the number of increments with which an error falls, between that of kinks, 1, and of smooth paths, 2."""
 
+_CUTS = 1
+"""Times that an increment of a press which serves an estimate is halved, at most."""
+
 _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 6, 12
 """Counts if every increment factors the stiffness again: 6 and 12 increments cost nearly twice as much as 10."""
 
@@ -323,7 +326,10 @@ def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str,
 
 
 def last_step(problem: Problem, workspace: Workspace | None = None) -> StepResult:
-    """Solve all increments and return the result of the last; for the workspace see `march`.
+    """Solve all increments of a press that serves an estimate, and return the result of the last; see `march`.
+
+    Increments that do not converge are halved less often than those of a press itself, so that an estimate does not
+    take many times as long as the press that it is for.
 
     Raises
     ------
@@ -331,7 +337,7 @@ def last_step(problem: Problem, workspace: Workspace | None = None) -> StepResul
         If an increment does not converge.
     """
     result = None
-    for result in march(problem, workspace=workspace):
+    for result in march(problem, workspace=workspace, cuts=_CUTS):
         if not result.outcome.ok:
             raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
     if result is None:
