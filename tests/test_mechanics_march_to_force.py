@@ -49,8 +49,8 @@ def test_a_body_at_rest_is_expected_at_the_depth_of_small_strain() -> None:
     for forecast_mm in (0.05, 0.3, 1.5):
         move = Move(ObjectPose(0.0), ObjectPose(forecast_mm))
         # two increments by power laws, of which the second has the power between the two: an estimate
-        assert expected_depth(large, None, move, (0.0, force)) == pytest.approx(0.3, rel=0.1)
-        assert expected_depth(problem, None, move, (0.0, force)) == forecast_mm
+        assert expected_depth(large, None, move, (0.0, force), 1.0) == pytest.approx(0.3, rel=0.1)
+        assert expected_depth(problem, None, move, (0.0, force), 1.0) == forecast_mm
 
 
 def test_a_later_depth_is_that_of_the_power_law() -> None:
@@ -59,7 +59,7 @@ def test_a_later_depth_is_that_of_the_power_law() -> None:
     part = Substep(before, after, Move(last.parts[-2][0], pose))
     now = normal_force(problem, after)
     assert forces_on(problem, after) == pytest.approx([now, 0.0, 0.0], abs=1e-12)
-    assert expected_depth(problem, part, Move(pose, ObjectPose(0.3)), (now, 2.0 * now)) == pytest.approx(
+    assert expected_depth(problem, part, Move(pose, ObjectPose(0.3)), (now, 2.0 * now), 1.0) == pytest.approx(
         by_power_law((0.025, normal_force(problem, before)), (0.1, now), 2.0 * now), rel=1e-14
     )
 

@@ -92,6 +92,7 @@ class ForceCondition:
     rate : of the force by the depth, as far as it is known, N/mm
     reach : mm, least and largest distance by which the object may be lowered
     tolerance : relative error of the force that is sought
+    turned : (c, d) displacement of the points by forces that turn with the object's surface, per distance
     """
 
     down: Float
@@ -99,6 +100,7 @@ class ForceCondition:
     rate: float
     reach: tuple[float, float]
     tolerance: float
+    turned: Float | float = 0.0
 
 
 def solve_to_force(
@@ -114,10 +116,10 @@ def solve_to_force(
     lowered : mm, by how much the object is lowered
     rate : of the force by the depth, N/mm
     """
-    lowered, rate, last = 0.0, condition.rate, (0.0, 0.0)
+    lowered, rate, last, moved = 0.0, condition.rate, (0.0, 0.0), condition.down + condition.turned
     allowed = condition.tolerance * condition.force
     for number in range(_SOLUTIONS):
-        at_depth = replace(problem, free_motion=problem.free_motion + lowered * condition.down)
+        at_depth = replace(problem, free_motion=problem.free_motion + lowered * moved)
         solution = RULES[rule](at_depth, guess)
         if not solution.outcome.ok:
             break

@@ -39,6 +39,10 @@ _ROUND_OFF = 1e-13
 """Round-off of directions."""
 
 
+LEAST_SLOPE = 0.1
+"""Length of the mean of unit normals below which they oppose each other: the object is narrower than a hat."""
+
+
 def unit_normals(normal: Float) -> Float:
     """Return unit vectors (c, d) along mean normals (c, d) of an object, -y where these are zero.
 
@@ -46,6 +50,12 @@ def unit_normals(normal: Float) -> Float:
     """
     size = np.linalg.norm(normal, axis=1)[:, None]
     return np.where(size > 0.0, normal / np.where(size > 0.0, size, 1.0), -np.eye(normal.shape[1])[1])
+
+
+def turned_towards(mean: Float, own: Float, share: Float) -> Float:
+    """Return mean normals (c, d) of an object, turned by a share (c,) towards outward normals (c, d) of the body."""
+    size, own_size = (np.linalg.norm(normal, axis=1)[:, None] for normal in (mean, own))
+    return np.asarray((1.0 - share[:, None]) * mean - share[:, None] * size * own / own_size)
 
 
 def bases_of(normal: Float) -> Float:

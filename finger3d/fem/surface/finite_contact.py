@@ -1,4 +1,10 @@
-"""Contact of a deformed surface: gaps as means over the deformed area, and their derivatives."""
+"""Contact of a deformed surface: gaps as means over the deformed area, and their derivatives.
+
+With the mean gradient N of the distance over a point's hat, the gap of the point is the mean distance over the length
+of N, and its normal is ``N / |N|``: a force on the point is then the resultant of the pressures on its hat, also where
+the normals of the object differ there.  Derivatives of the gap leave out those of that length, whose effect is
+proportional to the gap.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +17,7 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.mesh.simplex import in_symmetry_planes
 from finger3d.fem.surface.traces import BoundarySurface, outward_normals
-from finger3d.fem.tensors import bases_of, block_diagonal, unit_normals
+from finger3d.fem.tensors import LEAST_SLOPE, bases_of, block_diagonal, turned_towards, unit_normals
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,7 @@ class DeformedContact:
     Attributes
     ----------
     gap : (c,) mm
+    slope : (c,) length of the mean of the object's unit normals
     bases : (c, d, d) directions of the points
     samples_gap, samples_normal : (q,) mm, (q, d) gap and unit normal at the samples
     follows_area : whether forces are pressures on the deformed area, which a rigid object exerts; beside an elastic one
@@ -99,6 +106,7 @@ class DeformedContact:
 
     face: BoundarySurface
     gap: Float
+    slope: Float
     bases: Float
     samples_gap: Float
     samples_normal: Float
@@ -110,6 +118,11 @@ class DeformedContact:
     def _mean_area(self) -> Float:
         return np.asarray(self.face.average @ self.area.ratio)
 
+    @cached_property
+    def _slope_area(self) -> Float:
+        """Sums (c,) over a hat are divided by these for a gap."""
+        return self.slope * self._mean_area
+
     def nodal_forces(self, force: Float) -> Float:
         """Return the nodal forces (n, d) of forces (c, d) at the points, along their directions."""
         face, area = self.face, self.area
@@ -117,11 +130,16 @@ class DeformedContact:
         tangential[:, 0] = force[:, 0] * (not self.follows_area)
         out: Float = face.trace.T @ np.einsum("ctk,ct->ck", self.bases, tangential)
         if self.follows_area:
-            per_area = force[:, 0] / self._mean_area
+            per_area = force[:, 0] / self._slope_area
             pressure = face.average.T @ per_area
             out += face.interpolate.T @ ((pressure * area.ratio)[:, None] * self.samples_normal)
-            out += area.transposed(self.samples_gap * pressure - face.average.T @ (per_area * self.gap))
+            out += area.transposed(self._uneven(per_area))
         return out
+
+    def _uneven(self, per_area: Float) -> Float:
+        """Return the weights (q,) of the area's derivatives under forces per area (c,) at the points."""
+        average = self.face.average
+        return np.asarray(self.samples_gap * (average.T @ per_area) - average.T @ (per_area * self.slope * self.gap))
 
     @cached_property
     def rows(self) -> sp.csr_matrix:
@@ -132,14 +150,14 @@ class DeformedContact:
             bases[:, 0] = 0.0
         rows = block_diagonal(bases) @ face.vector_trace
         if self.follows_area:
-            rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ self._d_mean_gap
+            rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ self._d_point_gap
         return sp.csr_matrix(rows)
 
     @cached_property
-    def _d_mean_gap(self) -> sp.csr_matrix:
-        """Derivative (c, n d) of the gap."""
-        weight = sp.diags_array(1.0 / self._mean_area) @ self.face.average
-        deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.gap) @ weight
+    def _d_point_gap(self) -> sp.csr_matrix:
+        """Derivative (c, n d) of the gap of the points."""
+        weight = sp.diags_array(1.0 / self._slope_area) @ self.face.average
+        deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.slope * self.gap) @ weight
         return sp.csr_matrix(weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative)
 
     def gap_rows(self, moved: Float) -> sp.csr_matrix:
@@ -152,7 +170,7 @@ class DeformedContact:
         mean = sp.kron(sp.diags_array(1.0 / self._mean_area) @ face.average, sp.eye_array(d))
         turned = block_diagonal(self.area.normal_slopes / self.area.initial[:, None, None]) @ face.vector_slopes
         widened = np.einsum("ck,ckl->cl", moved, self.turns)
-        return sp.csr_matrix(self._d_mean_gap + block_diagonal(widened[:, None, :]) @ (mean @ turned))
+        return sp.csr_matrix(self._d_point_gap + block_diagonal(widened[:, None, :]) @ (mean @ turned))
 
     @cached_property
     def _d_gap(self) -> sp.csr_matrix:
@@ -172,12 +190,12 @@ class DeformedContact:
         """
         face = self.face
         spread = self.area.derivative
-        per_area = sp.diags_array(force / self._mean_area)
-        pressure = sp.diags_array(face.average.T @ per_area.diagonal())
+        per_area = force / self._slope_area
+        pressure = sp.diags_array(face.average.T @ per_area)
         normal = self.rows[:: self.bases.shape[1]]
-        half = self._d_gap.T @ pressure @ spread - normal.T @ per_area @ face.average @ spread
-        uneven = self.samples_gap * pressure.diagonal() - face.average.T @ (per_area @ self.gap)
-        total = half + half.T + self.area.second_derivative(uneven)
+        per_mean = sp.diags_array(force / self._mean_area)
+        half = self._d_gap.T @ pressure @ spread - normal.T @ per_mean @ face.average @ spread
+        total = half + half.T + self.area.second_derivative(self._uneven(per_area))
         if curvature is not None:
             weighted = (pressure.diagonal() * self.area.ratio)[:, None, None] * curvature
             total = total + face.vector_interpolate.T @ block_diagonal(weighted) @ face.vector_interpolate
@@ -212,20 +230,20 @@ def deformed_contact(
     """
     area = _Area.of(face, points, displacement)
     total = (face.average @ area.ratio)[:, None]
-    mean_normal = (face.average @ (normal * area.ratio[:, None])) / total
-    turns = np.zeros((*mean_normal.shape, mean_normal.shape[1]))
+    mean = in_symmetry_planes((face.average @ (normal * area.ratio[:, None])) / total, face.points, axes)
+    slope = np.linalg.norm(mean, axis=1)
+    turns = np.zeros((*mean.shape, mean.shape[1]))
     if object_share is not None:
-        body_normal = (face.average @ (outward_normals(area.moved) * area.ratio[:, None])) / total
-        size = np.linalg.norm(body_normal, axis=1)[:, None]
-        body_normal, ratio = body_normal / size, np.linalg.norm(mean_normal, axis=1)[:, None] / size
-        turns = -(object_share[:, None] * ratio)[:, :, None] * _across(body_normal)
-        mean_normal = (1.0 - object_share[:, None]) * mean_normal - object_share[:, None] * ratio * size * body_normal
-    mean_normal = in_symmetry_planes(mean_normal, face.points, axes)
-    bases = bases_of(unit_normals(mean_normal))
+        own = in_symmetry_planes((face.average @ (outward_normals(area.moved) * area.ratio[:, None])) / total, face.points, axes)
+        size = np.linalg.norm(own, axis=1)
+        turns = -(object_share * slope / size)[:, None, None] * _across(own / size[:, None])
+        mean = turned_towards(mean, own, object_share)
+    bases = bases_of(unit_normals(mean))
     if object_share is not None:
-        turns = _across(bases[:, 0]) @ turns / np.linalg.norm(mean_normal, axis=1)[:, None, None]
-    mean_gap = (face.average @ (gap * area.ratio)) / total[:, 0]
-    return DeformedContact(face, mean_gap, bases, gap, normal, area, object_share is None, turns)
+        turns = _across(bases[:, 0]) @ turns / np.linalg.norm(mean, axis=1)[:, None, None]
+    slope = np.maximum(slope, LEAST_SLOPE)
+    point_gap = (face.average @ (gap * area.ratio)) / total[:, 0] / slope
+    return DeformedContact(face, point_gap, slope, bases, gap, normal, area, object_share is None, turns)
 
 
 def _across(unit: Float) -> Float:

@@ -20,16 +20,13 @@ from numpy.typing import NDArray
 from finger3d._types import Float, freeze_arrays
 from finger3d.fem.mesh.simplex import CONTACT, in_symmetry_planes
 from finger3d.fem.surface.traces import BoundarySurface
-from finger3d.fem.tensors import bases_of, unit_normals
+from finger3d.fem.tensors import LEAST_SLOPE, bases_of, turned_towards, unit_normals
 from finger3d.objects import vertical_frame
 
 Distance = Callable[[Float], tuple[Float, Float]]
 
 _FACING = -0.1
 """Product of the normals of object and finger below which the two surfaces face each other."""
-
-_LEAST_SLOPE = 0.1
-"""Length of the mean of unit normals below which they oppose each other: the object is narrower than a hat."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +57,7 @@ class ContactGeometry:
     @property
     def gap(self) -> Float:
         """Gaps (c,) mm, negative for penetration."""
-        out: Float = self.distance / np.maximum(self.slope, _LEAST_SLOPE)
+        out: Float = self.distance / np.maximum(self.slope, LEAST_SLOPE)
         out += np.einsum("ck,ck->c", self.bases[:, 0], self.offset)
         return out
 
@@ -141,9 +138,7 @@ def geometry_of_means(
     mean = in_symmetry_planes(means[:, 1 : 1 + d], surface.points, axes)
     length = np.linalg.norm(mean, axis=1)
     if object_share is not None:
-        normals = in_symmetry_planes(surface.normals, surface.points, axes)
-        normals *= (object_share * length / np.linalg.norm(normals, axis=1))[:, None]
-        mean = (1.0 - object_share[:, None]) * mean - normals
+        mean = turned_towards(mean, in_symmetry_planes(surface.normals, surface.points, axes), object_share)
     normal = unit_normals(mean)
     offset = np.zeros_like(normal) if displacement is None else displacement - means[:, 1 + d :]
     return ContactGeometry(means[:, 0], length, offset, bases_of(normal))

@@ -228,11 +228,15 @@ class IncrementEquations:
         """
         problem, pattern, tangent = self.problem, self.body.contact_rows, self.body.tangent(now.x)
         active = problem.system.active_dofs
-        rows, reads = now.contact.rows[active], np.arange(len(active))
+        rows, reads, turning = now.contact.rows[active], np.arange(len(active)), None
         if problem.system.object_compliance is None:
             u = displacement(problem.mesh, now.x)
             curvature = curvature_of(problem, problem.surface, u, self.move.end, local)
-            tangent = tangent.less(now.contact.geometric_stiffness(force[:, 0], curvature))
+            geometric = now.contact.geometric_stiffness(force[:, 0], curvature)
+            tangent = tangent.less(geometric)
+            if curvature is not None:  # the object is lowered as the body rises
+                rises = np.broadcast_to(np.eye(problem.dim)[1], u.shape).ravel()
+                turning = np.append(geometric @ rises, np.zeros(len(now.x) - u.size))
         else:  # the gap is not read along the rows of the forces, since its normal turns
             normals = np.flatnonzero(active % problem.dim == 0)
             moved = self.displacement_of_object(now.contact.bases, force)
@@ -248,18 +252,24 @@ class IncrementEquations:
         condensed = condense(tangent, problem.body.fixed_dofs, rows, replaced=replaced)
         self.workspace.factorizations += condensed.factorizations
         delassus = scatter_to_points(condensed.compliance[reads], active, *force.shape)
-        linearisation = Linearisation(condensed, reads, now.contact.bases, delassus, reusable=not damping)
+        linearisation = Linearisation(condensed, reads, now.contact.bases, delassus, turning, not damping)
         self.workspace.linearisations[self._has_inclusions] = linearisation
         return linearisation
 
     def contact(
-        self, now: Configuration, force: Float, linearisation: Linearisation, displacement: Float
+        self,
+        now: Configuration,
+        force: Float,
+        linearisation: Linearisation,
+        displacement: Float,
+        turned: Float | None = None,
     ) -> tuple[Self, ContactSolution[ContactState], Float]:
         """Solve contact of the linearised body.
 
         Parameters
         ----------
         displacement : (r,) mm, of the rows that are read, under the forces out of balance alone
+        turned : (r,) of these rows, as the forces turn with the object, per distance that it is lowered
 
         Returns
         -------
@@ -273,10 +283,13 @@ class IncrementEquations:
         compliance = problem.system.object_compliance
         if compliance is not None:
             delassus = delassus + rotated_delassus(compliance, bases @ vertical_frame(problem.dim).T)
-        moved = np.zeros(force.size)
-        moved[active] = displacement
-        free_displacement = self.relative_displacement(now, force)
-        free_displacement += self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
+
+        def at_points(read: Float) -> Float:
+            moved = np.zeros(force.size)
+            moved[active] = read
+            return self.active(np.einsum("cij,cj->ci", rotation, moved.reshape(force.shape)).ravel())
+
+        free_displacement = self.relative_displacement(now, force) + at_points(displacement)
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
         contact = ContactProblem.of(
@@ -288,12 +301,12 @@ class IncrementEquations:
             self._augmentation,
             problem.surface.area,
         )
-        increment, solution = self._solved(now, force, contact)
+        increment, solution = self._solved(now, force, contact, 0.0 if turned is None else at_points(turned))
         change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
         return increment, solution, change.ravel()[active]
 
     def _solved(
-        self, now: Configuration, force: Float, contact: ContactProblem
+        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float | float
     ) -> tuple[Self, ContactSolution[ContactState]]:
         """Return the contact solution from a guess of the forces (c, d), N, and the increment that it is for."""
         return self, RULES[self.problem.model.rule](contact, force)

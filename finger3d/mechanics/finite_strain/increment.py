@@ -205,6 +205,10 @@ class FiniteIncrement(IncrementEquations):
     def _error(self, now: Configuration, state: ContactState) -> float:
         return self.residual(now, state, self.out_of_balance(now, state.force))
 
+    def _turning(self, linearisation: Linearisation) -> Sequence[Float]:
+        """Return loads (N,) N/mm by which nodal contact forces change with the depth, if that is unknown."""
+        return ()
+
     def _advance(
         self, now: Configuration, force: Float, linearisation: Linearisation, longest: float = math.inf
     ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
@@ -212,10 +216,13 @@ class FiniteIncrement(IncrementEquations):
 
         There is none if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
         """
-        eliminated = linearisation.condensation.eliminated(-self.out_of_balance(now, force))
-        read = eliminated.displacement[linearisation.reads]
-        increment, solution, change = self.contact(now, force, linearisation, read)
-        step = eliminated.unknowns(change)
+        loads = [-self.out_of_balance(now, force), *self._turning(linearisation)]
+        eliminated = linearisation.condensation.eliminated(np.column_stack(loads))
+        increment, solution, change = self.contact(
+            now, force, linearisation, *eliminated.displacement[linearisation.reads].T
+        )
+        by = [1.0, increment.move.end.depth_mm - self.move.end.depth_mm][: len(loads)]
+        step = eliminated.unknowns(np.outer(change, np.eye(len(loads))[0])) @ by
         length = float(np.abs(step[: self.problem.mesh.points.size]).max())
         if not solution.outcome.ok or not np.isfinite(step).all() or length > longest:
             return solution, None
@@ -278,8 +285,11 @@ class IncrementToForce(FiniteIncrement):
         state = replace(self.start.contact, force=force, bases=now.contact.bases)
         return -float(self.problem.world_force(state)[:, 1].sum())
 
+    def _turning(self, linearisation: Linearisation) -> Sequence[Float]:
+        return () if linearisation.turning is None else (linearisation.turning,)
+
     def _solved(
-        self, now: Configuration, force: Float, contact: ContactProblem
+        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float | float
     ) -> tuple[Self, ContactSolution[ContactState]]:
         """Lower the object until the linearised body has the force."""
         depth, images = self.move.end.depth_mm, 2.0 ** len(self.problem.axes)
@@ -289,6 +299,7 @@ class IncrementToForce(FiniteIncrement):
             rate=self.rate / images,
             reach=(self.depths[0] - depth, self.depths[1] - depth),
             tolerance=_EXACT,
+            turned=turned,
         )
         solution, lowered, rate = solve_to_force(self.problem.model.rule, contact, force, condition)
         if not solution.outcome.ok:

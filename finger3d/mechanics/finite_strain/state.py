@@ -58,6 +58,7 @@ class Linearisation:
     reads : (r,) numbers of the rows that tell the displacement along each force
     bases : (c, d, d) directions of the contact points
     delassus : (c, d, c, d) mm/N, in these directions; symmetric beside a rigid object
+    turning : (N,) N/mm, change of the nodal contact forces as a curved object is lowered; None beside a flat one
     reusable : whether an increment may begin with it; otherwise only its sparsity pattern serves
     """
 
@@ -65,6 +66,7 @@ class Linearisation:
     reads: Int
     bases: Float
     delassus: Float
+    turning: Float | None = None
     reusable: bool = True
 
     def rotation(self, bases: Float) -> Float:

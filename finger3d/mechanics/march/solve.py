@@ -261,7 +261,7 @@ class Press:
         """Advance to the depth where the normal force is the prescribed one."""
         problem, (now, wanted) = self.problem, (float(forces[0]) for forces in self._wanted(load))
         way = ToForceAtFiniteStrain if problem.model.finite_strain else ToForce
-        depth = expected_depth(problem, self._last_part, move, (now, wanted))
+        depth = expected_depth(problem, self._last_part, move, (now, wanted), self._deepest)
         return way(self, move, (now, wanted), self._deepest, self._report).run(depth)
 
     def _to_forces(self, move: Move, load: Load) -> Advanced:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
@@ -206,7 +206,9 @@ class ToForceAtFiniteStrain(ToForce):
         return self._to_force(start, last.move, last.after.contact.force, before)
 
 
-def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: tuple[float, float]) -> float:
+def expected_depth(
+    problem: Problem, last: Substep | None, move: Move, forces: tuple[float, float], deepest: float
+) -> float:
     """Return the depth (mm) expected at a normal force: that of small strain where a body at finite strain begins it.
 
     Parameters
@@ -214,31 +216,40 @@ def expected_depth(problem: Problem, last: Substep | None, move: Move, forces: t
     last : part of the increment before, if there is one
     move : to the depth of the leg's forecast
     forces : before and at the end, N
+    deepest : largest depth, mm
     """
     force, wanted = forces
     if force <= 0.0 and problem.model.finite_strain:
-        return _at_small_strain(problem, move.end, wanted)
+        return _at_small_strain(problem, move.end, wanted, deepest)
     if last is None:
         return move.end.depth_mm
     before = last.move.start.depth_mm, normal_force(problem, last.before)
     return by_power_law(before, (move.start.depth_mm, force), wanted)
 
 
-def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float) -> float:
+def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float, deepest: float) -> float:
     """Return a depth (mm) near that of a normal force (N) in small strain, from increments to the pose and onwards.
 
-    The first one is frictionless, so that it is solved soon even where the pose is far too deep.
+    All but the last are frictionless, so that they are solved soon even where the pose is far too deep.  The depth is
+    doubled until the object touches.
     """
-    small, depth, known = SmallStrain(), pose.depth_mm, (0.0, 0.0)
+    small, depth = SmallStrain(), pose.depth_mm
     workspace, rest = small.workspace(), small.start(problem)
-    for friction in (Coulomb(0.0), problem.model.friction):
+
+    def force_at(depth_mm: float, friction: FrictionLaw) -> float:
         like = replace(problem, model=replace(problem.model, friction=friction))
-        found = small.increment(like, rest, Move(problem.origin, replace(pose, depth_mm=depth)), None, workspace)
-        now = depth, normal_force(problem, found.state)
-        if not found.outcome.ok or now[1] <= 0.0:
-            break
-        depth, known = by_power_law(known, now, wanted), now
-    return depth
+        found = small.increment(like, rest, Move(problem.origin, replace(pose, depth_mm=depth_mm)), None, workspace)
+        return normal_force(problem, found.state) if found.outcome.ok else math.nan
+
+    free = force_at(depth, Coulomb(0.0))
+    while free <= 0.0 and 2.0 * depth < deepest:
+        depth *= 2.0
+        free = force_at(depth, Coulomb(0.0))
+    if not free > 0.0:
+        return depth
+    other = by_power_law((0.0, 0.0), (depth, free), wanted)
+    rubbed = force_at(other, problem.model.friction)
+    return by_power_law((depth, free), (other, rubbed), wanted) if rubbed > 0.0 else other
 
 
 def by_power_law(before: tuple[float, float], now: tuple[float, float], wanted: float) -> float:
