@@ -77,34 +77,47 @@ def test_nodal_forces_are_those_of_the_transposed_rows(d: int) -> None:
     assert at.nodal_forces(force).ravel() == pytest.approx(at.rows.T @ force.ravel(), rel=1e-12, abs=1e-13)
 
 
+def under_ball(
+    mesh: Mesh, face: BoundarySurface, u: np.ndarray, radius: float, share: float | None = None
+) -> DeformedContact:
+    """With a ball, whose normals turn along the face."""
+    away = face.samples + face.interpolate @ u - np.array([0.4, 1.0 + radius, 0.6])[: mesh.dim]
+    distance = np.linalg.norm(away, axis=1)
+    return deformed_contact(
+        face,
+        points=mesh.points,
+        displacement=u,
+        gap=distance - radius,
+        normal=away / distance[:, None],
+        axes=(),
+        object_share=None if share is None else np.full(len(face.nodes), share),
+    )
+
+
 @pytest.mark.parametrize("d", [2, 3])
 def test_curvature_of_the_object_is_part_of_the_derivative(d: int) -> None:
     mesh, face, u = made(d)
-    centre, radius = np.array([0.4, 3.0, 0.6])[:d], 2.0
-    random = np.random.default_rng(8)
+    radius, random = 2.0, np.random.default_rng(8)
     way, force = random.normal(size=u.shape), random.uniform(0.0, 2.0, len(face.nodes))
-
-    def ball(u: np.ndarray) -> DeformedContact:
-        away = face.samples + face.interpolate @ u - centre
-        distance = np.linalg.norm(away, axis=1)
-        return deformed_contact(
-            face,
-            points=mesh.points,
-            displacement=u,
-            gap=distance - radius,
-            normal=away / distance[:, None],
-            axes=(),
-        )
-
-    here, h = ball(u), 1e-6
+    here, h = under_ball(mesh, face, u, radius), 1e-6
     distance = here.samples_gap + radius
     normal = here.samples_normal
     curvature = (np.eye(d) - normal[:, :, None] * normal[:, None, :]) / distance[:, None, None]
-    there = [ball(u + s * h * way) for s in (1.0, -1.0)]
+    there = [under_ball(mesh, face, u + s * h * way, radius) for s in (1.0, -1.0)]
     ends = [end.rows[::d].T @ (force * end.slope / here.slope) for end in there]  # at a constant mean slope
     slope = (ends[0] - ends[1]) / (2 * h)
     second = here.geometric_stiffness(force, curvature)
     assert second @ way.ravel() == pytest.approx(slope, rel=1e-6, abs=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("share", [None, 0.4])
+@pytest.mark.parametrize("d", [2, 3])
+def test_nodal_forces_add_up_to_those_of_the_points_on_a_ball_smaller_than_a_hat(d: int, share: float | None) -> None:
+    mesh, face, u = made(d)
+    at, force = under_ball(mesh, face, u, 0.2, share), np.random.default_rng(9).normal(size=(len(face.nodes), d))
+    assert at.slope.min() < 0.9
+    total = np.einsum("ca,cak->k", force, at.bases)
+    assert at.nodal_forces(force).sum(axis=0) == pytest.approx(total, rel=1e-12)
 
 
 def test_at_rest_rows_are_the_weighted_means() -> None:

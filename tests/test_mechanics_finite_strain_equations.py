@@ -20,7 +20,7 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
 from finger3d.mechanics.results.state import State
-from finger3d.objects import Move
+from finger3d.objects import Cylinder, Move
 from tests.models import half_cylinder
 
 
@@ -93,6 +93,24 @@ def test_beside_an_elastic_object_the_tangent_contains_the_turn_of_the_common_no
         left.append(np.abs(away + eliminated.unknowns(change))[:nodes].max() / np.abs(away).max())
     assert left[0] < 0.05
     assert left[1] > 0.2
+
+
+def test_nodal_forces_turn_with_a_curved_object_as_it_is_lowered() -> None:
+    """The change is that of a body which rises, and the object's normals differ from sample to sample."""
+    increment, state = solved_increment(replace(half_cylinder(1.0), object=Cylinder(radius_mm=6.0)))
+    force, x = state.contact.force.copy(), state.body.unknowns
+    force[:, 1:] = 0.0  # directions of friction do not turn in the tangent
+    turning, h = increment.linearise(increment.at(x), force, local=True).turning, 1e-4
+    assert turning is not None
+    ends, (start, end) = [], (increment.move.start, increment.move.end)
+    for sign in (1.0, -1.0):
+        lower = replace(increment, move=Move(start, replace(end, depth_mm=end.depth_mm + sign * h)))
+        there = lower.at(x).contact
+        ends.append(there.nodal_forces(force * (there.slope / increment.at(x).contact.slope)[:, None]))
+    slope = (ends[0] - ends[1]).ravel() / (2.0 * h)
+    assert np.abs(slope).max() > 0.01 * np.abs(force).max() / 6.0
+    assert turning[: slope.size] == pytest.approx(slope, rel=1e-4, abs=1e-4 * np.abs(slope).max())
+    assert (turning[slope.size :] == 0.0).all()
 
 
 def test_a_step_that_passes_the_least_energy_by_far_is_halved(

@@ -23,8 +23,8 @@ from finger3d.mechanics.formulations import formulation_of, increment_to_force
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import MeshObject, Move, ObjectPose
-from tests.models import large_fig9, run
+from finger3d.objects import MeshObject, Move, ObjectPose, Plane, Sphere
+from tests.models import block, large_fig9, run
 
 
 @pytest.mark.parametrize("nu", [0.45, 0.5])
@@ -169,3 +169,29 @@ def test_a_faceted_object_without_friction_takes_few_factorisations() -> None:
     problem, workspace = build(Effect().apply(model)), formulation_of(Effect().apply(model)).workspace()
     assert all(step.outcome.ok for step in march(problem, workspace=workspace))
     assert workspace.factorizations <= 3 * 8  # 14 today, 122 with the smooth curvature alone
+
+
+def test_without_contact_round_off_is_no_residual() -> None:
+    """An incompressible block is pressed by 4e-3 of an edge of its mesh, and the object taken away."""
+    small, edge = 0.003, block().mesh.size_mm
+    assert small < 0.01 * edge
+    legs = (Leg(small, steps=2), Leg(-small, steps=3))
+    model = Effect().apply(block(object=Plane(), material=Isotropic(1.0, 0.5), domain="plane-strain", legs=legs))
+    problem, workspace = build(model), formulation_of(model).workspace()
+    frames = list(march(problem, workspace=workspace))
+    assert all(step.outcome.ok for step in frames)
+    assert not frames[-1].state.force.any()
+    assert workspace.factorizations <= 3  # 1 today; hundreds, and no end, if round-off has to fall
+
+
+def test_the_normal_force_is_the_reaction_of_the_base_under_an_object_sharper_than_the_mesh() -> None:
+    sharp = Sphere(radius_mm=1.5)  # edges of the mesh have 0.8 mm
+    problem, frames = run(Effect().apply(block(object=sharp, legs=(Leg(0.6, steps=2),))))
+    assert all(step.outcome.ok for step in frames)
+    state, formulation = frames[-1].meshed_state, formulation_of(problem.model)
+    assert isinstance(formulation, FiniteStrain)
+    internal = formulation.body(problem).internal_forces(state.body.unknowns)
+    base = problem.body.fixed_dofs[problem.body.fixed_dofs % 3 == 1]
+    down = internal[base].sum() * 2 ** len(problem.axes)
+    force = measure(problem.points, frames[-1])["normal_force_N"]
+    assert down == pytest.approx(force, rel=1e-7)  # residuals of 5e-9

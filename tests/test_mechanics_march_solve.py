@@ -12,13 +12,14 @@ import scipy.sparse as sp
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.errors import Outcome
+from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import Station, stations, targets
 from finger3d.mechanics.march.solve import Press, march
+from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Move, ObjectPose, Plane
@@ -124,6 +125,9 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
     monkeypatch.setitem(RULES, "projection", timid)
     (cut,) = march(problem)
+    timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
+    with pytest.raises(Finger3dError, match="did not converge"):
+        last_step(problem)  # which halves increments once, for an estimate
     monkeypatch.undo()
     four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))
     assert cut.method == "cut back"
