@@ -54,11 +54,11 @@ def scenes(sections: int, solids: int, seed: int, longer: float = 1.5) -> Iterat
 def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool, longer: float) -> Tree:
     """Return the tables of one scene; edges far from contact are four times as long as by default, or longer."""
     high, half, wide = HEIGHTS[finger], HALVES[finger], WIDTHS[finger]
-    depth = high * _between(random, 0.005, 0.08 if solid else 0.3)
-    legs: list[Tree] = [{"depth_mm": depth, "duration_s": _between(random, 0.01, 50.0), "steps": 4}]
+    depth = high * log_uniform(random, 0.005, 0.08 if solid else 0.3)
+    legs: list[Tree] = [{"depth_mm": depth, "duration_s": log_uniform(random, 0.01, 50.0), "steps": 4}]
     if random.random() < 0.25:
         slide = depth * random.uniform(0.05, 0.5)
-        legs.append({"depth_mm": depth, "slide_x_mm": slide, "duration_s": _between(random, 0.01, 50.0), "steps": 2})
+        legs.append({"depth_mm": depth, "slide_x_mm": slide, "duration_s": log_uniform(random, 0.01, 50.0), "steps": 2})
     angle = random.uniform(0.0, 90.0)
     gauges = [
         {"name": name, "x_mm": x * half, "y_mm": y * high, "angle_deg": angle, "length_mm": 0.1 * high}
@@ -67,12 +67,12 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool, lo
     if solid:  # a gauge that keeps the symmetry, and with it half of the mesh
         gauges = [{**gauges[1], "angle_deg": 0.0}]
     domain: Any = "solid" if solid else ("plane-strain", "plane-stress")[int(random.integers(2))]
-    elastic = {"E_MPa": _between(random, 1.0, 1e5), "nu": random.uniform(0.2, 0.45)}
+    elastic = {"E_MPa": log_uniform(random, 1.0, 1e5), "nu": random.uniform(0.2, 0.45)}
     tables: Tree = {
         "finger": {**FINGERS[finger], "width_mm": wide},
         "material": {"E_MPa": 1.0, "nu": (random.uniform(0.3, 0.47), 0.49)[int(random.integers(2))]},
-        "object": _object(random, shape, high, depth),
-        "friction": {"mu": _between(random, 0.05, 1.2)},
+        "object": objects(random, high, depth)[shape],
+        "friction": {"mu": log_uniform(random, 0.05, 1.2)},
         "press": {"leg": legs},
         "model": {"domain": domain},
         "gauge": gauges,
@@ -80,10 +80,10 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool, lo
         "effects": {
             "auto": True,
             "kinetic_friction": {"ratio": 1.0 - 0.7 * random.random() ** 2},
-            "viscosity": {"prony": [[_between(random, 0.02, 0.5), 0.5]]},
+            "viscosity": {"prony": [[log_uniform(random, 0.02, 0.5), 0.5]]},
             "elastic_object": elastic,
             "embedded_gauge": {
-                "E_MPa": _between(random, 1.0, 1e4), "thickness_mm": 4e-4 * high, "width_mm": 0.06 * high,
+                "E_MPa": log_uniform(random, 1.0, 1e4), "thickness_mm": 4e-4 * high, "width_mm": 0.06 * high,
             },
         },
     }  # fmt: skip
@@ -96,10 +96,10 @@ def _drawn(random: np.random.Generator, finger: int, shape: int, solid: bool, lo
     return tables | {"mesh": {"size_mm": longer * own.size_mm, "base_size_mm": 4.0 * own.base_size_mm}}
 
 
-def _object(random: np.random.Generator, shape: int, high: float, depth: float) -> Tree:
-    """Return the table of an object about as large as the finger; a cylinder or ball is pressed in up to its middle."""
-    round_mm = max(high * _between(random, 0.5, 4.0), 1.2 * depth)
-    tables: tuple[Tree, ...] = (
+def objects(random: np.random.Generator, high: float, depth: float) -> tuple[Tree, ...]:
+    """Return tables of objects about as large as a finger; a cylinder or ball is pressed in up to its middle."""
+    round_mm = max(high * log_uniform(random, 0.5, 4.0), 1.2 * depth)
+    return (
         {"shape": "plane"},
         {"shape": "cylinder", "radius_mm": round_mm},
         {"shape": "plane", "tilt_deg": random.uniform(1.0, 10.0)},
@@ -108,9 +108,8 @@ def _object(random: np.random.Generator, shape: int, high: float, depth: float) 
         {"shape": "wave", "wavelength_mm": high * random.uniform(0.3, 1.0), "amplitude_mm": 0.02 * high},
         {"shape": "mesh", "path": str(COIN), "scale": high / 12.0},
     )
-    return tables[shape]
 
 
-def _between(random: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     """Return a number between both, its logarithm evenly distributed."""
     return float(low * (high / low) ** random.random())

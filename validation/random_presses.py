@@ -34,6 +34,7 @@ from finger3d._types import Tree
 from finger3d.errors import Finger3dError
 from finger3d.scene import parse
 
+from ._effect_scenes import COIN, log_uniform, objects
 from ._rows import Result, Row
 
 SCENES, SCENES_QUICK = 60, 2
@@ -45,7 +46,9 @@ RESIDUAL, FORCE, DEEP = 1e-8, 1e-6, 0.02
 inside the object, over that of the press, above which it is told."""
 
 GOAL = "goal of this project"
-COIN = Path(__file__).resolve().parent.parent / "geometries" / "coin.stl"
+
+_EXITS = {0: "converged", 2: "refused", 3: "ended"}
+_MARKERS = {"converged": "o", "ended": "s", "refused": "^", "not ended": "x"}
 
 _TRIES = 20
 """Draws of a scene until one is not refused."""
@@ -94,9 +97,9 @@ def _drawn(random: np.random.Generator) -> Tree:
     domain = str(random.choice(["plane-strain", "plane-stress", "solid"], p=[0.4, 0.25, 0.35]))
     solid, large = domain == "solid", bool(random.random() < 0.35)
     finger, high, half, wide = _finger(random, solid)
-    depth = high * float(_between(random, 0.01, 0.4 if large else 0.25))
+    depth = high * float(log_uniform(random, 0.01, 0.4 if large else 0.25))
     edge = high / (6.0 if solid else 12.0) * random.uniform(0.7, 1.5)
-    stiff = _between(random, 0.05, 5.0)
+    stiff = log_uniform(random, 0.05, 5.0)
     has_parts = finger["geometry"] == "fingertip"
     tables: Tree = {
         "finger": finger,
@@ -117,7 +120,8 @@ def _drawn(random: np.random.Generator) -> Tree:
     elif random.random() < 0.7:
         tables["mesh"]["mesher"] = "swept"
     if random.random() < 0.9:
-        tables["friction"] = {"mu": float(random.choice([_between(random, 0.05, 1.2), 2.0, 10.0], p=[0.8, 0.1, 0.1]))}
+        mu = random.choice([log_uniform(random, 0.05, 1.2), 2.0, 10.0], p=[0.8, 0.1, 0.1])
+        tables["friction"] = {"mu": float(mu)}
     if random.random() < 0.08:
         tables["contact"] = {"rule": "paper"}
     return tables
@@ -125,7 +129,7 @@ def _drawn(random: np.random.Generator) -> Tree:
 
 def _finger(random: np.random.Generator, solid: bool) -> tuple[Tree, float, float, float]:
     """Return the table of a finger, its height, half its length and its width, mm."""
-    size, wide = _between(random, 3.0, 15.0), _between(random, 3.0, 15.0)
+    size, wide = log_uniform(random, 3.0, 15.0), log_uniform(random, 3.0, 15.0)
     kinds = ["block", "half_cylinder", "clipped_cylinder", "clipped_cylinder", "fingertip"]
     match random.choice([*kinds, "hemisphere"] if solid else kinds):
         case "block":
@@ -150,18 +154,10 @@ def _finger(random: np.random.Generator, solid: bool) -> tuple[Tree, float, floa
 
 def _object(random: np.random.Generator, high: float, depth: float, solid: bool) -> Tree:
     """Return the table of an object about as large as the finger; half of them are beside its middle, or turned."""
-    round_mm = max(high * _between(random, 0.3, 4.0), 1.2 * depth)
-    axis = str(random.choice(["z", "x"])) if solid else "z"
-    tables: tuple[Tree, ...] = (
-        {"shape": "plane"},
-        {"shape": "plane", "tilt_deg": random.uniform(-10.0, 10.0)},
-        {"shape": "cylinder", "radius_mm": round_mm, "axis": axis},
-        {"shape": "sphere", "radius_mm": round_mm},
-        {"shape": "wedge", "angle_deg": random.uniform(10.0, 40.0), "tip_radius_mm": high * 0.15, "axis": axis},
-        {"shape": "wave", "wavelength_mm": high * random.uniform(0.4, 1.5), "amplitude_mm": 0.03 * high, "axis": axis},
-        {"shape": "mesh", "path": str(COIN), "scale": high / 12.0},
-    )
+    tables = objects(random, high, depth)
     table = tables[int(random.integers(len(tables)))]
+    if solid and table["shape"] in ("cylinder", "wedge", "wave") and random.random() < 0.5:
+        table = table | {"axis": "x"}
     if random.random() < 0.5:
         table = table | {"x_mm": random.uniform(-0.2, 0.2) * high}
         if solid:
@@ -175,11 +171,11 @@ def _object(random: np.random.Generator, high: float, depth: float, solid: bool)
 
 def _legs(random: np.random.Generator, solid: bool, depth: float, stiffness: float) -> list[Tree]:
     """Press to a depth or a force; often slide, drag, turn, and release half or all of it."""
-    force = stiffness * _between(random, 0.005, 0.2)
+    force = stiffness * log_uniform(random, 0.005, 0.2)
     here: Tree = {"depth_mm": depth} if random.random() < 0.65 else {"force_N": force}
     steps = "auto" if random.random() < 0.15 else int(random.integers(1, 11))
-    after: Tree = {"steps": int(random.integers(1, 7)), "duration_s": _between(random, 0.01, 50.0)}
-    legs, place = [{**here, "steps": steps, "duration_s": _between(random, 0.01, 50.0)}], dict[str, Any]()
+    after: Tree = {"steps": int(random.integers(1, 7)), "duration_s": log_uniform(random, 0.01, 50.0)}
+    legs, place = [{**here, "steps": steps, "duration_s": log_uniform(random, 0.01, 50.0)}], dict[str, Any]()
     if random.random() < 0.3:
         place = {"slide_x_mm": random.uniform(-0.5, 0.5) * depth}
         if solid:
@@ -214,20 +210,15 @@ def _effects(random: np.random.Generator, large: bool, solid: bool, high: float)
         tables["kinetic_friction"] = {"ratio": random.uniform(0.4, 1.0)}
     if random.random() < 0.15:
         tables["viscosity"] = {
-            "prony": [[random.uniform(0.05, 0.6), _between(random, 0.05, 5.0)]], "bulk": bool(random.random() < 0.5),
+            "prony": [[random.uniform(0.05, 0.6), log_uniform(random, 0.05, 5.0)]], "bulk": bool(random.random() < 0.5),
         }  # fmt: skip
     if random.random() < 0.15:
-        tables["elastic_object"] = {"E_MPa": _between(random, 0.2, 100.0), "nu": random.uniform(0.2, 0.49)}
+        tables["elastic_object"] = {"E_MPa": log_uniform(random, 0.2, 100.0), "nu": random.uniform(0.2, 0.49)}
     if random.random() < 0.12:
         tables["embedded_gauge"] = {"E_MPa": 3000.0, "thickness_mm": 4e-4 * high, "width_mm": 0.06 * high}
     if random.random() < 0.06:
         tables["auto"] = True
     return tables
-
-
-def _between(random: np.random.Generator, low: float, high: float) -> float:
-    """Return a number between both, its logarithm evenly distributed."""
-    return float(low * (high / low) ** random.random())
 
 
 def pressed(number: int, tables: Tree, limit_s: float = LIMIT_S) -> Pressed:
@@ -253,7 +244,7 @@ def pressed(number: int, tables: Tree, limit_s: float = LIMIT_S) -> Pressed:
     good = [step for step in found["steps"] if step["outcome"] == "converged"] if found else []
     last_line = run.stderr.strip().splitlines()[-1] if run.stderr.strip() else ""
     says = (found["outcome"] if found else last_line).replace(str(COIN), COIN.name)
-    outcome = {0: "converged", 2: "refused", 3: "ended"}.get(run.returncode, f"exit {run.returncode}")
+    outcome = _EXITS.get(run.returncode, f"exit {run.returncode}")
     faults = list(_faults(tables, found, good, run.returncode, run.stderr))
     return Pressed(number, kind, outcome, len(good), seconds, "; ".join(faults), says)
 
@@ -336,7 +327,7 @@ def _draw(figure: Any, table: Mapping[str, Sequence[Any]]) -> None:
     axes = figure.subplots()
     order = np.argsort(np.asarray(table["seconds"], dtype=float))
     seconds, outcome = (np.asarray(table[name])[order] for name in ("seconds", "outcome"))
-    for name, marker in (("converged", "o"), ("ended", "s"), ("refused", "^"), ("not ended", "x")):
+    for name, marker in _MARKERS.items():
         at = np.flatnonzero(outcome == name)
         axes.plot(at + 1, seconds[at].astype(float), marker, ms=5, label=f"{name}: {len(at)}")
     axes.set(xlabel="scenes, the quickest first", ylabel="time of the command on one thread (s)", yscale="log")

@@ -230,11 +230,15 @@ def deformed_contact(
     """
     area = _Area.of(face, points, displacement)
     total = (face.average @ area.ratio)[:, None]
-    mean = in_symmetry_planes((face.average @ (normal * area.ratio[:, None])) / total, face.points, axes)
+
+    def mean_of(normals: Float) -> Float:
+        return in_symmetry_planes((face.average @ (normals * area.ratio[:, None])) / total, face.points, axes)
+
+    mean = mean_of(normal)
     slope = np.linalg.norm(mean, axis=1)
     turns = np.zeros((*mean.shape, mean.shape[1]))
     if object_share is not None:
-        own = in_symmetry_planes((face.average @ (outward_normals(area.moved) * area.ratio[:, None])) / total, face.points, axes)
+        own = mean_of(outward_normals(area.moved))
         size = np.linalg.norm(own, axis=1)
         turns = -(object_share * slope / size)[:, None, None] * _across(own / size[:, None])
         mean = turned_towards(mean, own, object_share)
