@@ -28,9 +28,10 @@ from finger3d.progress import QUIET, Progress
 FACTOR = 2.0
 """Edge length of the coarser companion over that of the mesh."""
 
-_FINER_FACTOR = 0.5
+_FINER_FACTOR, _FINER_IF_FACTORED = 0.5, 0.7
 """Edge length of the finer companion over that of the mesh; its square is tried next, since a curved body may already
-be meshed finer than requested."""
+be meshed finer than requested.  In solids at finite strain, where every increment factorises the tangent, a companion
+at the first would take some forty times the time of the press."""
 
 _GRADED_FACTOR = 3.0
 """Edge length of a swept companion of an unstructured mesh, if at `FACTOR` it has as many unknowns: a swept mesh is
@@ -104,7 +105,8 @@ def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[M
     if model.domain == "solid" and own.mesher != longer.mesher:
         chosen.append(coarser(model, _GRADED_FACTOR).mesh)
         chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    finer = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (_FINER_FACTOR, _FINER_FACTOR**2)]
+    factor = _FINER_IF_FACTORED if model.domain == "solid" and model.finite_strain else _FINER_FACTOR
+    finer = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (factor, factor**2)]
     return chosen, finer
 
 

@@ -149,7 +149,8 @@ def estimate(
     except _FAILURES as error:
         found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
     try:
-        increment_errors, by = _of_increments(own, steps, beside, where, numbers, used)
+        known = found.companion_numbers
+        increment_errors, by = _of_increments(own, steps, (beside, where, known), numbers, used)
     except _FAILURES as error:
         increment_errors, by = {}, f"no estimate: {_reason(error)}"
     if own.model.ends_at_force:  # the normal force is given
@@ -206,8 +207,7 @@ def estimate_with_grid(
 def _of_increments(
     own: Problem,
     steps: Sequence[StepResult],
-    beside: Problem | None,
-    where: str,
+    companion: tuple[Problem | None, str, Mapping[str, float]],
     numbers: Measure,
     runs: Sequence[Run],
 ) -> tuple[dict[str, float], str]:
@@ -215,7 +215,7 @@ def _of_increments(
 
     Parameters
     ----------
-    beside, where : a press that costs less, and what it differs in, in words; None without one
+    companion : a press that costs less, or None, what it differs in, in words, and its numbers if they are known
     runs : runs that chose automatic increments
     """
     if has_exact_path(own.model):
@@ -223,6 +223,7 @@ def _of_increments(
     if runs:
         errors = errors_of_runs([(count, numbers(own, results[-1])) for count, results in runs])
         return errors, f"{', '.join(str(count) for count, _ in runs[:-1])} and {runs[-1][0]}, order 1"
+    beside, where, known = companion
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
     own_s = _marching_cost(own)
@@ -232,8 +233,8 @@ def _of_increments(
         if judged is None or ratio * seconds > budget:
             continue
         try:
-            last = steps[-1] if judged is own else last_step(judged)
-            errors = step_error(judged, numbers(judged, last), numbers, ratio)
+            there = numbers(own, steps[-1]) if judged is own else known or numbers(judged, last_step(judged))
+            errors = step_error(judged, there, numbers, ratio)
         except _FAILURES as error:
             failure = failure or error
             continue

@@ -38,6 +38,9 @@ _SHORTEST = 0.125
 _SLOW = 0.35
 """Ratio of successive residuals above which the tangent is factored again; a factor costs about five iterations."""
 
+_NEAR = 1e-4
+"""Residual below which an iteration that is not patient goes on as long as a patient one does."""
+
 _ASTRAY, _DIVERGED = 0.1, 1.0
 """Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up.  From the
 first on it is given up too if a step with a new tangent is too long: the tangent is nearly singular there."""
@@ -140,7 +143,7 @@ class FiniteIncrement(IncrementEquations):
         is_damped = False
         for _ in range(_ITERATIONS):
             if linearisation is None:
-                if factors >= (_PATIENT_FACTORS if patient else _FACTORS):
+                if factors >= (_PATIENT_FACTORS if patient or error < _NEAR else _FACTORS):
                     break
                 linearisation = increment.linearise(now, force, local=factors % 2 == 1)
                 factors, is_damped = factors + 1, False
