@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy import companions
+from finger3d.accuracy import estimate as estimates
 from finger3d.accuracy.companions import coarser, companion
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -23,7 +25,7 @@ from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
 from finger3d.meshing.structured.swept import mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.objects import Sphere
-from tests.models import run, swept_fig9
+from tests.models import large_fig9, run, swept_fig9
 
 
 def test_the_companion_stays_within_the_finger() -> None:
@@ -98,6 +100,23 @@ def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> 
     found = companion(problem).model.mesh
     assert (found.size_mm, found.base_size_mm) == (0.2, 0.5)
     assert made == ["lump", "lump"]
+
+
+def test_a_companion_is_pressed_once_with_the_increments_of_the_press(monkeypatch: Any) -> None:
+    problem, frames = run(large_fig9(0.45, 4.0, legs=(Leg(4.0, steps=4),)))
+    pressed: list[Problem] = []
+    monkeypatch.setattr(estimates, "last_step", lambda beside: pressed.append(beside) or last_step(beside))
+    found = estimate(problem, frames)
+    assert found.steps["normal_force_N"] > 0.0
+    assert len(pressed) == 1
+
+
+def test_a_finer_companion_at_large_deformation_is_not_so_fine() -> None:
+    model = unstructured()
+    for large, size in ((model, 0.2), (LargeDeformation().apply(model), 0.28)):
+        coarse, (finer, _) = companions.companions(large, 2000)
+        assert not coarse
+        assert finer.size_mm == pytest.approx(size)
 
 
 def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: list[str], monkeypatch: Any) -> None:

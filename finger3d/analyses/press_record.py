@@ -239,7 +239,8 @@ def point_count_warning(record: PressRecord) -> list[str]:
     if count >= _RESOLVED_POINTS[problem.dim] and across >= _POINTS_ACROSS:
         return []
     ratio = min((count / _RESOLVED_POINTS[problem.dim]) ** power, max(across - 1, 1) / _RESOLVED_POINTS[2], 1.0)
-    what = f"Only {count} {'point touches' if count == 1 else 'points touch'}" + (f", {across} across" if problem.dim == 3 else "")
+    what = "Only 1 point touches" if count == 1 else f"Only {count} points touch"
+    what += f", {across} across" if problem.dim == 3 else ""
     return [
         f"{what}: too few for the extents of contact and stick zone, and for forces if the object slides; "
         + size_advice(problem.model, size * ratio, "has enough", "press deeper")

@@ -253,12 +253,10 @@ class IncrementToForce(FiniteIncrement):
     Attributes
     ----------
     wanted : F on the whole finger, N
-    depths : mm, between which the depth is looked for
     rate : of the force by the depth in the last iteration, N/mm
     """
 
     wanted: float
-    depths: tuple[float, float] = (-math.inf, math.inf)
     rate: float = math.nan
 
     def solve_to_force(self, guess: Float | None) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
@@ -274,11 +272,11 @@ class IncrementToForce(FiniteIncrement):
         before = -float(self.problem.world_force(self.start.contact)[:, 1].sum())
         wanted = (share * math.sqrt(self.wanted) + (1.0 - share) * math.sqrt(max(before, 0.0))) ** 2
         pose = self.move.end if share == 1.0 else self.move.at(share)
-        start, far = self.move.start, self._largest_step
+        start = self.move.start
         rise, way = wanted - before, depth - start.depth_mm
         rate = rise / way if rise * way > 0.0 else self.wanted / self.length_scale
         move = Move(start, replace(pose, depth_mm=depth))
-        return replace(self, move=move, wanted=wanted, rate=rate, depths=(depth - far, depth + far))
+        return replace(self, move=move, wanted=wanted, rate=rate)
 
     def _error(self, now: Configuration, state: ContactState) -> float:
         return max(super()._error(now, state), abs(self._force(now, state.force) / self.wanted - 1.0))
@@ -294,13 +292,13 @@ class IncrementToForce(FiniteIncrement):
     def _solved(
         self, now: Configuration, force: Float, contact: ContactProblem, turned: Float | float
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Lower the object until the linearised body has the force."""
-        depth, images = self.move.end.depth_mm, 2.0 ** len(self.problem.axes)
+        """Lower the object until the linearised body has the force, by at most the largest step."""
+        depth, images, far = self.move.end.depth_mm, 2.0 ** len(self.problem.axes), self._largest_step
         condition = ForceCondition(
             down=self.active(now.contact.bases[:, :, 1].ravel()),
             force=self.wanted / images,
             rate=self.rate / images,
-            reach=(self.depths[0] - depth, self.depths[1] - depth),
+            reach=(-far, far),
             tolerance=_EXACT,
             turned=turned,
         )
