@@ -22,6 +22,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
+from finger3d.mechanics.results.history import StepResult
 from finger3d.meshing.structured.swept import mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.objects import Sphere
@@ -105,7 +106,12 @@ def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> 
 def test_a_companion_is_pressed_once_with_the_increments_of_the_press(monkeypatch: Any) -> None:
     problem, frames = run(large_fig9(0.45, 4.0, legs=(Leg(4.0, steps=4),)))
     pressed: list[Problem] = []
-    monkeypatch.setattr(estimates, "last_step", lambda beside: pressed.append(beside) or last_step(beside))
+
+    def counted(beside: Problem, **more: Any) -> StepResult:
+        pressed.append(beside)
+        return last_step(beside, **more)
+
+    monkeypatch.setattr(estimates, "last_step", counted)
     found = estimate(problem, frames)
     assert found.steps["normal_force_N"] > 0.0
     assert len(pressed) == 1

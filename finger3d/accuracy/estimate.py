@@ -29,6 +29,7 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
+    FEW_CUTS,
     Run,
     errors_of_runs,
     last_step,
@@ -272,7 +273,7 @@ def discretisation(
             "with every second multiplier",
         )
     beside = companion(own, report)
-    last = last_step(beside)
+    last = last_step(beside, cuts=FEW_CUTS)
     ratio = edge_ratio(own, beside)
     kind = "coarse" if ratio > 1.0 else "finer"
     found = ErrorEstimate(

@@ -28,7 +28,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import AUTO_START, stations
-from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.solve import CUTS, march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, of_kind
 from finger3d.mechanics.results.history import StepResult, measure
@@ -59,8 +59,8 @@ _LEAST_RUNS = 3
 _FALL = 1.5
 """Power of the number of increments with which an error falls, between that of kinks, 1, and of smooth paths, 2."""
 
-_CUTS = 1
-"""Times that an increment of a press which serves an estimate is halved, at most."""
+FEW_CUTS = 1
+"""Times that an increment of a press which serves an estimate is halved, at most: it may cost more than the press."""
 
 _FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 6, 12
 """Counts if every increment factors the stiffness again: 6 and 12 increments cost nearly twice as much as 10."""
@@ -295,7 +295,7 @@ def step_error(
         Increments of the further run over those of the problem.
     """
     trial, ratio = with_scaled_steps(problem, ratio)
-    return errors_between(quantities, measurement(trial, last_step(trial)), ratio)
+    return errors_between(quantities, measurement(trial, last_step(trial, cuts=FEW_CUTS)), ratio)
 
 
 def errors_between(quantities: Mapping[str, float], others: Mapping[str, float], ratio: float) -> dict[str, float]:
@@ -325,11 +325,8 @@ def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str,
     return largest
 
 
-def last_step(problem: Problem, workspace: Workspace | None = None) -> StepResult:
-    """Solve all increments of a press that serves an estimate, and return the result of the last; see `march`.
-
-    Increments that do not converge are halved less often than those of a press itself, so that an estimate does not
-    take many times as long as the press that it is for.
+def last_step(problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS) -> StepResult:
+    """Solve all increments and return the result of the last; for the workspace and cuts see `march`.
 
     Raises
     ------
@@ -337,7 +334,7 @@ def last_step(problem: Problem, workspace: Workspace | None = None) -> StepResul
         If an increment does not converge.
     """
     result = None
-    for result in march(problem, workspace=workspace, cuts=_CUTS):
+    for result in march(problem, workspace=workspace, cuts=cuts):
         if not result.outcome.ok:
             raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
     if result is None:

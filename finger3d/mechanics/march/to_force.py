@@ -242,7 +242,7 @@ def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float, deepest:
         return normal_force(problem, found.state) if found.outcome.ok else math.nan
 
     free = force_at(depth, Coulomb(0.0))
-    while free <= 0.0 and 2.0 * depth < deepest:
+    while free <= 0.0 < depth < 0.5 * deepest:
         depth *= 2.0
         free = force_at(depth, Coulomb(0.0))
     if not free > 0.0:
