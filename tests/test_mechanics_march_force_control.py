@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +24,15 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.force_control import (
     DepthSearch,
     Trial,
-    adapted,
     at_depth_reached,
     forecast_depth,
 )
+from finger3d.mechanics.march.parts import solved_in_turn
 from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.to_force import normal_force
 from finger3d.mechanics.model import Domain, Leg, Model
-from finger3d.mechanics.results.history import measure
-from finger3d.objects import Plane
+from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.objects import Move, Plane
 from finger3d.scene import load
 from tests.logs import Log
 from tests.models import block, fig9
@@ -165,12 +167,11 @@ def test_a_force_under_the_papers_rule_is_reached_or_ends_the_press(large: bool)
     ("domain", "steps", "ratio"),
     [("plane-strain", 1, 2), ("plane-strain", 3, 2), ("plane-strain", 5, 2), ("solid", 3, 2), ("solid", 5, 2)],
 )
-def test_a_press_by_force_at_large_deformation_is_the_press_by_its_depths_at_twice_the_cost(
+def test_a_press_by_force_at_large_deformation_is_the_press_through_its_poses_at_twice_the_cost(
     domain: Domain, steps: int, ratio: float, forecast_mm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # the first increment is pressed two or three times, until its parts are at their shares of the depth
     problem, iterations = build(LargeDeformation().apply(block(legs=(Leg(1.0, steps=5),), domain=domain))), [0]
-    advance = FiniteIncrement._advance
+    formulation, advance = formulation_of(problem.model), FiniteIncrement._advance
 
     def counted(*arguments: Any) -> Any:
         iterations[0] += 1
@@ -178,39 +179,29 @@ def test_a_press_by_force_at_large_deformation_is_the_press_by_its_depths_at_twi
 
     monkeypatch.setattr(FiniteIncrement, "_advance", counted)
 
-    def pressed(*legs: Leg) -> tuple[int, list[dict[str, float]]]:
-        workspace, before = formulation_of(problem.model).workspace(), iterations[0]
-        steps = list(march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace))
-        assert all(step.outcome.ok for step in steps)
+    def pressed(*legs: Leg) -> tuple[int, list[StepResult]]:
+        workspace, before = formulation.workspace(), iterations[0]
+        found = list(march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace))
+        assert all(step.outcome.ok for step in found)
         cost = iterations[0] - before + 5 * workspace.factorizations  # a factor takes as long as five iterations
-        return cost, [measure(problem.points, step) for step in steps]
+        return cost, found
 
-    _, there = pressed(Leg(1.0, steps=5))
-    cost, by_force = pressed(Leg(forecast_mm, steps=steps, force_N=there[-1]["normal_force_N"]))
-    least, by_depth = pressed(*(Leg(step["depth_mm"], steps=1) for step in by_force))
+    wanted = measure(problem.points, pressed(Leg(1.0, steps=5))[1][-1])["normal_force_N"]
+    cost, by_force = pressed(Leg(forecast_mm, steps=steps, force_N=wanted))
+    least, by_depth = pressed(*(Leg(step.target.depth_mm, steps=1) for step in by_force))
     assert cost <= ratio * least
-    for a, b in zip(by_depth, by_force, strict=True):
-        assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-8)
-        # the residual of 5e-9 of the forces; parts of the first increment off by a share change it by up to that share
-        assert b["friction_sum_N"] == pytest.approx(a["friction_sum_N"], rel=1e-6)
-
-
-def test_an_increment_is_repeated_until_its_parts_are_those_of_its_depth() -> None:
-    solution = ContactSolution(REST, Outcome.CONVERGED, 0.0, 1, "none")
-    near = []
-
-    def repeated(_: Trial, depth: float, is_similar: bool) -> Trial:
-        near.append(is_similar)
-        return Trial(1.0 + 0.02 * (depth - 1.0) + 1e-3 * (depth - 1.0) ** 2, solution, 1.0)
-
-    first = repeated(Trial(0.0, solution, 0.0), 0.3, False)
-    near.clear()
-    assert adapted(first, 0.3, repeated).depth == pytest.approx(1.0, rel=1e-9)
-    assert near == [False, True, True]  # 1e-2, 9e-6 and 1e-10 off by the secant method, 3e-4 the second without it
-    assert adapted(first, 0.3, lambda *_: None) is first
-    near.clear()
-    assert adapted(first, first.depth, repeated) is first
-    assert near == []
+    parts = [part for step in by_force for part in step.parts]
+    moves = [Move(start, end) for start, end in pairwise([problem.origin, *(pose for pose, _ in parts)])]
+    state, workspace = formulation.start(problem), formulation.workspace()
+    through, again = solved_in_turn(problem, workspace, state, moves, 0)
+    assert through.outcome.ok
+    for (_, found), part in zip(parts, again, strict=True):  # to the residual of 5e-9 of the forces
+        assert part.after.contact.force == pytest.approx(found.contact.force, abs=1e-7 * wanted)
+    first = [normal_force(problem, state) for _, state in by_force[0].parts]
+    assert first == pytest.approx(np.multiply((1 / 16, 1 / 4, 1), wanted / steps), rel=1e-7)
+    # a first increment to a depth is cut at other depths: forces differ by no more than the error of the increments
+    forces = [[measure(problem.points, step)["normal_force_N"] for step in found] for found in (by_force, by_depth)]
+    assert forces[0] == pytest.approx(forces[1], rel=5e-3)
 
 
 def test_a_forecast_is_good_to_a_factor_of_two() -> None:

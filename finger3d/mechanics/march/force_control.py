@@ -44,10 +44,6 @@ _NEARER = (0.5, 0.25, 0.125)
 _SIMILAR = 0.5
 """Relative change of the depth up to which increments are similar."""
 
-_SAME, _REPEATED, _CONTRACTION = 2e-6, 7, 0.5
-"""Relative difference of the depths of an increment and of its parts at which these are not adapted any more, largest
-number of times, and change of the one with the other below which it is extrapolated."""
-
 _GRID = (81, 21)
 
 _BEYOND = 1.1
@@ -96,32 +92,6 @@ def target(finite_strain: bool) -> float:
 def is_similar(depth: float, other: float) -> bool:
     """Return whether increments to two depths (mm) are similar, so that one may begin at the end of the other."""
     return abs(depth - other) < _SIMILAR * abs(depth)
-
-
-def adapted(trial: Trial, depth: float, repeated: Callable[[Trial, float, bool], Trial | None]) -> Trial:
-    """Return a trial whose increment is repeated until its parts are at their shares of the depth that it ends at.
-
-    The depth of the parts is found by the secant method.
-
-    Parameters
-    ----------
-    trial : with the force, from parts of an increment to another depth
-    depth : mm, that other one
-    repeated : function of the last trial, a depth (mm), and whether that is similar to the last one
-        Returns the trial that the parts at shares of the depth lead to; None if there is none.
-    """
-    slope, last = 0.0, trial
-    for _ in range(_REPEATED):
-        away = trial.depth - depth
-        if abs(away) <= _SAME * abs(trial.depth):
-            break
-        step = away / (1.0 - slope) if abs(slope) < _CONTRACTION else away
-        end = repeated(trial, depth + step, is_similar(depth + step, depth))
-        if end is None:
-            break
-        last, trial, depth = trial, end, depth + step
-        slope = (trial.depth - last.depth) / step
-    return trial
 
 
 @dataclass

@@ -19,8 +19,9 @@ from finger3d.mechanics.small_strain.linear_contact import transported
 from finger3d.objects import Move, ObjectPose
 
 FIRST_PARTS = 1.0 / 16.0, 0.25
-"""Shares at which an increment that begins without contact is cut: quarters and halves of the contact's length under a
-ball.  In the first part points move freely until one of them touches, which says nothing of how they move later."""
+"""Shares at which an increment that begins without contact is cut: of its depth, quarters and halves of the contact's
+length under a ball, or of its force, the same under a cylinder.  In the first part points move freely until one of them
+touches, which says nothing of how they move later."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,18 @@ def solved_in_turn(
         if not end.outcome.ok:
             now = end.state if end.outcome.is_cycle else state
             break
+    return combined(found, now), parts
+
+
+def combined(solutions: Sequence[ContactSolution[State[Any]]], state: State[Any]) -> ContactSolution[State[Any]]:
+    """Return the solution of an increment, which ends at a state, from those of its parts."""
     return replace(
-        found[-1],
-        state=now,
-        residual=max(one.residual for one in found),
-        iterations=sum(one.iterations for one in found),
-        method=SNAPPED if any(one.method == SNAPPED for one in found) else found[-1].method,
-    ), parts
+        solutions[-1],
+        state=state,
+        residual=max(one.residual for one in solutions),
+        iterations=sum(one.iterations for one in solutions),
+        method=SNAPPED if any(one.method == SNAPPED for one in solutions) else solutions[-1].method,
+    )
 
 
 def _solved(

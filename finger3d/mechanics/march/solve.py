@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
+from copy import copy
 from dataclasses import replace
 from threading import Event
 from typing import Any
@@ -19,7 +20,7 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import deepest, target
-from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, expecting, solved_in_turn
+from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, combined, energies, expecting, solved_in_turn
 from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.march.to_force import (
     ToForce,
@@ -155,11 +156,15 @@ class Press:
         was_cut = len(end.parts) > len(self.moves_to(end.pose))
         self._before = None if was_cut else (self.state, self._work, self._dissipation)
         self._add_energies(end)
-        self._previous = Move(self.pose, end.pose), self.state.contact.force
-        self._last_part = end.parts[-1] if end.parts else None
-        self.state, self.pose, outcome = end.solution.state, end.pose, end.solution.outcome
+        self._move_to(end)
+        outcome = end.solution.outcome
         self.has_failed = not (outcome.ok or outcome.is_cycle)
         return self._result(end, self._free_strain(station))
+
+    def _move_to(self, end: Advanced) -> None:
+        self._previous = Move(self.pose, end.pose), self.state.contact.force
+        self._last_part = end.parts[-1] if end.parts else None
+        self.state, self.pose = end.solution.state, end.pose
 
     def _add_energies(self, end: Advanced) -> None:
         work, lost = end.energies or energies(self.problem, end.parts)
@@ -258,11 +263,22 @@ class Press:
         return Advanced(there.solution, [part], there.pose, there.energies)
 
     def _to_force(self, move: Move, load: Load) -> Advanced:
-        """Advance to the depth where the normal force is the prescribed one."""
-        problem, (now, wanted) = self.problem, (float(forces[0]) for forces in self._wanted(load))
-        way = ToForceAtFiniteStrain if problem.model.finite_strain else ToForce
-        depth = expected_depth(problem, self._last_part, move, (now, wanted), self._deepest)
-        return way(self, move, (now, wanted), self._deepest, self._report).run(depth)
+        """Advance to the depth where the normal force is the prescribed one; where contact begins, in parts."""
+        way = ToForceAtFiniteStrain if self.problem.model.finite_strain else ToForce
+        first = way.first_shares if len(self.moves_to(move.end)) > 1 else ()
+        now, wanted = (float(forces[0]) for forces in self._wanted(load))
+        press, ends = copy(self), list[Advanced]()
+        for share in (*first, 1.0):
+            part, forces = Move(press.pose, move.at(share) if share < 1.0 else move.end), (now, share * wanted)
+            depth = expected_depth(self.problem, press._last_part, part, forces, self._deepest)
+            end = way(press, part, forces, self._deepest, self._report).run(depth)
+            ends.append(end)
+            if not end.solution.outcome.ok:
+                return Advanced(combined([end.solution for end in ends], self.state), [], self.pose)
+            press._move_to(end)
+            now = share * wanted
+        solution = combined([end.solution for end in ends], press.state)
+        return Advanced(solution, [part for end in ends for part in end.parts], press.pose)
 
     def _to_forces(self, move: Move, load: Load) -> Advanced:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""

@@ -10,13 +10,13 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.friction import Coulomb
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import increment_to_force
-from finger3d.mechanics.march.force_control import DepthSearch, Trial, adapted, is_similar, target
-from finger3d.mechanics.march.parts import Advanced, Substep, expecting
+from finger3d.mechanics.march.force_control import DepthSearch, Trial, is_similar, target
+from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, expecting
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.objects import Move, ObjectPose
@@ -73,6 +73,9 @@ class ToForce:
     """
 
     tolerance: ClassVar[float] = target(finite_strain=False)
+    first_shares: ClassVar[tuple[float, ...]] = ()
+    """Shares of the force to which parts of an increment that begins without contact lead, each found directly; without
+    any such an increment is found by trials, whose parts have shares of the depth."""
 
     def __init__(
         self, press: Advancing, move: Move, forces: tuple[float, float], deepest: float, report: Progress
@@ -99,9 +102,10 @@ class ToForce:
 
     def _directly(self, depth: float) -> Trial | None:
         """Return the end with the depth as an unknown; None where the iteration does not converge."""
+        if self._force <= 0.0 and not self.first_shares:
+            return None
         there = Move(self._move.start, self._pose(depth))
-        guess = self._press.expected_force(there.end)
-        return self._to_force(self._press.state, there, guess, []) if self._force > 0.0 else None
+        return self._to_force(self._press.state, there, self._press.expected_force(there.end), [])
 
     def _to_force(self, start: State[Any], move: Move, guess: Float | None, before: Sequence[Substep]) -> Trial | None:
         """Return the end of a part to the force, after other parts."""
@@ -146,29 +150,11 @@ class ToForce:
 class ToForceAtFiniteStrain(ToForce):
     """An increment to a normal force at finite strain, where every iteration from afar costs a factorisation.
 
-    Where contact begins, the force is approached roughly; the parts of the increment begin their iterations near that
-    solution, until they are at their shares of the depth.  Trials begin at the end that is expected from those before.
+    Trials begin at the end that is expected from those before.
     """
 
     tolerance: ClassVar[float] = target(finite_strain=True)
-
-    def _directly(self, depth: float) -> Trial | None:
-        press, pose = self._press, self._pose(depth)
-        *earlier, last = press.moves_to(pose)
-        if not earlier:
-            return self._to_force(press.state, last, press.expected_force(pose), [])
-        rough = press.workspace.rough()
-        found, parts = press.solved(press.state, earlier, workspace=rough)
-        start = found.state, None
-        near = increment_to_force(press.problem, start, last, self._wanted, rough) if found.outcome.ok else None
-        press.workspace.factorizations += rough.factorizations
-        if near is None:
-            return None
-        last, end = near
-        part = Substep(found.state, end.state, last, end.residual)
-        trial = self._noted(last.end.depth_mm, end, [*parts, part])
-        exact = adapted(trial, depth, self._repeated)
-        return exact if exact is not trial else None
+    first_shares: ClassVar[tuple[float, ...]] = FIRST_PARTS
 
     def _tried(self, depth: float, good: Sequence[Trial]) -> Trial:
         trial = super()._tried(depth, good)
@@ -179,25 +165,13 @@ class ToForceAtFiniteStrain(ToForce):
             before = self._noted(last.move.end.depth_mm, until_then, parts)
             return replace(trial, depth=failed.move.end.depth_mm, before=before)
         end = self._from_last(self._parts[depth]) if is_near(trial.force, self._wanted) else None
-        return trial if end is None else adapted(end, depth, self._repeated)
+        return end or trial
 
     def _near(
         self, last: Trial, depth: float, ends: tuple[State[Any], State[Any]], share: float
     ) -> tuple[State[Any], list[Substep]]:
         start = expecting(self._press.state, Move(self._move.start, self._pose(depth)), ends, share)
         return start, self._parts[last.depth] if is_similar(depth, last.depth) else []
-
-    def _repeated(self, trial: Trial, depth: float, near_last: bool) -> Trial | None:
-        """Return the end of an increment whose parts are at shares of a depth (mm), from a trial with the force."""
-        press, its_parts = self._press, self._parts[trial.depth]
-        *earlier, last = press.moves_to(self._pose(depth))
-        if not earlier:
-            return None
-        whole = len(its_parts) == len(earlier) + 1
-        moves, near = (earlier, its_parts[:-1] if near_last else []) if whole else ([*earlier, last], [])
-        found, parts = press.solved(press.state, moves, near=near)
-        parts += [Substep(found.state, trial.solution.state, last, trial.solution.residual)] if whole else []
-        return self._from_last(parts) if found.outcome.ok else None
 
     def _from_last(self, parts: Sequence[Substep]) -> Trial | None:
         """Return the end of an increment whose last part goes to the force, near the end of a similar part."""
@@ -230,26 +204,26 @@ def expected_depth(
 def _at_small_strain(problem: Problem, pose: ObjectPose, wanted: float, deepest: float) -> float:
     """Return a depth (mm) near that of a normal force (N) in small strain, from increments to the pose and onwards.
 
-    All but the last are frictionless, so that they are solved soon even where the pose is far too deep.  The depth is
-    doubled until the object touches.
+    They are frictionless, so that they are solved soon even where the pose is far too deep.  The depth is doubled until
+    the object touches.
     """
     small, depth = SmallStrain(), pose.depth_mm
-    workspace, rest = small.workspace(), small.start(problem)
+    like = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    workspace, rest = small.workspace(), small.start(like)
 
-    def force_at(depth_mm: float, friction: FrictionLaw) -> float:
-        like = replace(problem, model=replace(problem.model, friction=friction))
+    def force_at(depth_mm: float) -> float:
         found = small.increment(like, rest, Move(problem.origin, replace(pose, depth_mm=depth_mm)), None, workspace)
         return normal_force(problem, found.state) if found.outcome.ok else math.nan
 
-    free = force_at(depth, Coulomb(0.0))
-    while free <= 0.0 < depth < 0.5 * deepest:
+    force = force_at(depth)
+    while force <= 0.0 < depth < 0.5 * deepest:
         depth *= 2.0
-        free = force_at(depth, Coulomb(0.0))
-    if not free > 0.0:
+        force = force_at(depth)
+    if not force > 0.0:
         return depth
-    other = by_power_law((0.0, 0.0), (depth, free), wanted)
-    rubbed = force_at(other, problem.model.friction)
-    return by_power_law((depth, free), (other, rubbed), wanted) if rubbed > 0.0 else other
+    other = by_power_law((0.0, 0.0), (depth, force), wanted)
+    again = force_at(other)
+    return by_power_law((depth, force), (other, again), wanted) if again > 0.0 else other
 
 
 def by_power_law(before: tuple[float, float], now: tuple[float, float], wanted: float) -> float:

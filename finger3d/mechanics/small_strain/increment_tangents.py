@@ -19,7 +19,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,8 +31,9 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.parts import Substep, energies
-from finger3d.mechanics.march.path import Station, stations
+from finger3d.mechanics.march.force_control import FORCE_TOLERANCE
+from finger3d.mechanics.march.parts import FIRST_PARTS, Substep, energies
+from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.march.to_force import forces_on
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.state import State
@@ -47,6 +49,9 @@ from finger3d.mechanics.small_strain.linearised import (
 )
 from finger3d.mechanics.small_strain.variations import Side, Variation, changes_of_points
 from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
+
+Ends: TypeAlias = Sequence[tuple[ObjectPose, State[Any]]]
+"""Pose and state at the end of every part of an increment."""
 
 _STEP = 1e-6
 """Step of the depth in an increment under a prescribed force, over the depth; that of parameters is about as large."""
@@ -125,24 +130,30 @@ class IncrementTangents:
     def _sides(self, step: StepResult, status: Status | None = None) -> list[Side]:
         """Return the sides at the end of an increment, where the points may have other statuses (c,)."""
         targets = [own[self._number] for own in self._stations]
-        poses = self._poses(targets)
+        ends, wanted = self._poses(targets), self._wanted(targets)
+        moves = [Move(side.pose, end) for side, end in zip(self.sides, ends, strict=True)]
+        sides, here = self.sides, self._here
         try:
-            parts = self._parts(step, status)
-            if any(target.load for target in targets):
-                poses = self._in_equilibrium(step, parts, targets, poses)
-            return self._through(parts, self.sides, self._steps, poses)
+            for share, found in _stages(self.problem, here.state, step, targets[0].load):
+                last = status if share == 1.0 else None
+                parts, poses = self._parts(here, found, last), [move.at(share) for move in moves]
+                if wanted is not None:
+                    poses = self._in_equilibrium(parts, (here, *sides), share * wanted, poses)
+                sides = self._through(parts, sides, self._steps, poses)
+                here = here._replace(state=found[-1][1], pose=found[-1][0])
+            return list(sides)
         except np.linalg.LinAlgError:
             raise Finger3dError("the equations of an increment are singular: numbers have no derivatives") from None
 
-    def _parts(self, step: StepResult, status: Status | None) -> list[Part]:
-        """Return the parts of an increment, linearised."""
-        whole, parts = Move(self._here.pose, step.target).change, list[Part]()
-        before, place, start = self._here.state, self._here.pose, 0.0
-        for pose, after in step.parts:
-            if status is not None and after is step.parts[-1][1]:
+    def _parts(self, here: Side, found: Ends, status: Status | None) -> list[Part]:
+        """Return parts of an increment from a place, linearised; the points may have other statuses (c,) at the end."""
+        end, parts = found[-1][0], list[Part]()
+        whole, before, place, start = Move(here.pose, end).change, here.state, here.pose, 0.0
+        for pose, after in found:
+            if status is not None and after is found[-1][1]:
                 after = replace(after, contact=replace(after.contact, status=status))
-            way = Move(self._here.pose, pose).change
-            share = 1.0 if pose == step.target else float(way @ whole) / float(whole @ whole)
+            way = Move(here.pose, pose).change
+            share = 1.0 if pose == end else float(way @ whole) / float(whole @ whole)
             linear = self._linearised(before, after, move := Move(place, pose))
             parts.append(Part(before, after, linear, move, start, share))
             before, place, start = after, pose, share
@@ -193,22 +204,31 @@ class IncrementTangents:
         change = (1.0 - targets[0].share) * self._left
         return [target.pose.changed([1, 2], by) for target, by in zip(targets, change, strict=True)]
 
-    def _in_equilibrium(
-        self, step: StepResult, parts: Sequence[Part], targets: Sequence[Station], poses: Sequence[ObjectPose]
-    ) -> list[ObjectPose]:
-        """Return the poses at the end of an increment whose depth or slides follow from prescribed forces."""
+    def _wanted(self, targets: Sequence[Station]) -> Float | None:
+        """Return the forces (2 p, 3) N prescribed at stations, NaN where there is none; None without any."""
         loads = [target.load for target in targets if target.load]
-        free = np.flatnonzero(~np.isnan(loads[0].forces))
-        reached, h = step.target.coordinates, _STEP * max(step.target.depth_mm, 1.0)
-        held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
-        moved = [step.target.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
-        steps = np.array([*self._steps, *[-h, h] * len(free)])
-        found = self._through(parts, [*self.sides, *[self._here] * len(moved)], steps, [*held, *moved])
-        forces = np.array([forces_on(side.problem, side.state) for side in found])
+        if not loads:
+            return None
         if loads[0].begins:
             self._leg_start_N = np.array([forces_on(side.problem, side.state) for side in self.sides])
         goals = np.array([load.forces for load in loads])
-        wanted = self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
+        return self._leg_start_N + loads[0].share * (goals - self._leg_start_N)
+
+    def _in_equilibrium(
+        self, parts: Sequence[Part], begin: Sequence[Side], wanted: Float, poses: Sequence[ObjectPose]
+    ) -> list[ObjectPose]:
+        """Return the poses after parts of an increment whose depth or slides follow from forces (2 p, 3), N.
+
+        The parts begin at the place of the press and of all sides.
+        """
+        here, *sides = begin
+        end, free = parts[-1].move.end, np.flatnonzero(~np.isnan(wanted[0]))
+        reached, h = end.coordinates, _STEP * max(end.depth_mm, 1.0)
+        held = [pose.changed(free, (reached - pose.coordinates)[free]) for pose in poses]
+        moved = [end.changed([k], [t]) for k in free.tolist() for t in (-h, h)]
+        steps = np.array([*self._steps, *[-h, h] * len(free)])
+        found = self._through(parts, [*sides, *[here] * len(moved)], steps, [*held, *moved])
+        forces = np.array([forces_on(side.problem, side.state) for side in found])
         missing = slopes(wanted - forces[: len(held)], self._steps)[free]
         stiffness = slopes(forces[len(held) :], steps[len(held) :])[free]
         try:
@@ -277,6 +297,20 @@ class IncrementTangents:
         ]
         reached = self._reached(part, fixed, states, sides, steps)
         return [side_after(*one) for one in zip(sides, moves, *zip(*reached, strict=True), strict=True)]
+
+
+def _stages(problem: Problem, before: State[Any], step: StepResult, load: Load | None) -> list[tuple[float, Ends]]:
+    """Return the ends of the parts of an increment that are found for a share of its forces, by that share.
+
+    Where contact begins under a normal force there are several; they are told by the force that they end with.
+    """
+    if load is not None and load.is_normal and not before.contact.force.any():
+        forces = np.array([forces_on(problem, state)[0] for _, state in step.parts])
+        ends = np.abs(forces - np.outer(FIRST_PARTS, forces[-1:])).argmin(axis=1)
+        if np.allclose(forces[ends], np.multiply(FIRST_PARTS, forces[-1]), rtol=0.0, atol=FORCE_TOLERANCE * forces[-1]):
+            cuts = pairwise([0, *(ends + 1).tolist(), len(forces)])
+            return [(share, step.parts[slice(*cut)]) for share, cut in zip((*FIRST_PARTS, 1.0), cuts, strict=True)]
+    return [(1.0, step.parts)]
 
 
 def side_after(before: Side, move: Move, state: State[Any], readings: Float) -> Side:
