@@ -34,6 +34,14 @@ def joint_of_three() -> Calibration:
     )
 
 
+def test_the_set_of_a_normal_likelihood_is_its_90_percent_interval_at_any_width() -> None:
+    joint = together(curve(line(0.02)))
+    quantile = stats.norm.ppf(0.95)
+    for noise in np.geomspace(3e-5, 3e-3, 16):  # with the values of the grid alone up to 6 % too narrow
+        found = read(joint, joint.at([0.613])[0], std=noise)
+        assert np.diff(found.intervals[0]) == pytest.approx(2.0 * quantile * noise / 0.02, rel=5e-3)
+
+
 def test_straight_curves_give_the_mean_and_deviation_of_least_squares() -> None:
     joint = together(curve(line(0.02)), curve(line(0.01), noise=3e-4))
     readings = joint.at([0.5])[0] + [1e-4, -2e-4]

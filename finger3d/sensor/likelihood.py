@@ -45,6 +45,7 @@ _PLAUSIBLE = math.exp(-0.5 * 2.706)  # of the largest likelihood: the 90 % limit
 _NEGLIGIBLE = 1e-12  # of the largest likelihood
 _ITERATIONS, _STILL = 30, 1e-4  # of the method of Gauss and Newton; a change of z, in standard deviations, that ends it
 _EQUAL = 0.1  # difference of logarithms of densities below which they are equal: on a plateau
+_FINER = 8  # places of a set's ends per mu
 _NODES, _ENOUGH, _ZOOMS = 400, 50, 6  # of a finer grid; where the likelihood is not negligible; grids that are tried
 
 
@@ -120,15 +121,21 @@ class _Likelihood:
         return bool(first and self.density[0] >= _PLAUSIBLE), bool(last and self.density[-1] >= _PLAUSIBLE)
 
     def credible_set(self) -> tuple[tuple[float, float], ...]:
-        """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood."""
-        with np.errstate(divide="ignore"):
-            level = np.round(np.log(self.density) / _EQUAL)
-        order = np.lexsort((np.abs(self.mu - self.mu[np.argmax(level)]), -level))  # of equals the nearest to the mode
-        count = int(np.searchsorted(np.cumsum(self.weight[order]), CREDIBLE)) + 1
+        """Return the intervals of the smallest set that holds `CREDIBLE` of the likelihood.
+
+        The logarithm of the density is linear between the mu, of which a set may hold few.
+        """
+        nodes = np.arange(len(self.mu))
+        places = np.linspace(0.0, nodes[-1], _FINER * nodes[-1] + 1)
+        log = np.interp(places, nodes, np.log(np.maximum(self.density, np.finfo(float).tiny)))
+        fine = _Likelihood(np.interp(places, nodes, self.mu), np.exp(log), np.zeros_like(log))
+        level = np.round(log / _EQUAL)
+        order = np.lexsort((np.abs(fine.mu - fine.mu[np.argmax(level)]), -level))  # of equals the nearest to the mode
+        count = int(np.searchsorted(np.cumsum(fine.weight[order]), CREDIBLE)) + 1
         inside = np.zeros(len(order) + 2, dtype=int)
         inside[1 + order[:count]] = 1
         ends = np.flatnonzero(np.diff(inside)).reshape(-1, 2)
-        return tuple((float(self.mu[a]), float(self.mu[b - 1])) for a, b in ends)
+        return tuple((float(fine.mu[a]), float(fine.mu[b - 1])) for a, b in ends)
 
 
 def _marginal(residual: Float, errors: Errors) -> tuple[Float, Float]:
