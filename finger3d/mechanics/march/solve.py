@@ -207,16 +207,10 @@ class Press:
         moves: Sequence[Move],
         guess: Float | None = None,
         near: Sequence[Substep] = (),
-        workspace: Any = None,
     ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
-        """Solve motions one after another from a state, which stays that of the press; see `solved_in_turn`.
-
-        Parameters
-        ----------
-        workspace : in place of that of the press
-        """
+        """Solve motions one after another from a state, which stays that of the press; see `solved_in_turn`."""
         self._end_if_cancelled()
-        return solved_in_turn(self.problem, workspace or self.workspace, start, moves, self._cuts, guess, near)
+        return solved_in_turn(self.problem, self.workspace, start, moves, self._cuts, guess, near)
 
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
         return Advanced(*self.solved(self.state, self.moves_to(pose), guess), pose)

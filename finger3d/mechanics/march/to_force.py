@@ -50,7 +50,6 @@ class Advancing(Protocol):
         moves: Sequence[Move],
         guess: Float | None = None,
         near: Sequence[Substep] = (),
-        workspace: Any = None,
     ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
         """Solve motions one after another; see `finger3d.mechanics.march.parts.solved_in_turn`."""
         ...
