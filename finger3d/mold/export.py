@@ -185,7 +185,7 @@ def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
     if not options.parts:
         return mold(shape, slots, options)
     if isinstance(shape, Triangles):
-        raise Finger3dError(f"--parts: {scene.design.name} holds triangles; solids are told apart in CAD only")
+        raise Finger3dError(f"--parts: {scene.design.name} holds triangles; only CAD files keep their solids")
     return poured(shape, scene.design.solids(), slots, options)
 
 
