@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import math
 import os
 import platform
@@ -37,10 +38,30 @@ PACKAGES = (
 )
 """Names on PyPI of finger3d and of every package that shapes numbers or pictures."""
 
+_PICTURES = ("pyvista", "vtk", "matplotlib")
+"""Those among them that shape no number."""
+
 
 def versions() -> dict[str, str]:
     """Return the installed version of each package by name, and that of Python; absent packages are left out."""
     return dict(_installed())
+
+
+def made_with() -> dict[str, str]:
+    """Return what shapes numbers besides a scene: versions of packages, and the source of finger3d and its designs."""
+    shaping = {name: version for name, version in _installed().items() if name not in _PICTURES}
+    return {**shaping, "the source of finger3d and its designs": source_hash()}
+
+
+@cache
+def source_hash(folder: str = "") -> str:
+    """Return 16 hex digits of the SHA-256 of the source of finger3d, or of a folder in it, and of all designs."""
+    package = Path(__file__).resolve().parent
+    files = [*(package / folder).rglob("*.py"), *package.rglob("*.toml"), *package.parent.glob("geometries/*.py")]
+    digest = hashlib.sha256()
+    for file in sorted(files):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 @cache

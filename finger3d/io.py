@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import errno
+import hashlib
 import json
 import math
 import os
@@ -187,6 +188,17 @@ def write_json(path: str | Path, data: object) -> None:
 def json_text(data: object) -> str:
     """JSON of nested dicts, lists, arrays and numbers; NaN and infinity become null."""
     return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def checksum(data: object, before: str = "") -> str:
+    """Return 16 hex digits of the SHA-256 of JSON data, the same before they are written and after they are read.
+
+    Parameters
+    ----------
+    before : checksum of what must come before the data
+    """
+    text = before + json.dumps(_plain(data), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _plain(value: object) -> object:

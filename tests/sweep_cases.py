@@ -27,8 +27,9 @@ def pressed_here(sweep: Sweep) -> list[dict]:
 
 
 def lines(out: Path) -> list[dict]:
-    path = out / "points.jsonl"
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    """Rows of the journal, without their checksums."""
+    found = [json.loads(line) for line in (out / "points.jsonl").read_text().splitlines()]
+    return [{name: value for name, value in row.items() if name != "checksum"} for row in found]
 
 
 def table(out: Path) -> list[dict]:

@@ -9,7 +9,7 @@ import pytest
 
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.measured import MeasuredPress
-from finger3d.analyses.identify.simulated import Simulation, largest, names_of, row_mistake
+from finger3d.analyses.identify.simulated import Simulation, largest, names_of
 from finger3d.errors import Finger3dError
 from finger3d.results.journal import Journal
 from tests.sensor_cases import SCENE, scene
@@ -52,20 +52,6 @@ def test_a_press_that_failed_is_not_tried_again(tmp_path: Path) -> None:
     known = simulation(tmp_path, {"values": [1.25, 0.0], "outcome": "too deep", "curve": {}})
     with pytest.raises(Finger3dError, match=r"material\.E_MPa = 1\.25.*too deep"):
         known.curve([0.7, 0.1])
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        (3, "JSON"),
-        ({**ROW, "values": [1.0]}, "values"),
-        ({**ROW, "outcome": None}, "outcome"),
-        ({**ROW, "curve": {"a": [1.0], "b": [1.0, 2.0]}}, "length"),
-        (ROW, ""),
-    ],
-)
-def test_a_stored_solution_is_checked(row: object, said: str) -> None:
-    assert row_mistake(FREE)(row) == said or (said and said in row_mistake(FREE)(row))
 
 
 def test_names_and_magnitudes() -> None:

@@ -7,8 +7,7 @@ import math
 
 import pytest
 
-from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.task import Evaluation, OptimisationProblem, evaluation_of, row_check, sensitivity
+from finger3d.analyses.optimise.task import Evaluation, evaluation_of, sensitivity
 from tests.sensor_cases import objective_table
 
 MUS = (0.1, 0.5, 1.0)
@@ -22,27 +21,9 @@ def test_sensitivity_is_the_least_slope_in_units_of_noise() -> None:
     assert sensitivity(objective_table([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
 
 
-CHECK = row_check(OptimisationProblem({}, (FreeKey("a", 0.0, 1.0), FreeKey("b", 0.0, 1.0))))
-
-
 def test_an_evaluation_comes_back_from_its_line() -> None:
     row = json.loads('{"values": [0.25, 0.5], "objective": NaN, "outcome": "too deep"}')
-    assert CHECK(row) == ""
     found = evaluation_of(row)
     assert (found.values, found.outcome) == ((0.25, 0.5), "too deep")
     assert math.isnan(found.value)
     assert evaluation_of({**row, "objective": 3.5}) == Evaluation((0.25, 0.5), 3.5, "too deep")
-
-
-@pytest.mark.parametrize(
-    ("row", "said"),
-    [
-        ([1.0], "JSON"),
-        ({"values": [0.5], "objective": 1.0, "outcome": "converged"}, "values"),
-        ({"values": [0.5, "a"], "objective": 1.0, "outcome": "converged"}, "numbers"),
-        ({"values": [0.5, 0.5], "objective": None, "outcome": "converged"}, "numbers"),
-        ({"values": [0.5, 0.5], "objective": 1.0}, "outcome"),
-    ],
-)
-def test_a_line_of_another_kind_is_told(row: object, said: str) -> None:
-    assert said in CHECK(row)

@@ -14,7 +14,16 @@ import pytest
 
 import finger3d
 from finger3d import _machine
-from finger3d._machine import PACKAGES, child_environment, cores, environment_bytes, memory_bytes, versions
+from finger3d._machine import (
+    PACKAGES,
+    child_environment,
+    cores,
+    environment_bytes,
+    made_with,
+    memory_bytes,
+    source_hash,
+    versions,
+)
 
 
 def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None:
@@ -22,6 +31,24 @@ def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None
     assert found["python"] == platform.python_version()
     assert found["numpy"] == metadata.version("numpy")
     assert set(found) <= {"python", *PACKAGES}
+
+
+def test_the_source_of_designs_effects_and_tables_shapes_numbers(tmp_path: Path, monkeypatch) -> None:
+    package = tmp_path / "finger3d"
+    files = [package / "effects" / "own.py", package / "silicones.toml", tmp_path / "geometries" / "own.py"]
+    for file in files:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("1")
+    monkeypatch.setattr(_machine, "__file__", str(package / "_machine.py"))
+    source_hash.cache_clear()
+    found = {made_with()["the source of finger3d and its designs"]}
+    for file in files:
+        file.write_text("2")
+        source_hash.cache_clear()
+        found.add(source_hash())
+    source_hash.cache_clear()
+    assert len(found) == 4
+    assert "matplotlib" not in made_with()
 
 
 def test_a_file_with_two_names_counts_once(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
     assert "kept" in said.lines[-1]
 
 
-def test_the_key_knows_all_that_shapes_the_mesh() -> None:
+def test_the_key_knows_all_that_shapes_the_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     other = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0 + 1e-12)
     finer = MeshOptions(size_mm=4.0, base_size_mm=10.0)
     coarser = MeshOptions(size_mm=5.0, base_size_mm=12.0)
@@ -153,6 +153,15 @@ def test_the_key_knows_all_that_shapes_the_mesh() -> None:
     ]
     assert len(set(keys)) == len(keys)
     assert cache.key(FIG9, OPTIONS, ZONE, ("z", "x")) == keys[0]
+    monkeypatch.setattr(cache, "source_hash", lambda folder: f"other {folder}")
+    assert cache.key(FIG9, OPTIONS, ZONE, BOTH) not in keys
+
+
+def test_designs_typed_at_a_prompt_share_no_mesh() -> None:
+    block = designs()["block"]
+    typed = [type("Own", (block,), {"name": "own", "__module__": "typed at a prompt"}) for _ in range(2)]
+    first, second = (cache.key(own(5.0, 5.0, 5.0), OPTIONS, ZONE, BOTH) for own in typed)
+    assert first != second
 
 
 def test_near_zones_share_a_mesh() -> None:

@@ -12,6 +12,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.objects import MeshObject
 from finger3d.scene import load, parse
+from finger3d.scene.files import contents
 from tests.bodies import box, channel, write_stl
 from tests.scene_tables import scene_with_object
 
@@ -71,3 +72,15 @@ def test_object_scale_changes_the_object(tmp_path: Path) -> None:
     obj = parse(scene_with_object(path, scale=25.4)).object
     assert isinstance(obj, MeshObject)
     assert obj.surface.volume == pytest.approx(0.004 * 25.4**3)
+
+
+def test_the_contents_of_all_files_of_bodies_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "finger.step").write_bytes(b"1")
+    (tmp_path / "coin.stl").write_bytes(b"1")
+    given = {"finger": {"geometry": "finger.step"}, "object": {"shape": "mesh", "path": "coin.stl"}}
+    first = contents(given, tmp_path / "scene.toml")
+    (tmp_path / "coin.stl").write_bytes(b"2")
+    second = contents(given, tmp_path / "scene.toml")
+    assert [*first] == [*second] == [str(tmp_path / "finger.step"), str(tmp_path / "coin.stl")]
+    assert [name for name in first if first[name] != second[name]] == [str(tmp_path / "coin.stl")]
+    assert contents({"finger": {"geometry": "block"}}) == {}

@@ -6,21 +6,20 @@ of a family is meshed for the union of all paths, so that its mesh is graded for
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile
-from pathlib import Path
 from threading import Event
 
+from finger3d._machine import made_with
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.io import checksum
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.parallel import map_parallel
@@ -33,6 +32,7 @@ from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.results.penetration import check_surface
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
+from finger3d.scene.files import contents
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
 """Tables of the scene that do not change the compliance."""
@@ -92,13 +92,7 @@ def body_key(scene: Scene) -> str:
     given = scene.given.get("mesh", {})
     # Default sizes depend on the depth; a family takes the smallest.
     kept["mesh"] = {k: v for k, v in tree["mesh"].items() if k not in _SIZES or k in given}
-    files = [tree["finger"]["geometry"], tree["object"].get("path")]
-    kept["files"] = [_digest(Path(name)) for name in files if name and Path(name).is_file()]
-    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()[:16]
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return checksum({**kept, "files": contents(tree), "made_with": made_with()})
 
 
 def finest(models: Sequence[Model]) -> MeshOptions:

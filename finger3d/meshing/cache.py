@@ -12,15 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from finger3d._machine import source_hash
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.io import atomic, read_arrays
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import content_hash
-
-FORMAT = 1
-"""Version of the stored meshes; a new number makes all cached meshes unused."""
 
 _PACKAGES = {"ftetwild": ("pytetwild", "build123d"), "netgen": ("netgen-mesher", "build123d")}
 
@@ -33,17 +31,16 @@ def folder() -> Path:
 
 
 def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...]) -> str:
-    """Return the SHA-256 of the design and its source file, the sizes, the zone, the symmetry, and the versions."""
+    """Return the SHA-256 of the design, all source that draws and meshes it, sizes, zone, symmetry, and versions."""
     try:
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()
-    except (OSError, TypeError):  # a design typed at a prompt has no file
-        code = ""
+    except (OSError, TypeError):  # a design typed at a prompt has no file: its meshes serve this process only
+        code = f"{id(type(design))} of {os.getpid()}"
     netgen = options.mesher == "netgen"
     text = json.dumps(
         {
-            "format": FORMAT,
             **design.cache_fields,
-            "code": code,
+            "code": [code, source_hash("geometry"), source_hash("meshing")],
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
             **({"grading": options.grading.key} if options.grading else {}),
             "zone": [repr(float(z)) for z in zone],

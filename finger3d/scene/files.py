@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from finger3d._types import Tree, TreeView
 from finger3d.geometry.design import Design
-from finger3d.geometry.files import SUFFIXES
+from finger3d.geometry.files import SUFFIXES, content
 from finger3d.meshing.given.mesh_files import MESH_SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
 from finger3d.scene.tables import FileTable, MeshFileTable, TomlTable
@@ -37,11 +37,23 @@ def absolute(document: TreeView, scene: Path | None) -> Tree:
     """Return the tree with absolute paths of its bodies; those in it are relative to the file of the scene."""
     folder = scene.parent if scene else Path()
     tree = dict(document)
-    for table, key in (("finger", "geometry"), ("object", "path")):
-        old = tree.get(table)
-        if isinstance(old, Mapping) and isinstance(value := old.get(key), str) and (key == "path" or is_file(value)):
-            tree[table] = {**old, key: str((folder / value).resolve())}
+    for table, key, value in _named(document):
+        tree[table] = {**document[table], key: str((folder / value).resolve())}
     return tree
+
+
+def contents(document: TreeView, scene: Path | None = None) -> dict[str, str]:
+    """Return the SHA-256 of each file of a body that a scene names, by its path."""
+    named = absolute(document, scene)
+    return {value: content(Path(value)) for _, _, value in _named(named)}
+
+
+def _named(document: TreeView) -> Iterator[tuple[str, str, str]]:
+    """Yield the table, the key and the path of each file of a body that a scene names."""
+    for table, key in (("finger", "geometry"), ("object", "path")):
+        keys = document.get(table)
+        if isinstance(keys, Mapping) and isinstance(value := keys.get(key), str) and (key == "path" or is_file(value)):
+            yield table, key, value
 
 
 def finger(path: str, table: TomlTable) -> Imported | GivenMesh:

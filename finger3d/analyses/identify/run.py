@@ -34,7 +34,6 @@ from finger3d.analyses.identify.simulated import (
     has_zones,
     largest,
     names_of,
-    row_mistake,
 )
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
@@ -42,7 +41,7 @@ from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, parse, tables_of, tree
+from finger3d.scene import Scene, Source, files, parse, tables_of, tree
 
 DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
 """What the standard deviations of an identification contain."""
@@ -168,12 +167,13 @@ def identify(
         check_rows(fitted_scene(given, keys, values, path).model().legs, keys, data)
     task = {
         "scene": tree.plain(given),
+        "files": files.contents(given, path),
         "free": [[f.key, f.low, f.high] for f in keys],
         "measured": hashlib.sha256(data.path.read_bytes()).hexdigest()[:16],
     }
     with (
         claimed(out, "identify") as folder,
-        opened(folder / "presses.jsonl", folder / "task.json", task, row_mistake(keys)) as journal,
+        opened(folder / "presses.jsonl", folder / "task.json", task) as journal,
     ):
         simulation = Simulation(given, path, keys, journal, has_zones(data.columns))
         found = _fitted(simulation, data, start, report)

@@ -358,23 +358,6 @@ def _beyond(measured: MeasuredPress, offset: float, end: float) -> str:
     )
 
 
-def row_mistake(free: Sequence[FreeKey]) -> Callable[[object], str]:
-    """Return a function that describes the mistake in a stored solution, or returns an empty string."""
-
-    def found(row: object) -> str:
-        if not isinstance(row, dict):
-            return "is no JSON object"
-        values, curve = row.get("values"), row.get("curve")
-        if not isinstance(values, list) or len(values) != len(free) or not all(isinstance(v, float) for v in values):
-            return f"values must be {len(free)} numbers"
-        if not isinstance(row.get("outcome"), str) or not isinstance(curve, dict):
-            return "outcome must be text, and curve a table"
-        lengths = {len(v) if isinstance(v, list) else -1 for v in curve.values()}
-        return "" if len(lengths) <= 1 and -1 not in lengths else "the columns of the curve must be lists of one length"
-
-    return found
-
-
 def largest(curve: Mapping[str, Float]) -> dict[str, float]:
     """Return the largest magnitude of every column."""
     return {name: float(np.abs(v).max(initial=0.0)) for name, v in curve.items()}

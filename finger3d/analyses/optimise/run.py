@@ -16,7 +16,6 @@ from finger3d.analyses.optimise.task import (
     checked_start,
     evaluation_of,
     objective_of,
-    row_check,
 )
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_json
@@ -118,7 +117,7 @@ def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | 
     start = checked_start(problem)
     with (
         claimed(out, "optimise") as folder,
-        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity(), row_check(problem)) as journal,
+        opened(folder / "evaluations.jsonl", folder / "search.json", problem.identity()) as journal,
     ):
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
 from finger3d.errors import Finger3dError
 from finger3d.results.journal import Row, number_in
-from finger3d.scene import Scene, parse, tree
+from finger3d.scene import Scene, files, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN
 
 Objective = Callable[["ObjectiveTable"], float]
@@ -125,6 +125,7 @@ class OptimisationProblem:
         objective = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
         return {
             "scene": tree.plain(self.given),
+            "files": files.contents(self.given, self.path),
             "free": [[f.key, f.low, f.high] for f in self.free],
             "objective": objective,
             "gauge": self.gauge,
@@ -180,22 +181,6 @@ class Evaluation:
     values: tuple[float, ...]
     value: float
     outcome: str
-
-
-def row_check(problem: OptimisationProblem) -> Callable[[object], str]:
-    """Return a function that describes the mistake in a line of evaluations.jsonl, or returns an empty string."""
-
-    def found(row: object) -> str:
-        if not isinstance(row, dict):
-            return "is no JSON object"
-        values = row.get("values")
-        if not isinstance(values, list) or len(values) != len(problem.free):
-            return f"values must be {len(problem.free)} numbers"
-        if not all(isinstance(v, float) for v in (*values, row.get("objective"))):
-            return "values and objective must be numbers"
-        return "" if isinstance(row.get("outcome"), str) else "outcome must be text"
-
-    return found
 
 
 def evaluation_of(row: Row) -> Evaluation:

@@ -154,12 +154,13 @@ class Sweep:
     is_list: bool = False
 
     def identity(self) -> Tree:
-        """Return what identifies the sweep; the hashes of bodies include the contents of files."""
+        """Return what identifies the sweep; the hashes of bodies include the contents of files that vary."""
         return {
             "scene": tree.plain(self.given),
             "vary": {v.key: list(v.texts) for v in self.vary},
             **({"list": True} if self.is_list else {}),
             "points": len(self.points),
+            "files": bodies.contents(self.given),
             "bodies": list(self.bodies),
         }
 

@@ -55,29 +55,10 @@ class ResultStore:
             If the folder cannot be written.
         """
         path, task = self.folder / JOURNAL, self.folder / TASK
-        with claimed(self.folder, "sweep"), opened(path, task, self.sweep.identity(), self._mistake, _difference) as j:
+        with claimed(self.folder, "sweep"), opened(path, task, self.sweep.identity(), _difference) as j:
             self._journal: Journal = j
             self.rows = {_number_of(row): row for row in j.rows}
             yield self
-
-    def _mistake(self, row: object) -> str:
-        """Return why a row of the journal does not belong to this sweep; empty if it does."""
-        if not isinstance(row, dict):
-            return "is no JSON object"
-        number = row.get("point")
-        if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(self.sweep.points):
-            return f"point must be a number from 0 to {len(self.sweep.points) - 1}"
-        if row.get("body") != self.sweep.points[number].body:
-            return f"body is not that of point {number}"
-        if not isinstance(row.get("outcome"), str):
-            return "outcome must be text"
-        for name, value in row.items():
-            if name not in ("point", *_TEXTS) and not _is_number(value):
-                return f"{shown(name)} must be a number"
-        if row["outcome"] == "converged" and not math.isfinite(row.get("normal_force_N", math.nan)):
-            return "normal_force_N must be a finite number"
-        taken = [v.key for v in self.sweep.vary if v.key in row]
-        return f"{taken[0]} is given by the sweep" if taken else ""
 
     def add(self, row: Row) -> None:
         """Keep the row of a finished point.
@@ -94,7 +75,7 @@ class ResultStore:
 
     def reload(self) -> None:
         """Read the rows from the journal: an interruption may fall between writing a row and its entry in `rows`."""
-        self.rows = {_number_of(row): row for row in journal_rows(self._journal.path, self._mistake)}
+        self.rows = {_number_of(row): row for row, _ in journal_rows(self._journal.path, self._journal.task)}
 
     def lose(self, point: Point, reason: str) -> None:
         """Note why a point has no numbers."""
@@ -160,11 +141,6 @@ def _number_of(row: Row) -> int:
     return number
 
 
-def _is_number(value: object) -> bool:
-    """Return whether a value is a number that fits into a double."""
-    return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63)
-
-
 def _alike(values: Sequence[object]) -> Column:
     """Return values of one type, as a column needs them: truth values, numbers as float, all else as text."""
     if all(isinstance(v, bool) for v in values):
@@ -177,8 +153,6 @@ def _alike(values: Sequence[object]) -> Column:
 
 def _difference(found: Mapping[str, object], wanted: Mapping[str, object]) -> str:
     """Return in a few words how two sweeps differ."""
-    if found.get("finger3d") != wanted["finger3d"]:
-        return f"made by finger3d {found.get('finger3d', 'of another kind')}"
     was, now = found.get("vary"), wanted["vary"]
     if not isinstance(was, dict) or not isinstance(now, dict):
         return f"{TASK} is damaged"

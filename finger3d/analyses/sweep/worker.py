@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult
+from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult, body_key
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.columns import by_key
@@ -36,6 +36,11 @@ def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
     with threadpool_limits(limits=1):
         if spec not in _body:
             _body.clear()
+            if body_key(parse(spec.given)) != spec.key:
+                raise Finger3dError(
+                    "a file of a body, a package or the source of finger3d is not the one that the sweep was started "
+                    "with; the same command tries it again"
+                )
             try:
                 _body[spec] = _build(spec)
             except TROUBLE as error:
