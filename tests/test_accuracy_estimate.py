@@ -162,7 +162,7 @@ def test_displacements_of_a_marker_grid_have_bars_of_their_own(force: float | No
     assert set(errors) == set(told)
     assert found.discretisation == estimate(problem, frames, numbers=press_numbers).discretisation
     fine, last = pressed(0.05)
-    truth = by_key(MarkerGrid.at(fine, grid.places).readings(fine, last[-1]))
+    truth = by_key(MarkerGrid.at(fine, grid.markers).readings(fine, last[-1]))
     within = [abs(value - truth[name]) <= 2.0 * errors[name] for name, value in told.items()]
     assert np.mean(within) >= 0.9
     assert max(errors.values()) <= 0.03  # of a depth of 1 mm

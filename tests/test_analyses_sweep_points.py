@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -185,3 +186,21 @@ def test_every_marker_of_a_grid_is_a_column(tmp_path: Path) -> None:
         for axis in "xyz":
             own = swept.columns[f"marker_{marker['marker']}_{axis}_mm"][0]
             assert own == pytest.approx(marker[f"displacement_{axis}_mm"], rel=1e-9, abs=1e-12)
+    with (tmp_path / "out" / "marker_grid.csv").open(newline="") as file:
+        places = {row["marker"]: [float(row[f"{axis}_mm"]) for axis in "xyz"] for row in csv.DictReader(file)}
+    assert places == {m["marker"]: [m["x_mm"], m["y_mm"], m["z_mm"]] for _, m in last.iterrows()}
+
+
+def test_a_dot_has_one_name_whatever_the_size_of_the_finger(tmp_path: Path) -> None:
+    """Places are multiples of the spacing on a section whose half length is its radius."""
+    path = written(tmp_path, HALF_CYLINDER + "[marker_grid]\nspacing_mm = 2.0\n")
+    sweep = combinations(path, ["gauge.0.y_mm=3.0"], ["finger.radius_mm=4,6", "marker_grid.spacing_mm=2,3"])
+    grids = [{m.name: m.x_mm for m in sweep.bodies[point.body].grid} for point in sweep.points]
+    assert [[*grid.values()] for grid in grids] == [
+        [-4.0, -2.0, 0.0, 2.0, 4.0],
+        [-3.0, 0.0, 3.0],
+        [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0],
+        [-6.0, -3.0, 0.0, 3.0, 6.0],
+    ]
+    assert len({(name, x) for grid in grids for name, x in grid.items()}) == 9  # names, and places
+    assert len({name for grid in grids for name in grid}) == 9

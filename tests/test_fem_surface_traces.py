@@ -51,7 +51,7 @@ def test_fields_are_read_over_the_points_though_meshes_do_not_match(dim: int) ->
     below, above = faced(dim)
     assert (signed_volumes(above) > 0.0).all()
     face = surface(below, "contact")
-    values, there = values_over(above, "contact", face.samples)
+    values, there = values_over(above, above.facets["contact"], face.samples)
     assert there.all()
     across = [0] if dim == 2 else [0, 2]
     # the place itself, curved facets included, and a linear field

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import MeshOptions
-from finger3d.mechanics.readings.marker_grid import MarkerGrid, marker_table
+from finger3d.mechanics.readings.marker_grid import MarkerGrid, grid_markers, marker_table
 from finger3d.mechanics.readings.reading import Marker
+from finger3d.meshing.generate import mesh_solid
 from tests.models import block
 
 COARSE = MeshOptions(1.5, 1.5, "swept")
@@ -45,8 +50,22 @@ def test_the_table_has_every_marker_after_every_increment() -> None:
     assert marker_table(problem, steps, None)["marker"] == ["m"] * len(steps)
 
 
-def test_places_beside_the_contact_face_have_no_displacement() -> None:
+def test_a_marker_beside_the_facets_of_a_rim_is_read_at_the_nearest() -> None:
     problem = build(block(mesh=COARSE))
-    there = MarkerGrid.at(problem, np.array([[-3.0, 0.0, 1.0], [5.0, 0.0, 0.0]])).displacements(problem.mesh.points)
-    assert there[0] == pytest.approx([-3.0, 3.0, 1.0], abs=1e-12)
-    assert np.isnan(there[1]).all()
+    markers = [Marker("a", -3.0, 3.0, 1.0), Marker("b", 4.01, 3.0, -0.5), Marker("c", 0.3, 3.0, 0.2)]
+    there = MarkerGrid.at(problem, markers).displacements(problem.mesh.points)
+    assert there == pytest.approx(np.array([[-3.0, 3.0, 1.0], [4.0, 3.0, -0.5], [0.3, 3.0, 0.2]]), abs=1e-7)
+
+
+def test_the_grid_follows_the_shape_whatever_the_mesh() -> None:
+    """A round rim: chords of a coarse mesh leave out dots that those of a fine one cover."""
+    design = designs()["hemisphere"](radius_mm=5.0)
+    wanted = {(x, z) for x in range(-5, 6) for z in range(-5, 6) if x * x + z * z <= 25}
+    markers = grid_markers(design, 1.0, 3)
+    assert [(m.x_mm, m.z_mm) for m in markers] == sorted(wanted)
+    assert [m.y_mm for m in markers] == pytest.approx([math.sqrt(25.0 - x * x - z * z) for x, z in sorted(wanted)])
+    for size in (1.5, 3.0):
+        mesh = mesh_solid(design, MeshOptions(size, 3.0), (-1.0, 1.0, -1.0, 1.0))[0]
+        there = MarkerGrid.at(SimpleNamespace(mesh=mesh, dim=3, axes=()), markers).displacements(mesh.points)
+        # steep at the rim, where a chord of 3 mm is .23 mm inside the circle
+        assert np.abs(there - MarkerGrid(markers, *[None] * 2).places)[:, ::2].max() < 0.25

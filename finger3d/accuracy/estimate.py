@@ -180,7 +180,7 @@ def estimate_with_grid(
     """
 
     def moved(p: Problem, step: StepResult) -> dict[str, float]:
-        return by_key(MarkerGrid.at(p, grid.places).readings(p, step))
+        return by_key(MarkerGrid.at(p, grid.markers).readings(p, step))
 
     def both(p: Problem, step: StepResult) -> dict[str, float]:
         return press_numbers(p, step) | moved(p, step)

@@ -28,6 +28,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.marker_grid import MarkerGrid
+from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.mechanics.results.penetration import check_surface
 from finger3d.progress import QUIET, Progress
@@ -109,7 +110,7 @@ class SharedBody(PressedBody):
     model : any model of the family, with the mesh that all share
     variants : all variants that will be pressed
     report : receives the messages
-    grid_mm : spacing of a grid of markers, whose displacements are among the numbers; None without one
+    grid : markers of a grid, whose displacements are among the numbers
 
     Attributes
     ----------
@@ -122,7 +123,7 @@ class SharedBody(PressedBody):
         model: Model,
         variants: Sequence[Variant],
         report: Progress = QUIET,
-        grid_mm: float | None = None,
+        grid: Sequence[Marker] = (),
     ) -> None:
         gauges = model.gauges
         if model.inclusions is None:
@@ -130,7 +131,7 @@ class SharedBody(PressedBody):
             places = dict.fromkeys(replace(g, name="") for v in variants for g in v.gauges)
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
-        self._gauges_are_inclusions, self._grid_mm = model.inclusions is not None, grid_mm
+        self._gauges_are_inclusions, self._grid = model.inclusions is not None, grid
         super().__init__(replace(model, legs=shared_legs(variants), gauges=gauges), report)
         self._results: dict[Variant, VariantResult | Exception] = {}
 
@@ -164,7 +165,7 @@ class SharedBody(PressedBody):
             press = variant.without_gauges()
             while press not in self._results:
                 done, run = next(runs)
-                self._results[done] = run.result(self._grid_mm)
+                self._results[done] = run.result(self._grid)
             result = self._results[press]
             if isinstance(result, VariantResult):
                 seconds = result.seconds if press in unpaid else 0.0
@@ -233,7 +234,7 @@ class _Run:
         seconds = self.seconds + time.perf_counter() - start
         return replace(self, frames=(*self.frames[:-1], last), seconds=seconds), check.within_candidates
 
-    def result(self, grid_mm: float | None) -> VariantResult | Exception:
+    def result(self, grid: Sequence[Marker]) -> VariantResult | Exception:
         """Return the quantities of the last step, those of a grid of markers included."""
         if isinstance(self.frames, Exception):
             return self.frames
@@ -247,8 +248,8 @@ class _Run:
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
         readings = last.readings
-        if grid_mm is not None:
-            readings = readings | MarkerGrid.of(self.problem, grid_mm).readings(self.problem, last)
+        if grid:
+            readings = readings | MarkerGrid.at(self.problem, grid).readings(self.problem, last)
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), self.seconds)
 
 

@@ -16,6 +16,8 @@ from finger3d._types import Tree, TreeView
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
+from finger3d.mechanics.readings.marker_grid import grid_markers
+from finger3d.mechanics.readings.reading import Marker
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
 from finger3d.scene.messages import listed, nearest, shown
@@ -127,12 +129,14 @@ class BodySpec:
     variants : of all its points, also of those that are finished: the mesh is graded for the union of their paths
     mesh : with the smallest sizes of the points
     given : the scene of one of the points
+    grid : markers of its grid
     """
 
     key: str
     variants: tuple[Variant, ...]
     mesh: MeshOptions
     given: TreeView = field(compare=False, repr=False)
+    grid: tuple[Marker, ...] = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -237,16 +241,35 @@ def _checked(
         members.setdefault(body, []).append((scene, variant))
         named = {v.key: value for v, value in zip(vary, here, strict=True)}
         points.append(Point(number, named, body, variant))
+    grids = _grids({key: of[0][0] for key, of in members.items()})
     shared = {
         key: BodySpec(
             key=key,
             variants=tuple(variant for _, variant in of),
             mesh=finest([scene.model() for scene, _ in of]),
             given=of[0][0].given,
+            grid=grids[key],
         )
         for key, of in members.items()
     }
     return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)
+
+
+def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
+    """Return the markers of the grid of each body; bodies of different shape have one name for one place x, z."""
+    own = {
+        key: grid_markers(scene.design, table.spacing_mm, 3 if scene.domain == "solid" else 2)
+        if (table := scene.tables.marker_grid)
+        else ()
+        for key, scene in scenes.items()
+    }
+    places = sorted({_across(marker) for markers in own.values() for marker in markers})
+    names = {place: f"grid_{k}" for k, place in enumerate(places, start=1)}
+    return {key: tuple(replace(m, name=names[_across(m)]) for m in markers) for key, markers in own.items()}
+
+
+def _across(marker: Marker) -> tuple[float, float]:
+    return round(marker.x_mm, 9), round(marker.z_mm, 9)
 
 
 SAMPLERS = ("lhs", "random")

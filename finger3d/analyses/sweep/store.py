@@ -20,7 +20,7 @@ from finger3d.results.summary import PressStep
 from finger3d.scene.messages import shown
 
 JOURNAL, TASK = "points.jsonl", "sweep.json"
-CSV, PARQUET = "results.csv", "results.parquet"
+CSV, PARQUET, GRID = "results.csv", "results.parquet", "marker_grid.csv"
 _TEXTS = ("body", "outcome")
 _LAST = ("outcome", "residual", "seconds", "build_seconds", "body")
 
@@ -86,7 +86,7 @@ class ResultStore:
         return [point for point in self.sweep.points if point.number not in self.rows]
 
     def write(self) -> None:
-        """Write results.csv, and results.parquet if pyarrow is installed.
+        """Write results.csv, the places of a grid of markers, and results.parquet if pyarrow is installed.
 
         Raises
         ------
@@ -98,6 +98,11 @@ class ResultStore:
             return
         with self.room(CSV):
             write_csv(self.folder / CSV, columns)
+        if grid := [(key, marker) for key, spec in self.sweep.bodies.items() for marker in spec.grid]:
+            places = {axis: [getattr(marker, axis) for _, marker in grid] for axis in ("x_mm", "y_mm", "z_mm")}
+            with self.room(GRID):
+                names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
+                write_csv(self.folder / GRID, {**names, **places})
         if _extras.available("pyarrow"):
             import pyarrow as pa
             import pyarrow.parquet as pq

@@ -49,10 +49,8 @@ def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
 
 
 def _build(spec: BodySpec) -> SharedBody:
-    scene = parse(spec.given)
-    grid = scene.tables.marker_grid
-    model = replace(scene.model(), mesh=spec.mesh)
-    return SharedBody(model, spec.variants, grid_mm=grid.spacing_mm if grid else None)
+    model = replace(parse(spec.given).model(), mesh=spec.mesh)
+    return SharedBody(model, spec.variants, grid=spec.grid)
 
 
 def _pressed(body: SharedBody, points: Sequence[Point], threads: int | None) -> Iterator[Row]:

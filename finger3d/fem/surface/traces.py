@@ -256,18 +256,17 @@ def facing_trace(surface: BoundarySurface, mesh: Mesh, label: str) -> sp.csr_mat
     The weights are those of the trace of the surface, so that the forces on its points are preserved: every row sums to
     1, or to 0 where less than half of the hat function of the point has facets above it.
     """
-    values, there = values_over(mesh, label, surface.samples)
+    values, there = values_over(mesh, mesh.facets[label], surface.samples)
     coverage = np.asarray(surface.average @ there.astype(float))
     scale = np.where(coverage >= _LEAST_HAT_COVERAGE, 1.0 / np.maximum(coverage, _LEAST_HAT_COVERAGE), 0.0)
     return sp.csr_matrix(sp.diags_array(scale) @ surface.average @ values)
 
 
-def values_over(mesh: Mesh, label: str, places: Float, lowest: bool = True) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+def values_over(mesh: Mesh, facets: Int, places: Float, lowest: bool = True) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
     """Return rows (q, n) that interpolate a field on facets above points (q, d), and where there are any.
 
     Of several facets above a point it is the lowest that faces down, or the highest that faces up.
     """
-    facets = mesh.facets[label]
     d = mesh.dim
     across = [0] if d == 2 else [0, 2]
     face, bary = (

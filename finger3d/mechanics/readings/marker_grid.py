@@ -10,13 +10,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Tree
-from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.mesh.simplex import FREE_FACES, axis_numbers
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import values_over
+from finger3d.geometry.design import Design
+from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column, displacement_columns
+from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.results.history import StepResult
+from finger3d.meshing.given.given import GivenMesh
 from finger3d.objects import ObjectPose
 
 _POSE: dict[str, Callable[[ObjectPose], float]] = {
@@ -29,6 +33,25 @@ _POSE: dict[str, Callable[[ObjectPose], float]] = {
 }
 """Columns of the pose of the object, as in history.csv."""
 
+_INWARD = 1e-9
+"""Share of the way to the middle of a facet by which a point on its border is moved: its line then meets the facet."""
+
+
+def grid_markers(design: Design, spacing_mm: float, dim: int) -> tuple[Marker, ...]:
+    """Return markers every `spacing_mm` along x and z, with one in the middle, as far as the contact face goes.
+
+    Their number, order and places follow from the shape of the finger alone, whatever the mesh.
+    """
+    x, z = (np.arange(-(half // spacing_mm), half // spacing_mm + 1.0) * spacing_mm
+            for half in (design.half_length_mm, design.width_mm / 2.0))  # fmt: skip
+    z = z if dim == 3 else np.zeros(1)
+    x, z = x.repeat(len(z)), np.tile(z, len(x))
+    places = np.stack([x, design.top(x, z), z], axis=1)
+    there = np.isfinite(places[:, 1])
+    if isinstance(design, GivenMesh):
+        there &= values_over(design.mesh, design.mesh.facets["contact"], places, lowest=False)[1]
+    return tuple(Marker(f"grid_{k}", *place) for k, place in enumerate(places[there].tolist(), start=1))
+
 
 @dataclass(frozen=True)
 class MarkerGrid:
@@ -36,42 +59,44 @@ class MarkerGrid:
 
     Attributes
     ----------
-    places : (k, d) mm, at rest
+    markers : k of them
     rows : (k, n) sparse
         Interpolation from the nodes of the meshed part.
-    sign : (k, d) factor of the components of a displacement, -1 in a mirror image, NaN beside the contact face
+    sign : (k, d) factor of the components of a displacement, -1 in a mirror image
     """
 
-    places: Float
+    markers: tuple[Marker, ...]
     rows: sp.csr_matrix
     sign: Float
 
     @classmethod
     def of(cls, problem: Problem, spacing_mm: float) -> MarkerGrid:
-        """Return markers every `spacing_mm` along x and z, with one in the middle, as far as the contact face goes."""
-        design, d = problem.model.design, problem.dim
-        x, z = (np.arange(-(half // spacing_mm), half // spacing_mm + 1.0) * spacing_mm
-                for half in (design.half_length_mm, design.width_mm / 2.0))  # fmt: skip
-        z = z if d == 3 else np.zeros(1)
-        places = np.zeros((len(x) * len(z), d))
-        places[:, 0] = x.repeat(len(z))
-        places[:, 2:] = np.tile(z, len(x))[:, None]
-        grid = cls.at(problem, places)
-        there = ~np.isnan(grid.sign[:, 0])
-        return cls(grid.places[there], grid.rows[there], grid.sign[there])
+        """Return the markers of `grid_markers`."""
+        return cls.at(problem, grid_markers(problem.model.design, spacing_mm, problem.dim))
 
     @classmethod
-    def at(cls, problem: Problem, places: Float) -> MarkerGrid:
-        """Return markers at the x and z of places (k, d) on any mesh of the finger."""
-        mesh, sign = problem.mesh, np.ones_like(places)
+    def at(cls, problem: Problem, markers: Sequence[Marker]) -> MarkerGrid:
+        """Return markers on any mesh of the finger; one beside the facets of a curved rim is read at the nearest."""
+        mesh, places = problem.mesh, np.array([m.place[: problem.dim] for m in markers])
+        sign = np.ones_like(places)
         for k in axis_numbers(problem.axes):
             sign[places[:, k] < 0.0, k] = -1.0
-        below = places * sign
-        below[:, 1] = mesh.points[:, 1].min() - 1.0
-        rows, there = values_over(mesh, "contact", below, lowest=False)
-        at = places.copy()
-        at[:, 1] = rows @ mesh.points[:, 1]
-        return cls(at, rows, np.where(there[:, None], sign, np.nan))
+        places *= sign
+        facets = mesh.facets["contact"]
+        if problem.dim == 3:
+            facets = np.vstack([mesh.facets[label] for label in FREE_FACES if label in mesh.facets])
+        rows, there = values_over(mesh, facets, places, lowest=False)
+        if not there.all():
+            surface = Triangles(mesh.points, facets[:, :3])
+            nearest, face, _ = surface.closest(places[~there])
+            places[~there] = nearest + _INWARD * (surface.corners[face].mean(axis=1) - nearest)
+            rows, _ = values_over(mesh, facets, places, lowest=False)
+        return cls(tuple(markers), rows, sign)
+
+    @property
+    def places(self) -> Float:
+        """Places (k, 3) mm, at rest."""
+        return np.array([m.place for m in self.markers])
 
     def displacements(self, u: Float) -> Float:
         """Return the displacements (k, d) of the markers from those (n, d) of the part's nodes."""
@@ -81,7 +106,7 @@ class MarkerGrid:
         """Return the displacements after an increment of a problem, as those of other markers."""
         (unknowns,) = formulation_of(problem.model).unknowns(problem, [step.meshed_state])
         moved = self.displacements(displacement(problem.mesh, unknowns))
-        columns = (column for k in range(len(moved)) for column in displacement_columns(f"grid_{k + 1}", problem.dim))
+        columns = (column for marker in self.markers for column in marker.columns(problem.dim))
         return dict(zip(columns, map(float, moved.ravel()), strict=True))
 
 
@@ -96,24 +121,22 @@ def marker_table(
     errors : of the displacements after the last increment, by the keys of their columns, mm
     """
     named = problem.model.markers
-    positions = [m.place[: problem.dim] for m in named] + ([] if grid is None else list(grid.places))
-    count = len(positions) - len(named)
+    markers = [*named, *(grid.markers if grid else ())]
     moved = [np.array([step.markers[m.name] for m in named]).reshape(-1, problem.dim) for step in steps]
     if grid is not None:
         unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps])
         fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
     columns: Tree = {
-        "step": np.repeat(np.arange(1, len(steps) + 1), len(positions)),
-        **{key: np.repeat([value(step.target) for step in steps], len(positions)) for key, value in _POSE.items()},
-        "marker": [*(m.name for m in named), *(f"grid_{k + 1}" for k in range(count))] * len(steps),
+        "step": np.repeat(np.arange(1, len(steps) + 1), len(markers)),
+        **{key: np.repeat([value(step.target) for step in steps], len(markers)) for key, value in _POSE.items()},
+        "marker": [m.name for m in markers] * len(steps),
     }
-    places, displacements = np.tile(_in_space(np.array(positions)), (len(steps), 1)), _in_space(np.vstack(moved))
+    places, displacements = np.tile([m.place for m in markers], (len(steps), 1)), _in_space(np.vstack(moved))
     columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
-    known = np.full((len(steps), len(positions), 3), np.nan)
-    last, errors = columns["marker"][: len(positions)], errors or {}
-    known[-1] = [[errors.get(c.key, np.nan) for c in displacement_columns(name)] for name in last]
+    known = np.full((len(steps), len(markers), 3), np.nan)
+    known[-1] = [[(errors or {}).get(c.key, np.nan) for c in displacement_columns(m.name)] for m in markers]
     return columns | {f"error_{axis}_mm": known[..., k].ravel() for k, axis in enumerate("xyz")}
 
 
