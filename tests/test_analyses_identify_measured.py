@@ -28,9 +28,9 @@ def scene_file(tmp_path: Path) -> Path:
         ("depth_mm\n1\n2\n", "measured"),
         ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force": .*"normal_force_N"'),
         ("depth_mm,force_N\n1,2\n2,3\n", 'column "force_N": did you mean "normal_force_N"[?]'),
-        ("depth_mm,iterations\n1,2\n2,3\n", 'column "iterations": it is none of'),
+        ("depth_mm,stick_ratio_area\n1,2\n2,3\n", 'column "stick_ratio_area": it is none of'),
         ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,1e-160\n", "line 3: gauge_a_std = 1e-160: must be from 1e-12"),
-        ("depth_mm,gauge_a_std\n1,2\n2,3\n", 'column "gauge_a_std" .*"gauge_a"'),
+        ("depth_mm,force_z_N,gauge_a_std\n1,2,3\n2,3,4\n", 'column "gauge_a_std" .*"gauge_a"'),
         ("depth_mm,gauge_a,gauge_a\n1,2,3\n2,3,4\n", '"gauge_a"'),
         ("depth_mm,gauge_a\n1,2\n2,\n", "line 3: gauge_a"),
         ("depth_mm,gauge_a\n1,2\n2,much\n", "line 3: gauge_a = 'much'"),
@@ -40,6 +40,7 @@ def scene_file(tmp_path: Path) -> Path:
         ("depth_mm,gauge_a\n1,2\n", "1 .*2"),
         ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,0\n", "line 3: gauge_a_std = 0: "),
         ("", "depth_mm"),
+        ("slide_x_mm,gauge_a\n0,2\n3,3\n2,4\n", "line 4: slide_x_mm = 2: .*time_s or step"),
     ],
 )
 def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
@@ -52,11 +53,18 @@ def test_files_that_are_refused(tmp_path: Path, text: str, told: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["depth_mm;gauge_a\n0,5;1,25e-3\n1;2,5e-3\n", "depth_mm\tgauge_a\n0,5\t1,25e-3\n1\t2,5e-3\n"]
+    ("text", "index", "at", "columns"),
+    [
+        ("step,time_s,depth_mm,gauge_a\n1,0,1,5\n2,0,2,6\n", "step", [1, 2], {"depth_mm", "gauge_a"}),
+        ("time_s,depth_mm,gauge_a\n0,1,5\n0,2,6\n", "depth_mm", [1, 2], {"gauge_a"}),
+        ("depth_mm,slide_x_mm,gauge_a\n3,0,5\n3,-1,6\n", "slide_x_mm", [0, -1], {"depth_mm", "gauge_a"}),
+        ("slide_z_mm;gauge_a;method;outcome\n0;5;newton;converged\n1;6;;\n", "slide_z_mm", [0, 1], {"gauge_a"}),
+    ],
 )
-def test_semicolons_and_tabs_come_with_decimal_commas(tmp_path: Path, text: str) -> None:
+def test_the_first_column_that_changes_in_one_direction_locates_the_rows(
+    tmp_path: Path, text: str, index: str, at: list[float], columns: set[str]
+) -> None:
     path = tmp_path / "bench.csv"
     path.write_text(text)
-    found = read_measured(path, KNOWN)
-    assert found.at.tolist() == [0.5, 1.0]
-    assert found.columns["gauge_a"].tolist() == [1.25e-3, 2.5e-3]
+    found = read_measured(path, (*KNOWN, "depth_mm"))
+    assert (found.index, found.at.tolist(), set(found.columns)) == (index, at, columns)

@@ -15,7 +15,7 @@ import pytest
 import finger3d
 from finger3d.analyses.identify.fit import FittedValues
 from finger3d.analyses.pressed_body import PressedBody
-from finger3d.errors import MissingError
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
@@ -133,6 +133,23 @@ def test_the_depth_is_fitted_under_a_prescribed_force(tmp_path: Path, scene_file
     found = finger3d.identify(scene_file, measured, {"material.E_MPa": (0.3, 2.0)}, tmp_path / "out")
     assert found.presses > 3  # under a force everything depends on the modulus
     assert found.fitted.values[0] == pytest.approx(0.8, rel=5e-3)
+
+
+def test_the_curves_of_a_press_that_slides_give_its_friction_back(tmp_path: Path) -> None:
+    legs = [{"depth_mm": 3.0, "steps": 2}, {"depth_mm": 3.0, "slide_x_mm": -2.0, "steps": 4}]
+    path = written(tmp_path, scene(press={"leg": legs}, friction={"mu": 0.3}).to_toml())
+    history = finger3d.press(path).to_dataframe()
+    for name, index, rows in (
+        ("all", "step", history),
+        ("slide", "slide_x_mm", history[["slide_x_mm", "normal_force_N", "tangential_force_x_N"]][2:]),
+    ):
+        rows.to_csv(tmp_path / f"{name}.csv", index=False)
+        found = finger3d.identify(path, tmp_path / f"{name}.csv", {"friction.mu": (0.1, 1.0)}, tmp_path / name)
+        assert found.measured.index == index
+        assert found.fitted.values[0] == pytest.approx(0.3, abs=1e-3)  # ten times the convergence of the fit
+    (tmp_path / "far.csv").write_text("slide_x_mm,normal_force_N\n-1,5\n-3,5\n")
+    with pytest.raises(Finger3dError, match="line 3: slide_x_mm = -3: the path of the scene ends at -2"):
+        finger3d.identify(path, tmp_path / "far.csv", {"friction.mu": (0.1, 1.0)}, tmp_path / "far")
 
 
 def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> None:

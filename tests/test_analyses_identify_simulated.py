@@ -29,7 +29,7 @@ def simulation(path: Path, *rows: dict) -> Simulation:
 
 def measured(at: list[float], path: str = "bench.csv") -> MeasuredPress:
     columns = {name: np.zeros(len(at)) for name in ("normal_force_N", "gauge_g36")}
-    return MeasuredPress(Path(path), "depth_mm", np.array(at), columns, {})
+    return MeasuredPress(Path(path), "depth_mm", np.array(at), columns, {}, tuple(range(2, 2 + len(at))))
 
 
 def test_forces_scale_with_the_modulus_and_strains_do_not(tmp_path: Path) -> None:

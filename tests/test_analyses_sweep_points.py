@@ -101,22 +101,25 @@ def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_pa
         {"friction.mu": 0.2, "material.nu": 0.45},
     ]
     assert len(sweep.bodies) == 2
+    path.write_text("Operator;Max\nfriction.mu;material.nu\n0,3;0,45\n0,1;0,49\n0,2;0,45\n", encoding="utf-16")
+    assert listed_points(paper_scene, SETS, rows_of(path), "--points").points == sweep.points
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "first line"),
-        ("friction.mu,\n0.1,2\n", "first line"),
+        ("", "line of names"),
+        ("friction.mu,,material.nu\n0.1,2,3\n", "line of names"),
+        ("friction.mu,\n0.1,2\n", "line 2: has 2 cells"),
         ("friction.mu\n", "no row"),
-        ("friction.mu,friction.mu\n0.1,0.2\n", "twice"),
+        ("friction.mu,friction.mu\n0.1,0.2\n", 'two columns are called "friction.mu"'),
         ("friction.mu,material.nu\n0.1,0.3\n0.2\n", "line 3"),
         ("friction.mu,material.nu\n0.1,\n", "line 2"),
         ("friction.mu\n0.1\n-2\n", "friction.mu = -2"),
         ("frictoin.mu\n0.1\n", "friction"),
         ("gauge.g36.x_mm,gauge.0.x_mm\n1,2\n", "given twice"),
-        (b"friction.mu\n\xff\n", "cannot be read"),
-        (None, "cannot be read"),
+        (b"friction.mu\n\0\n", "zero bytes"),
+        (None, "there is no such file"),
     ],
 )
 def test_a_bad_table_is_refused_in_one_line(text, expected, paper_scene, tmp_path, capsys) -> None:
@@ -125,7 +128,7 @@ def test_a_bad_table_is_refused_in_one_line(text, expected, paper_scene, tmp_pat
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
     assert main(["sweep", str(paper_scene), "--points", str(path), "--out", str(tmp_path / "out")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "--points" in line
+    assert "points" in line
     assert expected in line
     assert not (tmp_path / "out").exists()
 

@@ -38,7 +38,9 @@ def test_many_readings_from_a_csv(tmp_path: Path, capsys: Any) -> None:
     ("text", "options", "told"),
     [
         ("strain\n0.01\nabc\n", [], "line 3: strain = 'abc'"),
-        ("strain\n0.01\nnan\n", [], "g = nan (reading 2 of 2)"),
+        ("strain\n0.01\nnan\n", [], "line 3: strain = 'nan': must be a finite number"),
+        ("strain\n1,25,7\n", [], "line 2: strain = '1,25,7': must be a finite number; it has more cells than names"),
+        ("time,strain\n0,0,061\n", [], "line 2: has 3 cells, and there are 2 columns"),
         ("x\n1\n", [], "a column named g or strain "),
         ("", [], "reading"),
         ("strain,std\n0.01,-1\n", [], "std of g = -1.0"),
@@ -52,6 +54,19 @@ def test_mistakes_in_readings(text: str, options: list[str], told: str, tmp_path
     err = capsys.readouterr().err
     assert told in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_read_from_files_and_streams(separator: str, tmp_path: Path, capsys: Any) -> None:
+    kept, path = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    text = f"# bench\nOperator{separator}Max\nstrain;std\n{straight(0.3):.6f};0,00001\n"
+    path.write_text(text.replace(".", ",").replace(";", separator))
+    assert run("estimate", kept, "--csv", path) == 0
+    said = capsys.readouterr().out
+    (row,) = csv.DictReader(io.StringIO(said))
+    assert float(row["mu"]) == pytest.approx(0.3, abs=2e-3)
+    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE)
+    assert child.communicate(path.read_text())[0] == said
 
 
 @pytest.mark.parametrize("options", [["--strain", "1e300"], ["--strain", "0.01", "--std", "1e300"]])
@@ -163,8 +178,9 @@ def test_lines_that_are_no_readings_are_answered_and_the_stream_goes_on(tmp_path
     kept = save(curve(straight), tmp_path / "calibration.json")
     child = follow(kept, "--follow", "-", stdin=subprocess.PIPE, text=False)
     good, long = repr(straight(0.3)).encode(), b"1" * 200_000
-    bad = {b"abc": "line 2: strain = 'abc'", b"nan,1e-5": "g = nan: ", b"\xff": "strain = '\ufffd'",
-           long: "line 5: strain = ''", b'"0.1': "", good + b",-1": "std of g = -1.0"}  # fmt: skip
+    bad = {b"abc,1": "line 2: strain = 'abc'", b"nan,1e-5": "line 3: strain = 'nan'", b"\xff": "line 4: has 1 cells",
+           long: "line 5: field larger than", b'"0.1': "line 6: unexpected end", good + b",-1": "std of g = -1.0",
+           b"\0\0": "zero bytes"}  # fmt: skip
     text = b"\xef\xbb\xbfstrain,std\n" + b"".join(line + b"\n" for line in bad) + good + b",1e-5\n"
     out, error = child.communicate(text)
     assert (child.returncode, error) == (0, b"")

@@ -224,7 +224,8 @@ def _markers(record: PressRecord) -> Tree | None:
 
 def history_table(steps: Sequence[StepResult], entries: Iterable[TreeView]) -> dict[str, ArrayLike]:
     """Return the columns of history.csv from the entries of the steps in summary.json; none without steps."""
-    rows = [row_of_entry(entry, step) for step, entry in zip(steps, entries, strict=True)]
+    pairs = enumerate(zip(steps, entries, strict=True), start=1)
+    rows = [{"step": number} | row_of_entry(entry, step) for number, (step, entry) in pairs]
     return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import sys
@@ -15,17 +14,17 @@ from typing import IO, TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, app, print_json
+from finger3d.csv_table import CsvTable, decoded, is_row, read_table, with_names
 from finger3d.errors import Finger3dError
 
 if TYPE_CHECKING:
-    from finger3d._types import Tree
+    from numpy.typing import ArrayLike
+
+    from finger3d._types import Float, Tree
     from finger3d.sensor import Calibration, Estimate
 
 _POLL_S = 0.02
 """Time between two looks at a file that is followed."""
-
-_LONGEST_LINE = 65536
-"""Characters of a line of a stream beyond which it is no line of readings."""
 
 _COLUMNS = ("mu", "std", "low", "high", "status", "chi_square", "p_value", "verdict")
 """Columns of an estimate that follow those of its readings."""
@@ -114,9 +113,11 @@ def estimate(
 
 def _estimate_file(job: _Job, path: Path, out: Path | None, json_: bool) -> None:
     """Write or print an estimate for each line of a CSV file."""
-    values, stds = _readings(job, path)
+    table = read_table(path, job.is_column)
+    job.check_columns(table)
+    readings, stds = job.readings_in(table)
     try:
-        every = job.estimates(values, stds)
+        every = job.estimates(readings, stds)
     except Finger3dError as error:
         raise Finger3dError(f"{path}: {error}") from None
     if json_:
@@ -186,9 +187,7 @@ class _Job:
             f"{option} {self.names[0]}={text}"
         )
 
-    def estimates(
-        self, values: Mapping[str, Sequence[float] | float], stds: Mapping[str, Sequence[float] | float]
-    ) -> Sequence[Estimate]:
+    def estimates(self, values: Mapping[str, ArrayLike], stds: Mapping[str, ArrayLike]) -> Sequence[Estimate]:
         """Return an estimate for each set of readings."""
         from finger3d.sensor import estimate as run
 
@@ -203,21 +202,39 @@ class _Job:
         """Return the cells of an estimate."""
         return [*estimate.readings.values(), *(getattr(estimate, name) for name in _COLUMNS)]
 
-    def columns_of(self, source: Path | str, names: Sequence[str]) -> dict[str, str]:
-        """Return the columns of a file for ``NAME`` and ``NAME_std``; a missing column of readings is an error."""
-        columns = {name: name for one in self.names for name in (one, f"{one}_std") if name in names}
-        if len(self.names) == 1:  # a single reading may be called strain
-            short = {self.names[0]: "strain", f"{self.names[0]}_std": "std"}
-            columns = {name: column for name, column in short.items() if column in names} | columns
-        missing = [name for name in self.names if name not in columns]
-        missing = [f"{missing[0]} or strain"] if missing and len(self.names) == 1 else missing
-        if missing:
-            has = ", ".join(repr(name)[:40] for name in names) or "nothing"
+    @property
+    def column_names(self) -> dict[str, tuple[str, ...]]:
+        """Names that the columns of a file may have, by ``NAME`` and ``NAME_std``."""
+        own = {name: (name,) for reading in self.names for name in (reading, f"{reading}_std")}
+        if len(self.names) > 1:
+            return own
+        return {name: (name, short) for name, short in zip(own, ("strain", "std"), strict=True)}
+
+    def is_column(self, cell: str) -> bool:
+        """Return whether a cell is the name of a column."""
+        return any(cell in names for names in self.column_names.values())
+
+    def columns_in(self, table: CsvTable) -> dict[str, str]:
+        """Return the columns of a file for ``NAME`` and ``NAME_std``, as far as it has them."""
+        found = {name: [n for n in names if n in table.names] for name, names in self.column_names.items()}
+        return {name: columns[0] for name, columns in found.items() if columns}
+
+    def check_columns(self, table: CsvTable) -> None:
+        """Raise an error if a column of readings is missing."""
+        if missing := [" or ".join(self.column_names[n]) for n in self.names if n not in self.columns_in(table)]:
+            has = ", ".join(repr(name)[:40] for name in table.names) or "nothing"
             raise Finger3dError(
-                f"{source}: must have a column named {' and one named '.join(missing)} and at least one reading; it "
-                f"has {has}"
+                f"{table.source}: must have a column named {' and one named '.join(missing)} and at least one reading; "
+                f"it has {has}"
             )
-        return columns
+
+    def readings_in(self, table: CsvTable) -> tuple[dict[str, Float], dict[str, Float | float]]:
+        """Return the readings and their standard deviations by name; ``--std`` where a file has no column for one."""
+        columns = self.columns_in(table)
+        numbers = table.numbers(columns.values())
+        values = {name: numbers[column] for name, column in columns.items()}
+        own = {name: values[f"{name}_std"] for name in self.names if f"{name}_std" in values}
+        return {name: values[name] for name in self.names}, {**self.given_stds, **own}
 
 
 def _followed(job: _Job, source: str) -> Iterator[str]:
@@ -226,50 +243,49 @@ def _followed(job: _Job, source: str) -> Iterator[str]:
     A line that is no reading is answered with the reason, so that it does not stop a robot.
     """
     yield ",".join(map(_cell, job.columns))
-    names: list[str] = []
-    columns: dict[str, str] = {}
-    number = 0
-    for line in _written_lines(source):
-        number = number + 1 if line else 0
-        if line == "\n" or not line:
-            continue
-        cells = next(csv.reader([line]), []) if len(line) <= _LONGEST_LINE else []
-        stripped = [cell.strip() for cell in cells]
-        if not columns or (number == 1 and set(stripped) >= set(columns.values())):
-            names, columns = stripped, job.columns_of(source, stripped)
-            continue
+    head, table, number = list[str](), None, 0
+    for content in _written_lines(source):
+        number, head = (number + 1, head) if content else (0, [])
         try:
-            row = dict(zip(names, cells, strict=False))
-            values = {name: _number(source, number, column, row) for name, column in columns.items()}
-            stds = job.given_stds | {name: values[f"{name}_std"] for name in job.names if f"{name}_std" in values}
-            (answer,) = job.estimates({name: values[name] for name in job.names}, stds)
-            answered = job.line(answer)
+            line = decoded(source, content)
+            found, _ = with_names(source, [*head, line], job.is_column)
+            if set(job.names) <= set(job.columns_in(found)):  # also in a file that has replaced another
+                head, table = [], found
+            elif table is None:
+                head.append(line)
+                if is_row(line):
+                    job.check_columns(found)
+            elif (row := table.with_rows([line], number)).rows:
+                (answer,) = job.estimates(*job.readings_in(row))
+                yield ",".join(map(_cell, job.line(answer)))
         except Finger3dError as error:
+            if table is None:
+                raise
             nothing = dict.fromkeys(job.columns, math.nan)
-            answered = list((nothing | {"status": "invalid", "verdict": str(error)}).values())
-        yield ",".join(map(_cell, answered))
+            yield ",".join(map(_cell, (nothing | {"status": "invalid", "verdict": str(error)}).values()))
+    if table is None and head:
+        job.check_columns(found)
 
 
-def _written_lines(source: str) -> Iterator[str]:
+def _written_lines(source: str) -> Iterator[bytes]:
     """Yield the lines of a file as they are written, without end; those of standard input until it ends.
 
-    An empty string says that the file was replaced by another, or cut: what follows is from the start.
+    An empty line says that the file was replaced by another, or cut: what follows is from the start.
     """
     if source == "-":
-        for whole in sys.stdin.buffer:
-            yield whole.decode("utf-8-sig", errors="replace")
+        yield from sys.stdin.buffer
         return
     stream, begun = _opened(source), b""
     try:
         while True:
             begun += stream.readline()
             if begun.endswith(b"\n"):
-                yield begun.decode("utf-8-sig", errors="replace")
+                yield begun
                 begun = b""
             elif _is_replaced(stream, source):
                 stream.close()
                 stream, begun = _opened(source), b""
-                yield ""
+                yield b""
             else:
                 time.sleep(_POLL_S)
     finally:
@@ -297,33 +313,3 @@ def _cell(value: object) -> str:
         return repr(value)
     text = str(value)
     return '"' + text.replace('"', '""') + '"' if "," in text or '"' in text else text
-
-
-def _readings(job: _Job, path: Path) -> tuple[dict[str, list[float]], dict[str, list[float] | float]]:
-    """Read readings and their standard deviations by name from a CSV file; ``--std`` where it has no column for one."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = list(csv.DictReader(stream))
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise Finger3dError(
-            f"{path}: not a CSV file; it must have a line of names, then one line for each reading"
-        ) from None
-    columns = job.columns_of(path, [str(name) for name in rows[0]] if rows else [])
-    values = {
-        name: [_number(path, i, column, row) for i, row in enumerate(rows, start=2)] for name, column in columns.items()
-    }
-    stds: dict[str, list[float] | float] = {**job.given_stds}
-    stds |= {name: values[f"{name}_std"] for name in job.names if f"{name}_std" in values}
-    return {name: values[name] for name in job.names}, stds
-
-
-def _number(path: Path | str, line: int, name: str, row: Mapping[str, str | None]) -> float:
-    text = row.get(name) or ""
-    try:
-        return float(text)
-    except ValueError:
-        raise Finger3dError(f"{path}: line {line}: {name} = {text!r:.40}: must be a number") from None

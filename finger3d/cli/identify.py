@@ -18,7 +18,7 @@ def identify(
     measured: Annotated[
         Path,
         Parameter(
-            help="CSV file: depth_mm, time_s or step, and columns named as in history.csv, such as normal_force_N; "
+            help="CSV file: step, time_s, depth_mm or a slide, and columns named as in history.csv, such as normal_force_N; "
             "optionally their standard deviations, such as normal_force_N_std."
         ),
     ],

@@ -41,10 +41,11 @@ def draw(path: Path, index: str, at: Float, curve_at: Float, panels: Sequence[Pa
     shown = panels[:_MOST]
     columns = 2 if len(shown) in (1, 3) else _COLUMNS
     made = sheet(len(shown) + 1, columns, (5.2, 4.0), (0.9, 0.2, 0.65, 0.45))
-    fine = np.linspace(0.0, float(curve_at[-1]), _FINE)
+    fine = np.linspace(float(curve_at[0]), float(curve_at[-1]), _FINE)
+    rising = np.argsort(curve_at)
     last = made.axes[len(shown)]
     for panel, axes in zip(shown, made.axes, strict=False):
-        curve = PchipInterpolator(curve_at, panel.curve)(fine)
+        curve = PchipInterpolator(curve_at[rising], panel.curve[rising])(fine)
         axes.plot(fine, curve, color=_SIMULATED, lw=1.6, label="simulated")
         axes.errorbar(
             at,

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float
+from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.scene.messages import listed, nearest
 
-INDEX = ("step", "time_s", "depth_mm")
-"""Columns that say when a row was measured; the first of them that a file has counts."""
+SLIDES = ("slide_x_mm", "slide_z_mm")
 
-_CLOCKS = ("step", "time_s")
+INDEX = ("step", "time_s", "depth_mm", *SLIDES)
+"""Columns that say when a row was measured; the first of them that changes in one direction counts."""
+
+CLOCKS = ("step", "time_s")
 """Columns that are never fitted, unlike the depth, which is fitted if it does not locate the rows."""
+
+_NO_MEASUREMENTS = ("iterations", "residual", "method", "outcome")
+"""Columns of history.csv that tell of the solver, and are passed over."""
 
 STD = "_std"
 
@@ -43,9 +48,10 @@ class MeasuredPress:
     ----------
     path : of the file
     index : name of the column that says when a row was measured, one of `INDEX`
-    at : (n,) its values, ascending
+    at : (n,) its values, ascending; a slide may also descend
     columns : (n,) values by name
     stds : (n,) standard deviations by name, of the columns that have them
+    lines : (n,) numbers of the lines of the file
     """
 
     path: Path
@@ -53,6 +59,12 @@ class MeasuredPress:
     at: Float
     columns: Mapping[str, Float]
     stds: Mapping[str, Float]
+    lines: tuple[int, ...]
+
+    @property
+    def direction(self) -> float:
+        """1 if the index ascends, -1 if it descends."""
+        return _direction(self.index, self.at)
 
     @property
     def count(self) -> int:
@@ -67,7 +79,7 @@ class MeasuredPress:
             ):
                 row = int(np.argmax(np.abs(values)))
                 raise Finger3dError(
-                    f"{self.path}: line {row + 2}: {name} = {values[row]:g}: the scene gives "
+                    f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives "
                     f"{simulated[0][name][row]:.2g}, of the opposite sign; a force that presses is positive, and so is "
                     "a strain that lengthens"
                 )
@@ -84,7 +96,7 @@ class MeasuredPress:
             found = abs(float(values[row]))
             if not smallest[name] / _UNIT_RATIO <= found <= largest[name] * _UNIT_RATIO:
                 raise Finger3dError(
-                    f"{self.path}: line {row + 2}: {name} = {values[row]:g}: the scene gives up to "
+                    f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
                     f"{smallest[name]:.2g} to {largest[name]:.2g}; is the unit that of the name (strain is a plain "
                     "number, not percent), and the sensor the right one?"
                 )
@@ -95,7 +107,7 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
 
     Parameters
     ----------
-    path : CSV file with a line of names, then a line for each row; with semicolons or tabs the comma is decimal
+    path : CSV file with a line of names, then a line for each row
     known : names that columns may have, besides those of `INDEX`
 
     Raises
@@ -104,82 +116,52 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
         In one line: for a file that cannot be read, an unknown column, a gap, a value that is no number, rows out of
         order.
     """
-    names, rows = _table(path)
-    index = next((name for name in INDEX if name in names), None)
-    if index is None:
-        raise Finger3dError(f"{path}: must have a column {listed(INDEX)}, which says when a row was measured")
-    columns = [n for n in names if n not in (index, *_CLOCKS) and not n.endswith(STD)]
-    for name in names:
-        base = name.removesuffix(STD)
-        if base not in known and base not in INDEX:
+    every = {*known, *INDEX}
+    table = read_table(path, lambda cell: cell.removesuffix(STD) in every)
+    names = [name for name in table.names if name not in _NO_MEASUREMENTS]
+    indices = [name for name in INDEX if name in names]
+    if not indices:
+        has = ", ".join(repr(name)[:40] for name in table.names) or "nothing"
+        raise Finger3dError(
+            f"{path}: must have a column {listed(INDEX)}, which says when a row was measured; it has {has}"
+        )
+    for base in (name.removesuffix(STD) for name in names):
+        if base not in every:
             near = next((n for n in known if n.endswith(f"_{base}")), None) or nearest(base, list(known))
             hint = f'did you mean "{near}"? ' if near else ""
             raise Finger3dError(
-                f'{path}: column "{name}": {hint}it is none of the forces, lengths, areas, energies and readings of '
+                f'{path}: column "{base}": {hint}it is none of the forces, lengths, areas, energies and readings of '
                 "history.csv, which are fitted; leave out other columns"
             )
-        if name.endswith(STD) and base not in columns:
-            raise Finger3dError(f'{path}: column "{name}" has no column "{base}"')
+    values = table.numbers(names)
+    index = next((name for name in indices if not len(_turns(name, values[name]))), indices[0])
+    at, columns = values[index], [n for n in names if n not in (index, *CLOCKS) and not n.endswith(STD)]
     if not columns:
         raise Finger3dError(f"{path}: has no measured column beside {index}; for instance normal_force_N")
-    values = {name: np.array([_number(path, line, name, row[name]) for line, row in rows]) for name in names}
-    at = values[index]
-    falling = np.flatnonzero(np.diff(at) <= 0.0)
-    if len(falling):
-        line = rows[int(falling[0]) + 1][0]
-        more = "; of a press that goes back, give time_s or step" if index == "depth_mm" else ""
-        raise Finger3dError(f"{path}: line {line}: {index} = {at[falling[0] + 1]:g}: must be larger than before{more}")
+    for name in names:
+        if name.endswith(STD) and name.removesuffix(STD) not in columns:
+            raise Finger3dError(f'{path}: column "{name}" has no column "{name.removesuffix(STD)}"')
+    if len(turns := _turns(index, at)):
+        line = table.lines[turns[0] + 1]
+        more = "; of a press that goes back, give time_s or step" if index not in CLOCKS else ""
+        raise Finger3dError(f"{path}: line {line}: {index} = {at[turns[0] + 1]:g}: must be larger than before{more}")
     if len(at) < _FEWEST:
         raise Finger3dError(f"{path}: has {len(at)} rows; at least {_FEWEST} are needed")
     stds = {n: values[n + STD] for n in columns if n + STD in values}
     for name, own in stds.items():
         bad = np.flatnonzero((own < _LEAST_STD) | (own > _LARGEST_STD))
         if len(bad):
-            line = rows[int(bad[0])][0]
+            line = table.lines[int(bad[0])]
             raise Finger3dError(
                 f"{path}: line {line}: {name}{STD} = {own[bad[0]]:g}: must be from {_LEAST_STD:g} to {_LARGEST_STD:g}"
             )
-    return MeasuredPress(path, index, at, {n: values[n] for n in columns}, stds)
+    return MeasuredPress(path, index, at, {n: values[n] for n in columns}, stds, table.lines)
 
 
-def _table(path: Path) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
-    """Return the names and the rows, with the number of their lines."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            separator = _separator(stream.readline())
-            stream.seek(0)
-            reader = csv.reader(stream, delimiter=separator)
-            names = [name.strip() for name in next(reader, [])]
-            lines = [(reader.line_num, cells) for cells in reader if cells]
-            if separator != ",":  # where the comma is decimal
-                lines = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in lines]
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise Finger3dError(f"{path}: not a CSV file; it must have a line of names, then a line for each row") from None
-    twice = next((n for i, n in enumerate(names) if n in names[:i]), None)
-    if twice is not None:
-        raise Finger3dError(f'{path}: two columns are called "{twice}"')
-    for line, cells in lines:
-        if len(cells) != len(names):
-            raise Finger3dError(f"{path}: line {line}: has {len(cells)} cells, and there are {len(names)} columns")
-    return names, [(line, dict(zip(names, cells, strict=True))) for line, cells in lines]
+def _direction(index: str, at: Float) -> float:
+    return -1.0 if index in SLIDES and at[-1:] < at[:1] else 1.0
 
 
-def _separator(names: str) -> str:
-    """Return what separates the names: semicolons and tabs are those of languages with a decimal comma."""
-    return max(",;\t", key=names.count)
-
-
-def _number(path: Path, line: int, name: str, text: str) -> float:
-    if not text.strip():
-        raise Finger3dError(f"{path}: line {line}: {name} is empty; leave out the row, or the column")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise Finger3dError(f"{path}: line {line}: {name} = {text.strip()!r:.40}: must be a finite number")
-    return value
+def _turns(index: str, at: Float) -> NDArray[np.int64]:
+    """Return the rows after which an index does not go on in its direction."""
+    return np.flatnonzero(_direction(index, at) * np.diff(at) <= 0.0)

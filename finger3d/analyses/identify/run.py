@@ -33,6 +33,7 @@ from finger3d.analyses.identify.simulated import (
     fitted_scene,
     has_zones,
     largest,
+    moving_part,
     names_of,
 )
 from finger3d.errors import Finger3dError
@@ -331,6 +332,8 @@ def _write(folder: Path, found: Identification) -> None:
     with atomic(folder / "identified.toml") as temporary:
         temporary.write_text(found.scene.to_toml(), encoding="utf-8")
     offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
-    panels = [Panel(n, values, found.stds[n], found.simulated[n], found.curve[n]) for n, values in data.columns.items()]
-    draw(folder / "identify.png", data.index, data.at + float(offset), found.curve[data.index], panels)
+    part = moving_part(found.curve[data.index], data)
+    curve = {name: values[part] for name, values in found.curve.items()}
+    panels = [Panel(n, values, found.stds[n], found.simulated[n], curve[n]) for n, values in data.columns.items()]
+    draw(folder / "identify.png", data.index, data.at + float(offset), curve[data.index], panels)
     identify_page(folder)

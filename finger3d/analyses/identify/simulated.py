@@ -17,7 +17,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
-from finger3d.analyses.identify.measured import MeasuredPress
+from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.analyses.sensitivity import varied
 from finger3d.analyses.shared_body import body_key
@@ -158,12 +158,8 @@ class Simulation:
         """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
         point, factor = self._point(values)
         curve = self._unscaled(point)
-        at = curve[measured.index]
-        if (np.diff(at) <= 0.0).any():
-            raise Finger3dError(_not_rising(measured))
         offset = self._offset(values, measured)
-        if text := _beyond(measured, offset, float(at[-1])):
-            raise Finger3dError(text)
+        _check_range(measured, offset, curve[measured.index])
         return dict(_scaled(_at_rows(curve, measured, offset), factor))
 
     def slopes(self, values: Float, measured: MeasuredPress) -> dict[str, Float] | None:
@@ -310,9 +306,10 @@ def _scaled(curve: Curve, factor: float) -> Curve:
 
 def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, Float]:
     """Return the values of every measured column at its rows."""
-    at = curve[measured.index]
-    where = np.clip(measured.at + offset, 0.0, at[-1])
-    rows = PchipInterpolator(at, np.column_stack([curve[name] for name in measured.columns]))(where)
+    part = moving_part(curve[measured.index], measured)
+    at = measured.direction * curve[measured.index][part]
+    where = np.clip(measured.direction * (measured.at + offset), at[0], at[-1])
+    rows = PchipInterpolator(at, np.column_stack([curve[name][part] for name in measured.columns]))(where)
     return dict(zip(measured.columns, np.asarray(rows).T, strict=True))
 
 
@@ -324,35 +321,51 @@ def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[floa
 
 def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: MeasuredPress) -> None:
     """Raise an error for measured depths that the path of the scene does not have, before anything is solved."""
-    if measured.index != "depth_mm" or any(leg.is_under_force for leg in legs):
+    if measured.index in CLOCKS or any(leg.is_under_force for leg in legs):
         return
-    depths = [target.depth_mm for target in targets(legs)]
-    if (np.diff([0.0, *depths]) <= 0.0).any():
-        raise Finger3dError(_not_rising(measured))
-    largest_offset = max((f.high for f in free if f.key == OFFSET), default=0.0)
-    if text := _beyond(measured, largest_offset, depths[-1]):
-        raise Finger3dError(text)
-    if measured.at[-1] < _SHORTEST * depths[-1]:
+    path = np.array([0.0, *(getattr(target, measured.index) for target in targets(legs))])
+    _check_range(measured, max((f.high for f in free if f.key == OFFSET), default=0.0), path)
+    if measured.index == "depth_mm" and measured.at[-1] < _SHORTEST * path[-1]:
         raise Finger3dError(
-            f"{measured.path}: line {len(measured.at) + 1}: depth_mm = {measured.at[-1]:g}: the path of the scene "
-            f"ends at {depths[-1]:g}; are the depths in mm? if so, lower press.depth_mm"
+            f"{measured.path}: line {measured.lines[-1]}: depth_mm = {measured.at[-1]:g}: the path of the scene "
+            f"ends at {path[-1]:g}; are the depths in mm? if so, lower press.depth_mm"
         )
 
 
-def _not_rising(measured: MeasuredPress) -> str:
-    other = "step" if measured.index == "time_s" else "time_s or step"
-    return f"{measured.path}: {measured.index} does not rise throughout the path of the scene; give {other} instead"
+def moving_part(path: Float, measured: MeasuredPress) -> slice:
+    """Return the part of the path (n,) of a scene, given by its index, from where the index changes.
+
+    Raises
+    ------
+    Finger3dError
+        If the index then does not change in the direction of the measured rows until the end.
+    """
+    moves = measured.direction * np.diff(path)
+    first = int(np.argmax(moves != 0.0))
+    if (moves[first:] <= 0.0).any():
+        other = "step" if measured.index == "time_s" else "time_s or step"
+        verb = "rise" if measured.direction > 0.0 else "fall"
+        raise Finger3dError(
+            f"{measured.path}: {measured.index} does not {verb} throughout the path of the scene; give {other} instead"
+        )
+    return slice(first, None)
 
 
-def _beyond(measured: MeasuredPress, offset: float, end: float) -> str:
-    """Return what is wrong with rows beyond the end of the path of a scene; empty if there are none."""
-    last = float(measured.at[-1])
-    if last + offset <= end * (1.0 + 1e-9):
-        return ""
-    text = f"{measured.path}: line {len(measured.at) + 1}: {measured.index} = {last:g}: "
-    if last > end:
-        return f"{text}the path of the scene ends at {end:g}"
-    return (
+def _check_range(measured: MeasuredPress, offset: float, path: Float) -> None:
+    """Raise an error for rows beyond the path (n,) of a scene, given by its index."""
+    moving = path[moving_part(path, measured)]
+    begin, end, direction = float(moving[0]), float(moving[-1]), measured.direction
+    first, last, slack = float(measured.at[0]), float(measured.at[-1]), 1e-9 * abs(end)
+    if measured.index in SLIDES and direction * (begin - first) > slack:
+        raise Finger3dError(
+            f"{measured.path}: line {measured.lines[0]}: {measured.index} = {first:g}: the scene slides from {begin:g}"
+        )
+    if direction * (last + offset - end) <= slack:
+        return
+    text = f"{measured.path}: line {measured.lines[-1]}: {measured.index} = {last:g}: "
+    if direction * (last - end) > 0.0:
+        raise Finger3dError(f"{text}the path of the scene ends at {end:g}")
+    raise Finger3dError(
         f"{text}with {OFFSET} = {offset:g} it is {last + offset:g}, and the path of the scene ends at {end:g}; "
         f"free the offset up to {end - last:g} only, or raise press.depth_mm"
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.shared_body import Variant, body_key, finest
+from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.readings.marker_grid import grid_markers
@@ -21,6 +21,7 @@ from finger3d.mechanics.readings.reading import Marker
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
 from finger3d.scene.messages import listed, nearest, shown
+from finger3d.scene.tables import SceneTable
 
 MOST = 100_000
 """Points of one sweep; every one is checked before the first is pressed, which takes some 5 to 20 ms."""
@@ -286,24 +287,15 @@ def rows_of(path: Path) -> tuple[Vary, ...]:
     Finger3dError
         If it cannot be read, or a cell is missing.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise Finger3dError(f"--points {path}: cannot be read: {reason}") from None
-    (_, head), *rows = [line for line in lines if any(line[1])] or [(0, [])]
-    if not head or not all(head):
-        raise Finger3dError(f"--points {path}: its first line must name a key in every column, such as friction.mu")
-    if twice := next((key for i, key in enumerate(head) if key in head[:i]), ""):
-        raise Finger3dError(f"--points {path}: the column {shown(twice)} occurs twice")
-    if not rows:
-        raise Finger3dError(f"--points {path}: has no row below its first line")
-    for number, row in rows:
-        if len(row) != len(head) or not all(row):
-            raise Finger3dError(f"--points {path}, line {number}: must have a value in each of {len(head)} columns")
-    return tuple(Vary(key, texts) for key, texts in zip(head, zip(*(row for _, row in rows), strict=True), strict=True))
+    table = read_table(Path(path), lambda cell: cell.partition(".")[0] in SceneTable.model_fields)
+    if not table.names or not all(table.names):
+        raise Finger3dError(f"--points {path}: its line of names must have a key in every column, such as friction.mu")
+    if not table.rows:
+        raise Finger3dError(f"--points {path}: has no row below its line of names")
+    texts = table.texts(table.names)
+    if empty := next((line for line, row in zip(table.lines, table.rows, strict=True) if not all(row)), 0):
+        raise Finger3dError(f"--points {path}, line {empty}: must have a value in each of {len(table.names)} columns")
+    return tuple(Vary(key, tuple(texts[key])) for key in table.names)
 
 
 def columns_of(columns: Mapping[str, Sequence[str]]) -> tuple[Vary, ...]:
