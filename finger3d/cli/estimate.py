@@ -205,10 +205,9 @@ class _Job:
     @property
     def column_names(self) -> dict[str, tuple[str, ...]]:
         """Names that the columns of a file may have, by ``NAME`` and ``NAME_std``."""
-        own = {name: (name,) for reading in self.names for name in (reading, f"{reading}_std")}
-        if len(self.names) > 1:
-            return own
-        return {name: (name, short) for name, short in zip(own, ("strain", "std"), strict=True)}
+        own = [name for reading in self.names for name in (reading, f"{reading}_std")]
+        short = ("strain", "std") if len(self.names) == 1 else own
+        return dict(zip(own, zip(own, short, strict=True), strict=True))
 
     def is_column(self, cell: str) -> bool:
         """Return whether a cell is the name of a column."""
@@ -221,7 +220,9 @@ class _Job:
 
     def check_columns(self, table: CsvTable) -> None:
         """Raise an error if a column of readings is missing."""
-        if missing := [" or ".join(self.column_names[n]) for n in self.names if n not in self.columns_in(table)]:
+        if missing := [
+            " or ".join(dict.fromkeys(self.column_names[n])) for n in self.names if n not in self.columns_in(table)
+        ]:
             has = ", ".join(repr(name)[:40] for name in table.names) or "nothing"
             raise Finger3dError(
                 f"{table.source}: must have a column named {' and one named '.join(missing)} and at least one reading; "

@@ -18,8 +18,8 @@ def identify(
     measured: Annotated[
         Path,
         Parameter(
-            help="CSV file: step, time_s, depth_mm or a slide, and columns named as in history.csv, such as normal_force_N; "
-            "optionally their standard deviations, such as normal_force_N_std."
+            help="CSV file: step, time_s, depth_mm or a slide, and columns named as in history.csv, such as "
+            "normal_force_N; optionally their standard deviations, such as normal_force_N_std."
         ),
     ],
     free: Annotated[
