@@ -83,6 +83,10 @@ class Outcome(Enum):
         "the whole contact slips: friction does not balance the prescribed tangential force; prescribe another one, or "
         "a larger normal force"
     )
+    NOT_HELD = (
+        "the object does not rest under the prescribed tangential force; prescribe its slide, more friction, or a "
+        "larger normal force"
+    )
     EVENTS = (
         "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"
     )

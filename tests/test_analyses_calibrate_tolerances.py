@@ -12,7 +12,7 @@ from finger3d.accuracy.companions import companion
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import tolerance_of, with_defaults
+from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of, with_defaults
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
@@ -53,6 +53,15 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     problem = build(scene().model())  # another depth by the same mesh: the zone that is meshed fine follows the depth
     deep = [ReducedModel.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).steps[-1].gauges["g36"] for s in (0.1, -0.1)]
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
+
+
+@pytest.mark.parametrize(("x", "y", "steps"), [(0.0, 0.0, (2, 1, 2)), (50.0, 0.0, (1, 1, 2)), (0.0, 20.0, (2, 2, 2))])
+def test_a_gauge_on_the_border_is_displaced_along_it_and_inwards(x: float, y: float, steps: tuple[int, ...]) -> None:
+    model = scene().model()
+    gauge = replace(model.gauges[0], x_mm=x, y_mm=y)
+    names = ("gauge_x_mm", "gauge_y_mm", "gauge_angle_deg")
+    found = [d.tolerance for d in displaced_gauges(model, gauge, dict.fromkeys(names, 0.3))]
+    assert tuple(found.count(name) for name in names) == steps
 
 
 def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:

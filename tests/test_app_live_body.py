@@ -99,6 +99,15 @@ def test_a_gauge_outside_the_finger_is_refused(body: LiveBody) -> None:
         body.read(Gauge("g", 4.9, 4.9), 0.3, 0.6, 1e-3)
 
 
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (2.0, 0.0), (5.0, 0.0), (-5.0, 2.0), (5.0, 4.0), (3.0, 4.0)])
+def test_a_gauge_on_the_border_is_read(x: float, y: float) -> None:
+    block = {"geometry": "block", "half_length_mm": 5.0, "height_mm": 4.0, "width_mm": 2.0}
+    body = LiveBody.of(parse(SCENE | {"finger": block, "mesh": {**SCENE["mesh"], "size_mm": 0.5}}))
+    at, inside = (body.read(Gauge("g", x * s, y, angle=0.3), 0.3, 0.6, 1e-3) for s in (1.0, 1.0 - 1e-4))
+    assert abs(at.strain - inside.strain) < at.strain_sd
+    assert at.strain_sd == pytest.approx(inside.strain_sd, rel=0.5)  # 100 times that of the noise in some places
+
+
 @pytest.mark.parametrize("effect", ["large_deformation", "viscosity"])
 def test_effects_whose_compliance_changes_are_refused_by_name(effect: str) -> None:
     settings = {"prony": ((0.3, 0.5),)} if effect == "viscosity" else {}

@@ -60,7 +60,7 @@ def opened() -> Dash:
 
 def answers(opened: Dash, *values: object) -> dict[str, dict[str, object]]:
     """What the page answers to values of its sliders that a browser sends."""
-    (name,) = opened.callback_map
+    name = next(key for key in opened.callback_map if "numbers" in key)
     ids = ("mu", "depth", "x", "y", "angle")
     outputs = [{"id": part.split(".")[0], "property": part.split(".")[1]} for part in name.strip(".").split("...")]
     inputs = [{"id": key, "property": "value", "value": v} for key, v in zip(ids, values, strict=True)]
@@ -72,7 +72,7 @@ def answers(opened: Dash, *values: object) -> dict[str, dict[str, object]]:
 
 
 def test_the_page_opens_at_the_gauge_of_the_scene(opened: Dash) -> None:
-    sliders = {part.children[1].id: part.children[1] for part in opened.layout.children[1].children}
+    sliders = {part.children[2].id: part.children[2] for part in opened.layout.children[1].children}
     found = {name: slider.value for name, slider in sliders.items()}
     assert found == {"mu": 0.3, "depth": 0.6, "x": 1.0, "y": 4.0, "angle": pytest.approx(20.0)}
     said = answers(opened, *found.values())
@@ -98,9 +98,11 @@ def served(page: Dash) -> Iterator[LocalServer]:
     server = local_server(page)
     thread = threading.Thread(target=server.serve)
     thread.start()
-    yield server
-    server.stop()
-    thread.join()
+    try:
+        yield server
+    finally:
+        server.stop()
+        thread.join()
 
 
 @pytest.mark.browser
@@ -126,6 +128,39 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
         browser.close()
     assert complaints == []
     assert all(url.startswith((running.url, "data:", "blob:")) for url in asked)
+
+
+@pytest.mark.browser
+def test_what_the_page_shows_belongs_together() -> None:
+    from playwright.sync_api import expect, sync_playwright
+
+    with served(page(LiveBody.of(parse(SCENE)), 0.3)) as running, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+        tab = browser.new_page()
+        tab.goto(running.url)
+        numbers, reading = tab.locator("#numbers"), tab.locator("#reading")
+        expect(numbers).to_contain_text("mu = 0.3, 0.6 mm deep", timeout=60_000)
+        for name, typed, value, said in (
+            ("depth", "20", "0.6", "0.6 mm deep"),
+            ("depth", "0.333", "0.333", "0.333 mm deep"),
+            ("mu", "5", "1.5", "mu = 1.5, 0.333 mm deep"),
+            ("angle", "200", "180", "180 degrees"),
+            ("y", "-3", "0", "y = 0 mm"),
+        ):
+            box = tab.locator(f"#{name}-typed")
+            box.fill(typed)
+            box.press("Tab")
+            expect(box).to_have_value(value)
+            expect(tab.locator(f"#{name} [role=slider]")).to_have_attribute("aria-valuenow", value)
+            expect(reading if name in {"angle", "y"} else numbers).to_contain_text(said)
+        tab.locator("#mu [role=slider]").press("ArrowLeft")
+        expect(tab.locator("#mu-typed")).to_have_value("1.49")
+        expect(numbers).to_contain_text("mu = 1.49, 0.333 mm deep")
+        tab.locator("#mu-typed").fill("")
+        tab.locator("#mu-typed").press("Enter")
+        expect(tab.locator("#mistake")).to_contain_text("must be a number from 0 to 1.5")
+        expect(numbers).to_be_empty()
+        browser.close()
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.objects import Plane, Sphere
+from finger3d.objects import Cylinder, Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held, numbers, pressed
 from tests.models import block, marched
 from validation import cattaneo_mindlin, held_weights
@@ -67,7 +67,7 @@ def test_a_slope_steeper_than_friction_holds_nothing_as_small_as_is_asked() -> N
 @pytest.mark.parametrize(
     ("steps", "outcome", "detail"),
     [
-        (1, Outcome.FORCE_NOT_REACHED, "0.02 N are missing where the object leaves the finger"),
+        (1, Outcome.NOT_HELD, "the object leaves the finger"),
         (2, Outcome.SLIPS, "0.02 N asked; the contact pushes 0.00168 N the other way"),
     ],
 )
@@ -84,6 +84,39 @@ def test_a_slope_without_friction_pushes_one_way_until_it_leaves_the_finger(
     assert (last.outcome, last.detail) == (outcome, detail)
     assert before.outcome.ok
     assert measure(problem.points, before)["force_x_N"] < 0.0
+
+
+@pytest.mark.parametrize(("mu", "steps"), [(0.05, 1), (0.05, 4), (0.0, 2)])
+def test_a_free_object_slides_off_a_slope_that_friction_does_not_hold(mu: float, steps: int) -> None:
+    """It rests where mu is at least tan(20 deg) = .36."""
+    finger = block(
+        design=designs()["block"](half_length_mm=6.0, height_mm=8.0, width_mm=5.0), mesh=MeshOptions(0.5, 2.0),
+        object=Plane(tilt=np.radians(20.0)), friction=Coulomb(mu), domain="plane-strain",
+        legs=(Leg(0.4, steps=1), Leg(0.4, steps=steps, force_x_N=0.0)),
+    )  # fmt: skip
+    problem = build(finger)
+    *_, last = march(problem)
+    assert (last.outcome, last.detail) == (Outcome.NOT_HELD, "the object leaves the finger")
+    rests = replace(problem, model=replace(finger, friction=Coulomb(0.5)))
+    assert measure(problem.points, marched(rests)[-1])["normal_force_N"] > 0.1
+
+
+def test_a_free_object_that_is_lifted_off_has_no_force() -> None:
+    legs = (Leg(0.4, steps=1), Leg(0.0, steps=2, force_x_N=0.0))
+    problem = build(block(object=Plane(), domain="plane-strain", legs=legs))
+    assert [step.outcome.ok for step in marched(problem)] == [True, True, True]
+
+
+def test_a_cylinder_beside_the_middle_of_a_smooth_block_does_not_rest() -> None:
+    """The free end of the block yields more, and the object slides there: a finite force is missing everywhere."""
+    finger = block(
+        design=designs()["block"](half_length_mm=6.0, height_mm=8.0, width_mm=5.0), mesh=MeshOptions(1.0, 2.0),
+        object=Cylinder(radius_mm=20.0), friction=Coulomb(0.0), domain="plane-strain",
+        legs=(Leg(0.2, 3.0, steps=1), Leg(0.2, 3.0, steps=1, force_x_N=0.0)),
+    )  # fmt: skip
+    *_, last = march(build(finger))
+    assert last.outcome is Outcome.NOT_HELD
+    assert last.detail.startswith("the nearest forces differ by")
 
 
 @pytest.mark.parametrize(

@@ -154,8 +154,8 @@ class LiveBody:
         own, tolerances = strains(gauge), []
         for name in GAUGE_PLACES.values():
             sd = TOLERANCES[name][0]
-            displaced = displaced_gauges(model, gauge, {name: sd})
-            tolerances.append(tolerance_of(name, sd, [(d.step, strains(d.gauge) - own) for d in displaced]))
+            if displaced := displaced_gauges(model, gauge, {name: sd}):
+                tolerances.append(tolerance_of(name, sd, [(d.step, strains(d.gauge) - own) for d in displaced]))
         curve = ReadingCurve(gauge.name, at, own, noise, tuple(tolerances))
         return LiveReading(
             strain=float(curve.at(mu)),

@@ -71,6 +71,12 @@ def page(body: LiveBody, mu: float) -> Dash:
         style={"fontFamily": "sans-serif", "margin": "1.5rem auto", "maxWidth": "60rem"},
     )
 
+    for name, slider in sliders.items():
+        both = (name, f"{name}-typed")
+        app.clientside_callback(  # type: ignore[no-untyped-call]
+            slider.clamped(name), [Output(at, "value") for at in both], [Input(at, "value") for at in both]
+        )
+
     @app.callback(
         [Output(name, "children") for name in ("numbers", "reading", "mistake")],
         [Output(name, "figure") for name in ("traction", "section")],
@@ -82,6 +88,7 @@ def page(body: LiveBody, mu: float) -> Dash:
         except Finger3dError as error:
             return "", "", str(error), go.Figure(), go.Figure()
         mu, depth, x, y, angle = values
+        at = f"mu = {mu:.4g}, {depth:.4g} mm deep: "
         gauge = replace(first, x_mm=x, y_mm=y, angle=math.radians(angle))
         section = section_figure(body, gauge)
         try:
@@ -92,8 +99,9 @@ def page(body: LiveBody, mu: float) -> Dash:
         try:
             reading = body.read(gauge, mu, depth, NOISE)
         except Finger3dError as error:
-            return numbers_of(press), "", str(error), traction, section
-        return numbers_of(press), text_of(reading), "", traction, section
+            return at + numbers_of(press), "", str(error), traction, section
+        place = f"gauge at x = {x:.4g}, y = {y:.4g} mm, {angle:.4g} degrees: "
+        return at + numbers_of(press), place + text_of(reading), "", traction, section
 
     return app
 
@@ -121,21 +129,35 @@ class Slider:
             return float(value)
         raise Finger3dError(f"{self.label}: must be a number from {self.low:g} to {self.high:g}")
 
+    def clamped(self, name: str) -> str:
+        """Return a function, in JavaScript, of slider and box: both get the value that was changed, within the range.
+
+        The box of Dash's own slider leaves the slider where it is if the typed number is out of range.
+        """
+        return f"""(slid, typed) => {{
+            const changed = window.dash_clientside.callback_context.triggered_id;
+            const clamped = Math.min({self.high!r}, Math.max({self.low!r}, typed));
+            const value = changed === "{name}-typed" ? clamped : slid;
+            return [changed === "{name}" ? window.dash_clientside.no_update : value, value];
+        }}"""
+
     def drawn(self, name: str) -> html.Div:
-        """Return the slider and its label."""
+        """Return the label, a box to type in, and the slider."""
         from dash import dcc, html
 
+        value = float(f"{self.value:.6g}")
+        box = dcc.Input(value, "number", id=f"{name}-typed", step="any", debounce=True)
         slider = dcc.Slider(
             self.low,
             self.high,
             self.step,
-            value=float(f"{self.value:.6g}"),
+            value=value,
             id=name,
             marks={float(f"{at:.4g}"): f"{at:.3g}" for at in np.linspace(self.low, self.high, 5)},
             updatemode="drag",
-            tooltip={"placement": "bottom"},
+            allow_direct_input=False,
         )
-        return html.Div([html.Label(self.label, htmlFor=name), slider], style={"marginBottom": "0.5rem"})
+        return html.Div([html.Label(self.label, htmlFor=f"{name}-typed"), box, slider], style={"marginBottom": "0.5rem"})
 
 
 def numbers_of(press: LivePress) -> str:

@@ -43,6 +43,9 @@ _LEAST_POINTS = {2: 150, 3: 500}
 """Least number of contact points, by dimension, for which differences on the coarser mesh are accurate enough: within a
 fifth of the largest."""
 
+_CLEAR_MM = 1e-6
+"""Distance from the border at which a displaced gauge is certainly in the mesh."""
+
 Effect: TypeAlias = tuple[float, Float]
 """Step of a quantity in its unit, and the changes (k, m) of readings at several mu that it causes."""
 
@@ -85,13 +88,16 @@ class DisplacedGauge:
 
 
 def displaced_gauges(model: Model, gauge: Gauge, tolerances: Mapping[str, float]) -> list[DisplacedGauge]:
-    """Return the gauge displaced by plus and minus each tolerance of its place, as far as it stays in the body."""
-    found = []
+    """Return the gauge displaced by plus and minus each tolerance of its place, as far as it stays in the body.
+
+    A gauge on the border may stay there: a displaced one need not be farther inside than the gauge itself.
+    """
+    found, least = [], min(_depth_inside(model, gauge), _CLEAR_MM)
     for name in (n for n in GAUGE_PLACES.values() if n in tolerances):
         for sign in (1.0, -1.0):
             step = sign * tolerances[name]
             displaced = replace(_displaced(gauge, name, step), name=f"{gauge.name} {name} {sign:+g}")
-            if _is_inside(model, displaced):
+            if _depth_inside(model, displaced) >= least:
                 found.append(DisplacedGauge(name, step, displaced))
     return found
 
@@ -104,10 +110,11 @@ def _displaced(gauge: Gauge, name: str, step: float) -> Gauge:
     return replace(gauge, angle=gauge.angle + math.radians(step))
 
 
-def _is_inside(model: Model, gauge: Gauge) -> bool:
+def _depth_inside(model: Model, gauge: Gauge) -> float:
+    """Return the least vertical distance, mm, of the gauge from base and contact surface; negative outside."""
     at = np.array([gauge.middle, *gauge.ends])
-    top = model.design.top(at[:, 0], at[:, 2])
-    return bool(np.isfinite(top).all() and (at[:, 1] > 0.0).all() and (at[:, 1] < top - 1e-6).all())
+    inside = np.minimum(at[:, 1], model.design.top(at[:, 0], at[:, 2]) - at[:, 1])
+    return float(np.nan_to_num(inside, nan=-np.inf).min())
 
 
 def evaluate_tolerances(
@@ -290,13 +297,12 @@ def _vary_stiff_gauge(
 ) -> Iterator[Effect]:
     """Displace each gauge that stiffens the body, unless it would leave it; only its own reading is compared."""
     model = body.problem.model
-    change = np.full((len(readings), len(body.mu)), math.nan)
     for i, gauge in _gauges(model, readings):
-        displaced = _displaced(gauge, name, sd)
-        if _is_inside(model, displaced):
-            gauges = tuple(displaced if g.name == gauge.name else g for g in model.gauges)
-            change[i] = body.change(body.rebuilt(gauges=gauges))[i]
-    yield sd, change
+        for d in displaced_gauges(model, gauge, {name: sd})[:1]:
+            moved = tuple(replace(d.gauge, name=g.name) if g.name == gauge.name else g for g in model.gauges)
+            change = np.full((len(readings), len(body.mu)), math.nan)
+            change[i] = body.change(body.rebuilt(gauges=moved))[i]
+            yield d.step, change
 
 
 _VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], float], Iterator[Effect]]] = {

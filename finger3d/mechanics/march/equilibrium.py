@@ -63,9 +63,9 @@ class PoseTrial:
         return self.ok and bool((status == SLIP).any()) and not (status == STICK).any()
 
     @property
-    def touches(self) -> bool:
-        """Whether any point is in contact."""
-        return bool(self.solution.state.contact.force.any())
+    def pressed_N(self) -> float:
+        """Sum of the normal forces of the points."""
+        return float(self.solution.state.contact.force[:, 0].sum())
 
 
 @dataclass
@@ -73,7 +73,8 @@ class PoseSearch:
     """Newton's method for the pose at which the object is in equilibrium with the forces applied to it.
 
     The stiffness is found by differences and updated after every step (Broyden 1965).  A step that does not lower the
-    error is halved.  Where the whole contact slips and cannot transmit the forces, the search ends.
+    error is halved.  Where the whole contact slips and cannot transmit the forces, the search ends.  Without contact no
+    force is missing where none is prescribed: an object that has lost contact on the way is not held.
 
     Attributes
     ----------
@@ -100,6 +101,7 @@ class PoseSearch:
     def run(self, start: Float) -> PoseTrial:
         """Return the trial in equilibrium, or the best one with an outcome that says why there is none."""
         best, refused = self._tried(start, None), 0
+        never_touched = not self._touches(best)
         while best.ok and (error := self._error(best)) > self.target and self.iterations < _ITERATIONS:
             fresh = self.stiffness is None
             stiffness = self._differenced(best) if self.stiffness is None else self.stiffness
@@ -115,16 +117,24 @@ class PoseSearch:
             refused = 0 if lowered else refused + (fresh or refused > 0)
             if lowered:
                 best = trial
-            if refused > _REFUSED or not best.touches:
+            if refused > _REFUSED or not self._touches(best):
                 break
-        if not best.ok or self._error(best) <= _LAST_DIGITS * self.target:
+        if not best.ok or (self._error(best) <= self._last_digits and (never_touched or self._touches(best))):
             return best
-        return self._ended(best, Outcome.SLIPS if best.slips else Outcome.FORCE_NOT_REACHED)
+        return self._ended(best, Outcome.SLIPS if best.slips and self.asked_N[0] else Outcome.NOT_HELD)
 
     def _tried(self, place: Float, near: PoseTrial | None) -> PoseTrial:
         trial = self.increment(place, near)
         self.iterations += trial.solution.iterations
         return trial
+
+    @property
+    def _last_digits(self) -> float:
+        """Relative error of forces that are equal but for round-off."""
+        return _LAST_DIGITS * self.target
+
+    def _touches(self, trial: PoseTrial) -> bool:
+        return trial.pressed_N > self._last_digits * self.scale_N
 
     def _error(self, trial: PoseTrial) -> float:
         return float(np.abs(trial.forces - self.wanted).max()) / self.scale_N
@@ -168,7 +178,7 @@ class PoseSearch:
             starts_to_slip = trial.slips and not best.slips
             changes_sign = (self.wanted - trial.forces)[k] * (self.wanted - best.forces)[k] < 0.0
             lowered = trial.ok and self._error(trial) < _LESS * self._error(best)
-            if lowered and (trial.touches or not changes_sign):
+            if lowered and (self._touches(trial) or not changes_sign):
                 if not starts_to_slip:
                     return trial
                 slipping = slipping or trial
@@ -188,12 +198,15 @@ class PoseSearch:
         if outcome is Outcome.SLIPS:
             now, asked = self.asked_N
             held = self.largest(trial) * now
-            slides_down = held > _MUCH * asked
-            share = "but slides down its slope under less" if slides_down else f"{100.0 * held / asked:.4g} % of it"
-            holds = f"holds at most {held:.9g} N, {share}" if held > 0.0 else f"pushes {-held:.3g} N the other way"
+            if held <= 0.0:
+                holds = f"pushes {-held:.3g} N the other way"
+            elif held > _MUCH * asked:
+                holds = f"holds at most {held:.9g} N, but slides down its slope under less"
+            else:
+                holds = f"holds at most {held:.9g} N, {100.0 * held / asked:.4g} % of it"
             detail = f"{asked:.6g} N asked; the contact {holds}"
+        elif self._touches(trial):
+            detail = f"the nearest forces differ by {self._error(trial) * self.scale_N:.3g} N"
         else:
-            missing = self._error(trial) * self.scale_N
-            nearest = f"the nearest forces differ by {missing:.3g} N"
-            detail = nearest if trial.touches else f"{missing:.3g} N are missing where the object leaves the finger"
+            detail = "the object leaves the finger"
         return replace(trial, solution=replace(trial.solution, outcome=outcome, detail=detail))
