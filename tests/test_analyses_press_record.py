@@ -65,6 +65,14 @@ def test_an_object_narrower_than_two_edges_is_warned_of_with_an_edge_length_that
     assert not said(re.findall(r"mesh\.size_mm = ([\d.]+) has enough", line)[0])
 
 
+def test_a_light_press_by_default_has_enough_points(tmp_path: Path) -> None:
+    text = re.sub(r"\[mesh\][^[]*", "", changed(HALF_CYLINDER, steps=2, depth_mm=0.01))
+    out = tmp_path / "out"
+    assert main(["press", str(written(tmp_path, text)), "--out", str(out), "--no-figures", "--no-error"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert not [line for line in summary["warnings"] if " touch" in line]
+
+
 def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:
     settings = {"small": [], "large": ["--set", "effects.large_deformation={}"]}
     said = {}

@@ -177,7 +177,7 @@ def test_what_is_hidden_is_the_sagitta_of_the_hats() -> None:
 @pytest.mark.parametrize(
     ("obj", "lengths"),
     [
-        (Wave(wavelength_mm=0.01, amplitude_mm=0.1), ("0.01", "0.0025")),
+        (Wave(wavelength_mm=0.1, amplitude_mm=0.1), ("0.1", "0.025")),
         (Wave(wavelength_mm=1.5, amplitude_mm=0.01), ("1.5", "0.37")),
         (Cylinder(radius_mm=0.9), ("0.9", "0.45")),
         (Wedge(angle=0.5, tip_radius_mm=0.2), ("0.2", "0.1")),

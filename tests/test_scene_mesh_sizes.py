@@ -38,18 +38,43 @@ def test_a_thin_finger_gets_two_elements_across() -> None:
             {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
             4.0 / 12.0,
         ),  # finer would be more than 600 points
-        ({"shape": "sphere", "radius_mm": 0.4}, 0.2 * 0.4),  # the finest
+        ({"shape": "sphere", "radius_mm": 0.1}, 0.05 * 0.4),  # the finest
+        ({"shape": "sphere", "radius_mm": 0.1, "mesher": "swept"}, 0.2 * 0.4),
     ],
 )
 def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> None:
+    mesh = {key: value for key, value in thing.items() if key == "mesher"}
+    thing = {key: value for key, value in thing.items() if key not in mesh}
     tables = {
         "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 4.0},
         "material": {"E_MPa": 1.0, "nu": 0.3},
         "press": {"depth_mm": 0.5},
         "object": thing,
+        "mesh": mesh,
     }
     wide = thing["shape"] in ("sphere", "plane")
     tables["finger"]["width_mm"] = 20.0 if wide else 4.0
+    # the overlap is found on a grid of a hundredth of the finger
+    assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("depth", "domain", "size"),
+    [
+        # a plane overlaps a half cylinder of 10 mm over 2 sqrt(d (2 R - d))
+        (0.02, "plane-strain", 1.2643 / 20),
+        (0.2, "plane-strain", 0.1),
+        (0.1, "solid", 2.8213 / 30),
+        (2.0, "solid", 0.4),
+    ],
+)
+def test_default_edges_resolve_the_contact_of_a_round_finger_with_a_plane(depth, domain, size) -> None:
+    tables = {
+        "finger": {"geometry": "half_cylinder", "radius_mm": 10.0, "width_mm": 2.0},
+        "material": {"E_MPa": 1.0, "nu": 0.3},
+        "press": {"depth_mm": depth},
+        "model": {"domain": domain},
+    }
     # the overlap is found on a grid of a hundredth of the finger
     assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)
 

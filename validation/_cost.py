@@ -24,7 +24,8 @@ from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.build import MARGIN, candidate_points, contact_rows
+from finger3d.mechanics.discretise.build import candidate_points, contact_rows
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.formulation import Workspace

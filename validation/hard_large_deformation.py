@@ -31,7 +31,8 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
-from finger3d.mechanics.discretise.build import MARGIN, build
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march

@@ -27,7 +27,8 @@ from finger3d._cost import (
     tets_of_ftetwild,
 )
 from finger3d._types import Tree
-from finger3d.mechanics.discretise.build import MARGIN, WHOLE_FACE, candidate_points, poses
+from finger3d.mechanics.discretise.build import WHOLE_FACE, candidate_points, poses
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry

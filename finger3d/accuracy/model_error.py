@@ -31,12 +31,12 @@ from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import (
-    MARGIN,
     build,
     candidate_points,
     with_elastic_object,
     with_object_compliance,
 )
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem, free_surface
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of

@@ -36,6 +36,9 @@ _SMALL_STRAIN_DEPTH = 0.3
 _RESOLVED_POINTS = {2: 6, 3: 100}
 """Fewest contact points of a resolved contact zone, by dimension: six on a line, ten by ten on a surface."""
 
+_SPARE = 1.25
+"""Contact points that the advised edge length aims at, over the fewest: meshes of one edge length differ in them."""
+
 _POINTS_ACROSS = 4
 """Fewest points along the shorter side of a contact zone: under a narrower object that slides, forces jump."""
 
@@ -238,7 +241,8 @@ def point_count_warning(record: PressRecord) -> list[str]:
     across, power = 1 + round(float(extents.min())), 1.0 / (problem.dim - 1)
     if count >= _RESOLVED_POINTS[problem.dim] and across >= _POINTS_ACROSS:
         return []
-    ratio = min((count / _RESOLVED_POINTS[problem.dim]) ** power, max(across - 1, 1) / _RESOLVED_POINTS[2], 1.0)
+    enough = _SPARE * _RESOLVED_POINTS[problem.dim]
+    ratio = min((count / enough) ** power, max(across - 1, 1) / _RESOLVED_POINTS[2])
     what = "Only 1 point touches" if count == 1 else f"Only {count} points touch"
     what += f", {across} across" if problem.dim == 3 else ""
     return [

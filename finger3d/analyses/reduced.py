@@ -21,7 +21,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
-from finger3d.mechanics.discretise.build import MARGIN
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.solve import march

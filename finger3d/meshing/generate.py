@@ -51,8 +51,10 @@ def mesh_solid(
     return _mesh_unstructured(design, options, zone, symmetry, report)
 
 
-def is_meshable(design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...] = ()) -> bool:
-    """Return whether a mesh of these edge lengths is estimated to fit into memory, without making it.
+def is_meshable(
+    design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...] = (), rows: float = 0.0
+) -> bool:
+    """Return whether a mesh of these edge lengths with `rows` of contact is estimated to fit, without making it.
 
     Parameters
     ----------
@@ -62,14 +64,14 @@ def is_meshable(design: Design, options: MeshSizes, zone: Zone, dim: int, symmet
     lengths = np.ptp(np.reshape(zone, (2, 2)), axis=1)[: dim - 1] / options.size_mm
     facets = (dim - 1) * float(lengths.prod()) / 2 ** len(symmetry)
     # each facet of the contact zone has at least one cell; to count all cells takes time
-    if not is_possible((dim - 1) * facets, dim):
+    if not is_possible(facets, dim, rows=rows):
         return False
     if isinstance(design, GivenMesh):
         return True
     if dim == 2 or options.mesher == "swept":
-        return is_possible(cell_count(design, options, zone, dim, symmetry), dim)
+        return is_possible(cell_count(design, options, zone, dim, symmetry), dim, rows=rows)
     zone = rounded_zone(design, options, zone)
-    return is_possible(count_cells(design, sizing(design, options, zone, *box(design, symmetry))), 3, MAX_TETS)
+    return is_possible(count_cells(design, sizing(design, options, zone, *box(design, symmetry))), 3, MAX_TETS, rows)
 
 
 def _mesh_unstructured(

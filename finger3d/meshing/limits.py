@@ -33,9 +33,9 @@ def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
         )
 
 
-def is_possible(cells: float, dim: int, cap: float = math.inf) -> bool:
-    """Return whether a mesh is estimated to fit into memory and has at most `cap` cells."""
-    return mesh_gb(cells, dim) <= MEMORY_SHARE * _machine_gb() and cells <= cap
+def is_possible(cells: float, dim: int, cap: float = math.inf, rows: float = 0.0) -> bool:
+    """Return whether a mesh with `rows` of contact is estimated to fit into memory and has at most `cap` cells."""
+    return mesh_gb(cells, dim) + rows_gb(rows) <= MEMORY_SHARE * _machine_gb() and cells <= cap
 
 
 def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:

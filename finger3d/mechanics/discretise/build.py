@@ -18,7 +18,7 @@ from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.simplex import CONTACT, Mesh
 from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
+from finger3d.mechanics.discretise.contact_geometry import MARGIN, contact_geometry, may_touch
 from finger3d.mechanics.discretise.gauge_refinement import locally_refined
 from finger3d.mechanics.discretise.problem import (
     CondensedBody,
@@ -44,9 +44,6 @@ from finger3d.progress import QUIET, Progress
 if TYPE_CHECKING:
     from finger3d.mechanics.discretise.elastic_object import ObjectResponse
     from finger3d.mechanics.discretise.foils import EmbeddedBars
-
-MARGIN = 0.3
-"""Largest rigid gap of candidate points, in depths of the press; whether it suffices is checked after the solution."""
 
 _STATIONS = 4, 20
 """Least and largest number of poses along a leg at which rigid gaps are taken to find the candidate points."""

@@ -25,6 +25,9 @@ from finger3d.objects import vertical_frame
 
 Distance = Callable[[Float], tuple[Float, Float]]
 
+MARGIN = 0.3
+"""Largest rigid gap of candidate points, in depths of the press; whether it suffices is checked after the solution."""
+
 _FACING = -0.1
 """Product of the normals of object and finger below which the two surfaces face each other."""
 

@@ -372,10 +372,7 @@ def _refusal(model: Model, unresolved: UnresolvedOverlap, size: float | None) ->
     if isinstance(model.design, DesignSummary):
         return f"{now}: {what}; condense the scene with a smaller mesh.size_mm"
     cure = "press deeper, or with a thicker or blunter object"
-    least = _FINER**_TRIES * model.mesh.size_mm
-    return (
-        f"{now}: {what}; no edge length above {least:.1g} mm that fits into this machine's memory resolves it; {cure}"
-    )
+    return f"{now}: {what}; no mesh.size_mm whose press fits into this machine's memory resolves it; {cure}"
 
 
 def unresolved_details(model: Model) -> list[str]:
@@ -386,7 +383,7 @@ def unresolved_details(model: Model) -> list[str]:
     blunter = f"choose a larger object.{detail.key}"
     return [
         f"object.{detail.key} = {detail.length_mm:g}: contact points {size:g} mm apart (mesh.size_mm) see only "
-        f"averages of it; {size_advice(model, rounded_down(largest), 'resolves it', blunter)}"
+        f"averages of it; {size_advice(model, largest, 'resolves it', blunter)}"
     ]
 
 

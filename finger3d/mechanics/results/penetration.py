@@ -14,7 +14,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import BoundarySurface, restrict
 from finger3d.mechanics.discretise.contact_geometry import may_touch
 from finger3d.mechanics.discretise.problem import Problem, free_surface
-from finger3d.mechanics.discretise.size_advice import size_advice
+from finger3d.mechanics.discretise.size_advice import rounded_down, size_advice
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Model
@@ -113,7 +113,7 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
     on_wall = deepest.face != CONTACT and not deepest.at_crease
     ratio, effect = resolving_edge(deepest), f"leaves about {_ADVISE_ABOVE:.0%}"
     if on_wall:
-        cure = f"mesh.base_size_mm = {ratio * mesh.base_size_mm:.2g} {effect}"
+        cure = f"mesh.base_size_mm = {rounded_down(ratio * mesh.base_size_mm):g} {effect}"
     else:
         cure = size_advice(problem.model, ratio * mesh.size_mm, effect, "a finer one leaves less")
     if mesh.grading is not None:
