@@ -145,7 +145,7 @@ def molds(paper_mold: Mold) -> Mapping[str, Mold]:
         def __missing__(self, name: str) -> Mold:
             return self.setdefault(name, made(*FEW[name]))
 
-    return Molds({"tongue, screws, plugs": paper_mold})
+    return Molds({"screws, gauges": paper_mold})
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,6 @@ from finger3d.mechanics.model import Gauge
 from finger3d.mold.body import shell
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.parts import Mold, mold
-from finger3d.mold.pours import poured
 from finger3d.scene import parse
 
 BODIES = {
@@ -42,23 +41,18 @@ def scene_of(name: str, **more):
     )
 
 
-FEW: dict[str, tuple[str, dict]] = {
-    "cord, bands, two cavities": ("half_cylinder", {"seal": "cord", "fasten": "bands", "cavities": 2}),
-    "carrier": ("block", {"carrier": True}),
-    "plain, sla": (
-        "hemisphere", {"printer": "sla", "seal": "none", "fasten": "none", "pry": False, "riser": 0.0}
-    ),
-    "pours": ("fingertip", {"parts": True}),
-    "insert": ("fingertip", {"parts": True, "inserts": "core"}),
-    "triangles": ("clipped_cylinder as STL", {}),
-}  # fmt: skip
-"""A design and options for each feature."""
+FEW: dict[str, tuple[str, dict, tuple[str, ...]]] = {
+    "plain, sla": ("hemisphere", {"printer": "sla", "screw": "none"}, ()),
+    "pours": ("fingertip", {"parts": True}, ()),
+    "insert": ("fingertip", {"parts": True}, ("core",)),
+    "triangles": ("clipped_cylinder as STL", {}, ()),
+}
+"""A design, options and rigid parts for each feature."""
 
 
-def made(name: str, options: dict) -> Mold:
+def made(name: str, options: dict, rigid: tuple[str, ...] = ()) -> Mold:
     """The mold of a design, of its solids, or of its triangles."""
     name, _, kind = name.partition(" as ")
-    design, chosen = designs()[name](**BODIES[name]), MoldOptions(**options)
-    if chosen.parts:
-        return poured(design.solid(), design.solids(), (), chosen)
-    return mold(shell(design.solid(), 0.1, name).surface if kind else design.solid(), (), chosen)
+    design = designs()[name](**BODIES[name])
+    shape = shell(design.solid(), 0.1, name).surface if kind else design.solid()
+    return mold(shape, (), MoldOptions(**options), design.solids(), rigid)

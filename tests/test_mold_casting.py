@@ -19,7 +19,7 @@ from finger3d.mold.casting import (
 HOLE = PourHole(6.0, 14.0, 4.0)
 
 
-def sheet(name: str, volume_ml: float = 100.0, hole: PourHole = HOLE, shrinkage: float = 0.0) -> str:
+def sheet(name: str, volume_ml: float = 100.0, hole: PourHole | None = HOLE, shrinkage: float = 0.0) -> str:
     return "\n".join(silicone_lines(silicone_named(name), volume_ml, hole, shrinkage))
 
 
@@ -63,6 +63,7 @@ def test_pot_life_against_pouring() -> None:
     assert "25 min" in slow
     assert re.search(r"degas 5 min.* 17 min ", slow)
     assert "syringe" in slow
+    assert "flow" not in sheet("Dragon Skin 20", 200.0, None)
     assert "syringe" not in sheet("Ecoflex 00-30", 50.0, PourHole(10.0, 20.0, 4.0))
     assert "degas 5 min" not in sheet("Mold Star 16")
     assert re.search(r"pot life .*data sheet", sheet("Smooth-Sil 960"))

@@ -101,8 +101,36 @@ def test_a_step_file_with_splines_has_the_right_volume_and_a_mold(tmp_path: Path
     assert done.silicone_ml == pytest.approx(wanted / 0.99**3 / 1e3, rel=1e-4)
 
 
+@pytest.mark.parametrize("parts", [False, True])
+def test_a_rigid_part_is_printed_and_its_volume_is_not_poured(parts, tmp_path: Path, monkeypatch) -> None:
+    """A block of 20 x 8 x 12 mm with a core of 8 x 5 x 12 mm: 1.92 ml less .48 ml."""
+    from build123d import Box, Compound, Pos, export_step
+
+    core = Pos(0.0, 2.5, 0.0) * Box(8.0, 5.0, 12.0)
+    body = Pos(0.0, 4.0, 0.0) * Box(20.0, 8.0, 12.0) - core
+    core.label = "core"
+    export_step(Compound(children=[body, core]), str(tmp_path / "two.step"))
+    scene = parse(
+        {
+            "finger": {"geometry": str(tmp_path / "two.step")},
+            "material": {"E_MPa": 1.0, "nu": 0.45},
+            "parts": {"core": {"rigid": True}},
+            "press": {"depth_mm": 1.0},
+        }
+    )
+    monkeypatch.setattr("finger3d.mold.output.step_pictures", lambda pictures: None)  # drawn in tests of the page
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
+    done = export(scene, tmp_path / "out", MoldOptions(parts=parts))
+    assert done.silicone_ml == pytest.approx(1.44, rel=1e-6)
+    # two blind holes for the pegs, at most 4.4 mm wide and 2.7 mm deep
+    insert = trimesh.load(tmp_path / "out" / "mold_insert_core.stl").volume
+    assert 480.0 - 2.0 * math.pi * 2.2**2 * 2.7 < insert < 480.0
+    assert any("core is rigid" in text for text in done.remarks)
+    assert "1.44 ml" in (tmp_path / "out" / "sheet.txt").read_text()
+
+
 def test_an_export_leaves_nothing_of_an_older_one(tmp_path: Path) -> None:
-    for name in ("mold.3mf", "mold_bed_2.3mf", "mold_plug_1a.stl", "button.toml", "sheet.txt", "mine.txt"):
+    for name in ("mold.3mf", "mold_bed_2.3mf", "mold_plug_1a.stl", "sheet.txt", "mine.txt"):
         (tmp_path / name).write_text("older")
     export(scene_of("block"), tmp_path)
     assert {f.name for f in tmp_path.glob("[!.]*")} == {"finger.step", "finger.stl", "mine.txt"}

@@ -1,36 +1,25 @@
-"""Mold parts as a slicer sees them, and on the bed."""
+"""Mold parts as a slicer sees them, and as they lie."""
 
 from __future__ import annotations
-
-import itertools
 
 import numpy as np
 import pytest
 
 from finger3d.mold.body import Shell
 from finger3d.mold.parts import Mold
-from finger3d.mold.printing import GAP_MM, as_printed, beds, check_print, islands, thickness
+from finger3d.mold.printing import GAP_MM, as_printed, check_print, in_a_row, islands, thickness
 from tests.bodies import box
 from tests.mold_cases import BODIES, FEW, made
 
 ALL = [
-    {"seal": "tongue", "fasten": "screws", "printer": "fdm-0.4"},
-    {"seal": "cord", "fasten": "screws", "printer": "sla", "cavities": 2, "screw": "M4"},
-    {"seal": "none", "fasten": "bands", "printer": "fdm-0.4", "cavities": 2, "riser": 0.0},
-    {"seal": "tongue", "fasten": "bands", "printer": "sla", "riser": 0.05},
-    {"seal": "cord", "fasten": "bands", "printer": "fdm-0.4", "riser": 0.03, "shrinkage": 0.01},
-    {"seal": "none", "fasten": "none", "printer": "sla", "pry": False},
-    {"seal": "cord", "fasten": "none", "printer": "fdm-0.4", "cavities": 2},
-    {"seal": "tongue", "carrier": True, "key_mm": 1.5, "pour_mm": 1.5, "riser": 0.0},
-    {"seal": "cord", "carrier": True, "key_mm": 1.5, "pour_mm": 2.0, "riser": 0.0, "printer": "sla"},
+    {"printer": "fdm-0.4"},
+    {"printer": "sla", "screw": "M4"},
+    {"printer": "sla", "screw": "none", "pour_mm": 2.0},
+    {"printer": "fdm-0.4", "shrinkage": 0.01, "peg_mm": 5.0, "split": "x"},
 ]
-"""Options that together hold every value of each."""
+"""Options that together hold every kind of value."""
 
-NAMES = [
-    "tongue, screws, plugs",
-    *(name for name in FEW if name != "insert"),
-    pytest.param("insert", marks=pytest.mark.slow),
-]
+NAMES = ["screws, gauges", *(name for name in FEW if name != "insert"), pytest.param("insert", marks=pytest.mark.slow)]
 
 
 def check(found: Mold, layer: float = 0.5) -> None:
@@ -87,45 +76,16 @@ def test_an_open_surface_is_told() -> None:
     assert "not closed" in check_print(Triangles(whole.points, whole.faces[1:]), 0.5).defect
 
 
-def _shells(*sizes: tuple[float, float, float]) -> dict[str, Shell]:
-    return {f"lid_{i}": Shell(box(*s, tuple(0.5 * e for e in s)), 0.0, 0.0) for i, s in enumerate(sizes)}
-
-
-def test_parts_lie_apart_on_the_bed() -> None:
-    found = beds(_shells((100, 60, 5), (80, 60, 5), (60, 30, 9), (20, 20, 3), (20, 100, 3)), (200.0, 140.0, 100.0))
-    assert len(found) == 1
-    (bed,) = found
-    assert bed.fits
-    for part in bed.placed.values():
-        assert (part.surface.low >= -1e-9).all()
-        assert (part.surface.high[:2] <= np.array([200.0, 140.0]) + 1e-9).all()
-    for a, b in itertools.combinations(bed.placed.values(), 2):
-        apart = np.maximum(a.surface.low - b.surface.high, b.surface.low - a.surface.high)[:2]
-        assert apart.max() >= GAP_MM - 1e-6
-
-
-def test_parts_that_do_not_fit_take_another_bed() -> None:
-    sizes = [(90.0, 90.0, 5.0)] * 3
-    found = beds(_shells(*sizes), (100.0, 100.0, 50.0))
-    assert [len(bed.placed) for bed in found] == [1, 1, 1]
-    assert all(bed.fits for bed in found)
-    (alone,) = beds(_shells((300.0, 20.0, 5.0)), (100.0, 100.0, 50.0))
-    assert not alone.fits
-    (high,) = beds(_shells((20.0, 20.0, 60.0)), (100.0, 100.0, 50.0))
-    assert not high.fits
-
-
-def test_a_long_part_is_turned() -> None:
-    (bed,) = beds(_shells((40.0, 180.0, 5.0)), (200.0, 50.0, 50.0))
-    (part,) = bed.placed.values()
-    assert bed.fits
-    assert part.extent == pytest.approx([180.0, 40.0, 5.0])
-    assert part.surface.volume == pytest.approx(40.0 * 180.0 * 5.0)  # turned, not mirrored
+def test_parts_stand_in_a_row() -> None:
+    parts = {name: Shell(box(4.0, 2.0, 1.0, (2.0, 1.0, 0.5)), 0.0, 0.0) for name in "abc"}
+    placed = in_a_row(parts)
+    for name, x in zip("abc", (0.0, 4.0 + GAP_MM, 8.0 + 2.0 * GAP_MM), strict=True):
+        assert placed[name].surface.low == pytest.approx([x, 0.0, 0.0])
 
 
 def test_outer_faces_lie_on_the_bed(paper_mold) -> None:
-    """Pegs of half B and of the lid, and the spigot of the riser, point up."""
-    printed = as_printed({name: paper_mold.shell(name, 0.2, 0.4) for name in ("half_b", "lid", "riser")})
+    """Pegs of half B and of the lid point up."""
+    printed = as_printed({name: paper_mold.shell(name, 0.2, 0.4) for name in ("half_b", "lid")})
     for name, part in printed.items():
         assert part.surface.low == pytest.approx(np.zeros(3), abs=1e-9)
         top = part.surface.points[part.surface.points[:, 2] > part.extent[2] - 1e-6]

@@ -2,60 +2,58 @@
 
 from __future__ import annotations
 
+import re
+
+import pytest
+
 from finger3d.materials.silicones import silicone_named
-from finger3d.mold.body import shell
 from finger3d.mold.printing import as_printed
-from finger3d.mold.sheet import close_lines, open_lines, oversize, pour_lines, prepare_lines, sheet, thread_lines
+from finger3d.mold.sheet import close_lines, open_lines, pour_lines, prepare_lines, sheet
 
 
 def test_the_steps_name_what_the_mold_has(molds) -> None:
-    """Screws with their size, the strips and plugs, the hole that is poured through."""
-    made = molds["tongue, screws, plugs"]
+    """Screws with their size, the strips, the hole that is poured through."""
+    made = molds["screws, gauges"]
     assert f"{made.bolts.number} screws M3 x {made.bolts.length_mm:g}" in " ".join(close_lines(made))
     assert f"{made.bolts.number} M3 nuts" in " ".join(prepare_lines(made))
-    assert "half B" in " ".join(thread_lines(made))
-    assert "plugs" in " ".join(close_lines(made))
+    assert "strips" in " ".join(prepare_lines(made))
     told = " ".join(pour_lines(made, made.pours[0]))
     assert f"{made.silicone_mm3 / 1e3:.2f} ml" in told
     assert "6 mm" in told
     assert "along z" in " ".join(open_lines(made))
 
 
-def test_a_carrier_is_poured_through_its_holes_and_stays(molds) -> None:
-    made = molds["carrier"]
-    assert thread_lines(made) == []
-    *_, poured = pour_lines(made, made.pours[0])
-    assert "carrier" in poured
-    assert "carrier stays" in " ".join(open_lines(made))
-
-
 def test_a_skin_is_poured_before_its_lid(molds) -> None:
-    skin, body, _ = molds["pours"].pours
-    poured, closed = pour_lines(molds["pours"], skin)
+    skin, body, core = molds["pours"].pours
+    poured, pushed, off = pour_lines(molds["pours"], skin)
     assert f"{skin.silicone_mm3 / 1e3:.2f} ml" in poured
-    assert "lid_skin" in closed
-    *_, closed, poured = pour_lines(molds["pours"], body)
+    assert "lid_skin" in pushed
+    assert "lid_skin off" in off
+    closed, poured, off = pour_lines(molds["pours"], body)
     assert "lid_body" in closed
     assert f"{body.silicone_mm3 / 1e3:.2f} ml" in poured
+    assert "lid_body off" in off
+    assert not any("pull" in line for line in pour_lines(molds["pours"], core))
 
 
-def test_a_cord_and_bands_are_laid(molds) -> None:
-    made = molds["cord, bands, two cavities"]
-    assert "cord of 2 mm" in " ".join(prepare_lines(made))
-    assert "5 mm wide" in " ".join(close_lines(made))
-
-
-def test_a_part_larger_than_the_bed_is_told(paper_mold) -> None:
-    part = as_printed({"lid": shell(paper_mold.parts["lid"], 0.05, "lid")})["lid"]
-    assert oversize(part, (45.0, 220.0, 250.0)) == ""  # turned on the bed
-    assert oversize(part, (100.0, 100.0, 250.0))
-    assert oversize(part, (220.0, 220.0, 5.0))
+def test_an_insert_is_printed_and_not_poured(molds) -> None:
+    """The volume of the sheet is that of skin and body; before the last pour the core is put onto its lid."""
+    made = molds["insert"]
+    printed = as_printed({name: made.shell(name, 0.2, 0.4) for name in made.parts})
+    text = " ".join(sheet("mine", made, printed).split())
+    volume = float(re.search(r"cavity ([\d.]+) ml, without what is inserted: core", text)[1])
+    assert volume == pytest.approx((made.body.volume_mm3 - 10.0 * 8.0 * 16.0) / 1e3, abs=0.006)
+    assert "insert core" in text
+    skin, body = made.pours
+    assert "core, which is printed (mold_insert_core.stl)" in pour_lines(made, body)[0]
+    assert not any("core" in line for line in pour_lines(made, skin))
+    assert "but not the inserts" in prepare_lines(made)[0]
 
 
 def test_the_sheet_has_the_silicone_of_the_scene(paper_mold) -> None:
-    printed = as_printed({name: shell(part, 0.05, name) for name, part in paper_mold.parts.items()})
-    named = sheet("mine", paper_mold, printed, (200.0, 200.0, 50.0), silicone_named("Dragon Skin 20"))
-    unnamed = sheet("mine", paper_mold, printed, (200.0, 200.0, 50.0))
+    printed = as_printed({name: paper_mold.shell(name, 0.2, 0.4) for name in paper_mold.parts})
+    named = sheet("mine", paper_mold, printed, silicone_named("Dragon Skin 20"))
+    unnamed = sheet("mine", paper_mold, printed)
     heads = ["SILICONE", "PARTS", "PRINT", "FRICTION FACE", "CURE INHIBITION", "GAUGES", "MIX", "POUR"]
     for text in (named, unnamed):
         assert [line for line in text.splitlines() if line.isupper()] == heads

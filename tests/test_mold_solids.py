@@ -7,7 +7,7 @@ import math
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.solids import Feature, added, between, common, cone, cuts, cylinder, hexagon, one, revolved
+from finger3d.mold.solids import Feature, between, common, cone, cylinder, hexagon, one, part
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z", "-x", "-y", "-z"])
@@ -17,7 +17,6 @@ def test_solids_start_at_their_point_and_run_along_their_axis(axis) -> None:
         cylinder((1.0, 2.0, 3.0), 2.0, 5.0, axis),
         cone((1.0, 2.0, 3.0), 2.0, 1.0, 5.0, axis),
         hexagon((1.0, 2.0, 3.0), 2.0, 5.0, axis),
-        revolved([(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (0.0, 5.0)], (1.0, 2.0, 3.0), axis),
     ):
         box = solid.bounding_box()
         low, high = [*box.min][i], [*box.max][i]
@@ -38,9 +37,10 @@ def test_pieces_are_refused() -> None:
         one(between((0, 0, 0), (1, 1, 1)) + between((2, 2, 2), (3, 3, 3)), "lid")
 
 
-def test_what_features_add_and_cut_is_collected_by_part() -> None:
-    a, b, c = (between((i, 0, 0), (i + 1.0, 1, 1)) for i in range(3))
-    features = [Feature(add={"lid": [a]}, cut={"half_a": [b]}), Feature(add={"lid": [c]})]
-    assert added(features, "lid") == [a, c]
-    assert cuts(features, "half_a") == [b]
-    assert cuts(features, "half_b") == []
+def test_a_part_has_what_features_add_and_lacks_what_they_cut() -> None:
+    """Cuts come last, and other parts' features do nothing."""
+    a, b = between((1, 0, 0), (3, 1, 1)), between((2, 0, 0), (4, 1, 1))
+    features = [Feature(cut={"lid": [b]}), Feature(add={"lid": [a]}, cut={"half_a": [a]})]
+    made = part("lid", between((0, 0, 0), (1, 1, 1)), features, "lid_skin")
+    assert made.volume == pytest.approx(2.0)
+    assert part("half_b", b, features, "half_b").volume == pytest.approx(2.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.plotting.mold import StepPicture, exploded, picture, step_pictures
+from finger3d.plotting.mold import StepPicture, picture, scenery, standing, step_pictures, taken_apart
 from tests.bodies import box
 from tests.pictures import share
 
@@ -20,7 +20,7 @@ PARTS = {
 
 
 def test_parts_are_moved_apart_and_fit_into_the_picture() -> None:
-    view = exploded(PARTS)
+    view = scenery(standing(taken_apart(PARTS)))
     ends = {name: (part.points.min(axis=0), part.points.max(axis=0)) for name, part in view.parts.items()}
     # poured with the lid on top, and the halves apart along z
     assert ends["lid"][0][1] > max(ends[name][1][1] for name in PARTS if name != "lid") - 1e-9
@@ -43,7 +43,7 @@ def test_every_step_has_a_picture_of_its_parts(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     pour = {name: part for name, part in PARTS.items() if name != "lid"}
     pictures = [
-        StepPicture(tmp_path / "1.png", PARTS, on_bed=True),
+        StepPicture(tmp_path / "1.png", PARTS, lying=True),
         StepPicture(tmp_path / "2.png", pour),
     ]
     assert step_pictures(pictures) == "matplotlib"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from cyclopts import App, CycloptsError, MissingArgumentError
+from cyclopts import App, CycloptsError, MissingArgumentError, UnknownOptionError
 
 # Importing a module registers its command.
 import finger3d.cli.app  # noqa: F401
@@ -28,7 +28,6 @@ from finger3d.cli import (  # noqa: F401
     sensitivity,
     show,
     sweep,
-    validate,
     writing,
 )
 from finger3d.cli.common import Interrupted, app, complain
@@ -58,6 +57,14 @@ def _check_surroundings(arguments: Sequence[str]) -> None:
         raise MissingError(OUT_OF_MEMORY)
 
 
+def _gone(error: CycloptsError, arguments: Sequence[str]) -> str:
+    """Return what to do instead of an option that is gone; empty for any other mistake."""
+    if not isinstance(error, UnknownOptionError) or arguments[0] != "export":
+        return ""
+    option = (error.token.keyword or error.token.value).split("=")[0]
+    return f"{option} is gone: {export.GONE[option]}" if option in export.GONE else ""
+
+
 def _run(arguments: Sequence[str], program: App) -> int:
     try:
         _check_surroundings(arguments)
@@ -67,7 +74,7 @@ def _run(arguments: Sequence[str], program: App) -> int:
         complain("give --out FOLDER, the folder for the results" if option == "--out" else str(error))
         return Finger3dError.exit_code
     except CycloptsError as error:
-        complain(f"{error} (finger3d --help lists the commands and options)")
+        complain(_gone(error, arguments) or f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code
     except (Finger3dError, Interrupted) as error:
         complain(str(error))

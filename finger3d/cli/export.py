@@ -15,6 +15,21 @@ from finger3d.mold.options import MoldOptions
 if TYPE_CHECKING:
     from finger3d.scene import Scene
 
+_INSERT = "draw it as a part of the design with [parts.LABEL] rigid = true: it is printed and inserted"
+_PLAIN = "the faces are plain: hold them with --screw, clamps or rubber bands"
+
+GONE = {
+    **dict.fromkeys(("--carrier", "--carrier-mm", "--key-mm", "--inserts"), _INSERT),
+    **dict.fromkeys(("--fasten", "--band-mm", "--seal", "--cord-mm", "--pry", "--no-pry"), _PLAIN),
+    **dict.fromkeys(("--plugs", "--no-plugs", "--slot-gap-mm"), "slots of strips are sealed with tape"),
+    "--riser": "the pour hole is a funnel, of the width --pour-mm at the sensor",
+    "--cavities": "print the mold several times",
+    "--coupon": "give the clearance of your printer as --clearance-mm",
+    "--button": "press a sample with a scene of its own, and finger3d identify",
+    "--bed": "the program of the printer arranges the parts",
+}
+"""Options that are gone, and what to do instead."""
+
 
 @app.command
 def export(
@@ -42,7 +57,7 @@ def export(
 ) -> None:
     """Write the finger as STEP and STL, and with --mold also the parts of a mold, instructions and pictures.
 
-    Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --bed 180x180x180
+    Example: finger3d export scene.toml --out print --mold --shrinkage 0.001 --screw M4
 
     Parameters
     ----------
@@ -52,11 +67,11 @@ def export(
     chosen = options or MoldOptions()
     if not mold and chosen != MoldOptions():
         raise Finger3dError("export: options of a mold need --mold")
+    if mold + mesh + bool(solver) > 1:
+        raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
     loaded = load(scene, set_)
     check_folder(out)
     if mesh or solver:
-        if mold or (mesh and solver):
-            raise Finger3dError("export: --mold, --mesh and --solver write different things; give one of them")
         _export_model(loaded, out, solver is not None, json_)
         return
     from finger3d.mold.export import export as run
@@ -72,7 +87,7 @@ def export(
         ("tolerance", f"{done.tolerance_mm:.3g} mm"),
     ]
     if done.silicone_ml is not None:
-        rows.append(("silicone", f"{done.silicone_ml:.1f} ml in the cavity; see sheet.txt"))
+        rows.append(("silicone", f"{done.silicone_ml:.3g} ml in the cavity; see sheet.txt"))
     rows.append(("results", str(out)))
     rows += [("", file.name) for file in done.files]
     print_rows(loaded.title, rows)

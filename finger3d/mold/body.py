@@ -200,15 +200,6 @@ class Body:
         cad = None if self.cad is None else (Rot(0, -90, 0) * self.cad)
         return Body(Triangles(self.surface.points @ _TURN.T, self.surface.faces), cad)
 
-    def at(self, x: float) -> Body:
-        """Return the body moved along x."""
-        if x == 0.0:
-            return self
-        from build123d import Pos
-
-        cad = None if self.cad is None else (Pos(float(x), 0, 0) * self.cad)
-        return Body(Triangles(self.surface.points + [x, 0.0, 0.0], self.surface.faces), cad)
-
     def shared(self, shape: Shape) -> float:
         """Return the volume (mm3) that a CAD solid shares with the body."""
         from finger3d.geometry.tessellate import triangulated

@@ -55,14 +55,14 @@ class PourHole:
         return 60e6 * math.pi * weight / (8.0 * silicone.viscosity_Pa_s * integral)
 
 
-def silicone_lines(silicone: Silicone | None, volume_ml: float, hole: PourHole, shrinkage: float) -> list[str]:
+def silicone_lines(silicone: Silicone | None, volume_ml: float, hole: PourHole | None, shrinkage: float) -> list[str]:
     """Return components, times and shrinkage of a silicone.
 
     Parameters
     ----------
     silicone : None if the scene names none
     volume_ml : of the mixture
-    hole : through which it is poured
+    hole : through which it is poured; None if it is poured into the open mold
     shrinkage : relative, that the cavity allows for
     """
     cup = f"  cup to degas        at least {CUP * volume_ml:.0f} ml: under vacuum it foams to 3 to 5 times its volume"
@@ -104,7 +104,7 @@ def _components(silicone: Silicone, volume_ml: float) -> list[str]:
     return [f"  measure             {volume_ml:.1f} ml in all: {parts} ({silicone.mix})"]
 
 
-def _pouring(silicone: Silicone, volume_ml: float, hole: PourHole) -> list[str]:
+def _pouring(silicone: Silicone, volume_ml: float, hole: PourHole | None) -> list[str]:
     """Return the pot life against the time of mixing, degassing and pouring."""
     life = silicone.pot_life_min
     if life is None:
@@ -114,7 +114,7 @@ def _pouring(silicone: Silicone, volume_ml: float, hole: PourHole) -> list[str]:
     if left < 2.0:
         return [f"{said}: no time to degas it; mix slowly for {min(MIX_MIN, life / 2.0):g} min and pour at once"]
     lines = [f"{said}: mix {MIX_MIN:g} min, degas {DEGAS_MIN:g} min; {left:g} min are left to fill the mold"]
-    flow = hole.flow_ml_min(silicone)
+    flow = None if hole is None else hole.flow_ml_min(silicone)
     if flow is None:
         return lines
     minutes = float(f"{volume_ml / flow:.2g}")

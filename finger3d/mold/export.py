@@ -40,7 +40,7 @@ class Exported:
     volume_mm3 : of the finger, by its closed form or by CAD
     stl_volume_mm3 : inside the triangles of finger.stl
     tolerance_mm : largest distance of these triangles from the finger; for a body of triangles that of the file, 0
-    silicone_ml : volume of the cavity; None without a mold
+    silicone_ml : volume of silicone in the cavity; None without a mold
     remarks : remarks for the user, a line each
     """
 
@@ -66,7 +66,7 @@ def export(
     Parameters
     ----------
     scene : path of a TOML file, a dict with its tables, or a loaded scene
-    out : folder for finger.step and finger.stl, and for the parts, plate, sheet and picture of a mold
+    out : folder for finger.step and finger.stl, and for the parts, sheet and pictures of a mold
     mold : `finger3d.MoldOptions`; None: no mold
     text : whether the STL file is text instead of binary
     tolerance_mm : largest distance of the triangles from the CAD surface, smaller where the volume asks for it; None:
@@ -93,6 +93,7 @@ def export(
     """
     from finger3d.io import claimed
     from finger3d.mold.body import Shell, shell, write_step, write_stl
+    from finger3d.mold.output import write_mold
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     design = scene.design
@@ -123,7 +124,9 @@ def export(
         files.append(out / "finger.stl")
         silicone = None
         if assembly is not None:
-            written, told = _write_mold(scene, assembly, body, solid, out, text, report)
+            name = scene.tables.material.silicone
+            named = silicone_named(name) if name else None
+            written, told = write_mold(scene.title, assembly, body, out, text, report, named)
             files += written
             remarks += told
             silicone = assembly.silicone_mm3 / 1e3
@@ -147,29 +150,13 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
         raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
 
 
-def _write_mold(
-    scene: Scene, made: Mold, body: Shell, solid: Solid | None, out: Path, text: bool, report: Progress
-) -> tuple[list[Path], list[str]]:
-    """Write a mold with its extras; return the paths of the files, and remarks."""
-    from finger3d.mold.extras import extra_parts, write_extras
-    from finger3d.mold.output import write_mold
-
-    name = scene.tables.material.silicone
-    named = silicone_named(name) if name else None
-    extras = extra_parts(scene, made, out)
-    files, remarks = write_mold(scene.title, made, body, out, text, report, extras.parts, named)
-    more, also = write_extras(scene, made, solid, out)
-    return [*files, *more], [*remarks, *extras.remarks, *also]
-
-
 def _clear(out: Path) -> None:
     """Remove the files of an earlier export, which may be of another finger."""
-    from finger3d.mold.extras import EXTRA_FILES
     from finger3d.mold.output import FILES
 
     for name in ("finger.step", "finger.stl"):
         (out / name).unlink(missing_ok=True)
-    for pattern in (*FILES, *EXTRA_FILES):
+    for pattern in FILES:
         for path in out.glob(pattern):
             path.unlink()
 
@@ -177,16 +164,17 @@ def _clear(out: Path) -> None:
 def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
     from finger3d.mold.foils import foils
     from finger3d.mold.parts import mold
-    from finger3d.mold.pours import poured
 
     embedded = scene.effects.get("embedded_gauge")
     section = (embedded.thickness_mm, embedded.width_mm) if embedded else None
     slots = foils(scene.model().gauges, options, section)
-    if not options.parts:
+    rigid = [label for label, part in scene.tables.parts.items() if part.rigid]
+    if not options.parts and not rigid:
         return mold(shape, slots, options)
     if isinstance(shape, Triangles):
-        raise Finger3dError(f"--parts: {scene.design.name} holds triangles; only CAD files keep their solids")
-    return poured(shape, scene.design.solids(), slots, options)
+        what = "--parts" if options.parts else f"[parts.{rigid[0]}] rigid = true"
+        raise Finger3dError(f"{what}: {scene.design.name} holds triangles; only CAD files keep their solids")
+    return mold(shape, slots, options, scene.design.solids(), rigid)
 
 
 def _volume(design: Design, solid: Solid | None, body: Shell) -> float:

@@ -1,8 +1,8 @@
 """A printable mold of the sensor: two halves and a lid, built from the finger's CAD by booleans.
 
 The sensor is cast upside down: the contact surface lies at the bottom of the cavity, where no air is trapped, and the
-lid closes the base. The base will be bonded to a carrier, or is cast onto one (`carrier`), so marks of the pour hole
-and the vents do no harm there.
+lid closes the base. The base will be bonded to a carrier, or stands on a rigid part that is printed, so marks of the
+pour hole and the vents do no harm there.
 
 The halves open along z by default. The section of an extruded finger is constant along z, and that of a half ball
 shrinks away from the middle, so neither has undercuts. The strips that carry the gauges run along z as well, and the
@@ -16,34 +16,23 @@ open along z. The lid begins at y = 0.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body, Shell, shell
-from finger3d.mold.cover import Keys, Ports, base_region, key_solids, keys, openings, ports, riser_cup
+from finger3d.mold.cover import Ports
 from finger3d.mold.demould import Draft, check_opening, undercut_depth
-from finger3d.mold.fasteners import (
-    Bolts,
-    Pegs,
-    band_grooves,
-    bolts,
-    carrier_pins,
-    half_pegs,
-    lid_pegs,
-    pry_notches,
-    screws,
-    seal,
-)
-from finger3d.mold.foils import FoilSlot, check_foils, plugs, slot
+from finger3d.mold.fasteners import Bolts, bolts, half_pegs, lid_pegs, screws
+from finger3d.mold.foils import FoilSlot, check_foils, slot
 from finger3d.mold.layout import Layout, layout_of
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.solids import Feature, added, between, common, cuts, one
+from finger3d.mold.pours import MAIN, Pour, check_strips, lid_parts, pour_order, pours
+from finger3d.mold.solids import Feature, between, common, one, part
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -52,35 +41,6 @@ _OVERLAP_TOLERANCE = 1e-6  # relative volume that booleans leave between faces i
 _MESH_OVERLAP_TOLERANCE = 1e-3  # the same where one of two bodies is tessellated
 _ON_BASE_MM = 1e-6
 HALVES = ("half_a", "half_b")
-MAIN = "body"
-"""Name of the solid without a label."""
-
-
-@dataclass(frozen=True)
-class Pour:
-    """One pour into the mold.
-
-    Attributes
-    ----------
-    label : of the solid that is poured; "" for the main body
-    lid : name of the part that closes the mold
-    silicone_mm3 : volume of all cavities
-    ports : openings of the lid over one cavity; None where silicone is poured before the lid is pushed on
-    cast : what lies in the cavities after this pour, in place
-    others : names of the parts that belong to this pour only: lid, riser, inserts
-    """
-
-    label: str
-    lid: str
-    silicone_mm3: float
-    ports: Ports | None
-    cast: tuple[Body, ...]
-    others: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """Label, or "body" for the main body."""
-        return self.label or MAIN
 
 
 @dataclass(frozen=True)
@@ -89,14 +49,11 @@ class Mold:
 
     Attributes
     ----------
-    body : what one cavity casts: the finger enlarged by the shrinkage
-    layout : places of cavities, walls and pegs
-    parts : half_a (z above the split), half_b (below, with the pegs), lid or carrier, riser, plugs, pins; without the
-        cavities where the body has no CAD, see `shell`
+    body : what the cavity holds: the finger enlarged by the shrinkage
+    layout : places of the cavity, walls and pegs
+    parts : half_a (z above the split), half_b (below, with the pegs), lids, inserts; without the cavity where the body
+        has no CAD, see `shell`
     pours : in their order
-    slots : the volumes of the strips, with their gaps
-    pegs, lid_pegs : pegs and holes of the halves, and of the lid
-    keys : keyed holes of the carrier under one cavity; None without a carrier
     draft : how the halves come off
     """
 
@@ -105,77 +62,112 @@ class Mold:
     layout: Layout
     parts: dict[str, Solid]
     pours: tuple[Pour, ...]
-    slots: tuple[Solid, ...]
     foils: tuple[FoilSlot, ...]
-    pegs: Pegs
-    lid_pegs: Pegs | None
-    keys: Keys | None
     draft: Draft
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
-        """What the cavities cast, in place."""
-        return tuple(self.body.at(x) for x in self.layout.places)
-
-    @property
     def silicone_mm3(self) -> float:
-        """Volume of silicone in all cavities, after all pours, without inserts."""
+        """Volume of silicone in the cavity after all pours, without inserts."""
         return sum(pour.silicone_mm3 for pour in self.pours)
 
     @property
-    def openings_mm3(self) -> float:
-        """Volume of pour holes, risers, vents and keyed holes, of all pours."""
-        cover, cavities = self.options.cover_mm, len(self.layout.places)
-        held = sum(pour.ports.volume_mm3(cover) for pour in self.pours if pour.ports is not None)
-        return cavities * (held + (self.keys.volume_mm3(cover) if self.keys else 0.0))
+    def ports(self) -> tuple[Ports, ...]:
+        """Openings of the lids, in the order of the pours that go through a lid."""
+        return tuple(pour.ports for pour in self.pours if pour.ports is not None)
 
     @property
-    def ports(self) -> Ports:
-        """Openings of the lid of the last pour that is poured through a lid."""
-        found = [pour.ports for pour in self.pours if pour.ports is not None]
-        return found[-1]
+    def openings_mm3(self) -> float:
+        """Volume of pour holes and vents, of all pours."""
+        return sum(ports.volume_mm3(self.options.lid_mm) for ports in self.ports)
 
     @property
     def bolts(self) -> Bolts | None:
         """Screws that hold the halves together; None without."""
         return bolts(self.layout, self.options)
 
-    @property
-    def outline(self) -> tuple[Float, Float]:
-        """Low and high corner (3,), mm, of the two halves together, without lugs."""
-        return self.layout.outer_low, self.layout.outer_high
-
     def shell(self, name: str, tolerance_mm: float, angle: float) -> Shell:
-        """Return a part as closed triangles, the cavities cut out."""
-        part = shell(self.parts[name], tolerance_mm, name, angle)
-        if self.body.cad is None and name in HALVES:
-            for body in self.bodies:
-                part = body.cut_from(part)
-        return part
+        """Return a part as closed triangles, the cavity cut out."""
+        made = shell(self.parts[name], tolerance_mm, name, angle)
+        return self.body.cut_from(made) if self.body.cad is None and name in HALVES else made
 
 
-def mold(shape: Solid | Triangles, gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
+def mold(
+    shape: Solid | Triangles,
+    gauges: Sequence[FoilSlot],
+    options: MoldOptions,
+    solids: Mapping[str, Solid] | None = None,
+    rigid: Collection[str] = (),
+) -> Mold:
     """Build a mold around a finger (y up, base on y = 0, mm), of CAD or of closed triangles.
+
+    Parameters
+    ----------
+    solids : the finger's solids by their labels; "" is the main body
+    rigid : labels of the solids that are printed and inserted
 
     Raises
     ------
     Finger3dError
-        If the split plane misses the body, the body has an undercut, a foil does not fit, the lid has no room
-        for its openings, or two parts of the mold would overlap.
+        If the split plane misses the body, the body has an undercut, a foil does not fit, a lid has no room
+        for its openings, two parts of the mold would overlap, or for the reasons of `finger3d.mold.pours.pours`.
     """
     if options.split == "x" and gauges:
         raise Finger3dError(
             f'--split x: the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along '
             "x; use --split z, or a scene without gauges"
         )
+    solids = solids or {}
+    silicones = _silicones(shape, solids, rigid, options)
     finger = Body.of(shape, options.machine.tolerance_mm)
     check_split(finger, options)
-    draft = check_opening(filled(finger, options), options, may_turn=not gauges)
+
+    def placed(shape: Solid | Triangles, name: str) -> Body:
+        made = Body.of(shape, options.machine.tolerance_mm, name)
+        return made.scaled(options.scale).opening_along_z(options.split)
+
     body = finger.scaled(options.scale).opening_along_z(options.split)
     check_foils(body, gauges, options)
-    assembled = _assembled(body, tuple(gauges), options, draft)
+    recessed = recesses(finger)
+    fillings = [placed(filling, "a recess").solid for filling in recessed]
+    planned = pours(
+        {label: body if cast is shape else placed(cast, label or MAIN) for label, cast in silicones.items()},
+        {label: placed(solids[label], label) for label in rigid},
+        fillings,
+        body,
+        options,
+    )
+    layout = layout_of(*body.box, options)
+    slots = {foil: slot(foil, layout, options) for foil in gauges}
+    check_strips(planned, slots)
+    draft = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
+    cavity = [] if body.cad is None else [body.cad, *fillings]
+    features = [
+        screws(layout, options),
+        half_pegs(layout, options),
+        lid_pegs(layout, options),
+        Feature(cut=dict.fromkeys(HALVES, [*slots.values(), *cavity])),
+    ]
+    parts = halves(layout, features)
+    for pour in planned:
+        parts |= lid_parts(pour, layout, features, options)
+    for name, solid in parts.items():
+        solid.label = name
+    assembled = Mold(options, body, layout, parts, planned, tuple(gauges), draft)
     check_parts(assembled)
     return assembled
+
+
+def _silicones(
+    shape: Solid | Triangles, solids: Mapping[str, Solid], rigid: Collection[str], options: MoldOptions
+) -> dict[str, Solid | Triangles]:
+    """Return what is poured, in the order of the pours; all of it at once without --parts."""
+    if options.parts or rigid:
+        order = pour_order(solids, rigid, options)
+        if options.parts:
+            return {label: solids[label] for label in order}
+        soft = solids[order[0]].fuse(*(solids[label] for label in order[1:])) if order[1:] else solids[order[0]]
+        return {"": one(soft, "the silicone between rigid parts", "pour it part by part, with --parts")}
+    return {"": shape}
 
 
 def recesses(body: Body) -> list[Solid]:
@@ -188,7 +180,7 @@ def recesses(body: Body) -> list[Solid]:
     return [piece for piece in pieces[:-1] if abs(piece.bounding_box().min.Y) < _ON_BASE_MM]
 
 
-def filled(finger: Body, options: MoldOptions) -> Body:
+def filled(finger: Body, fillings: Sequence[Solid], options: MoldOptions) -> Body:
     """Return the body that the halves enclose: the finger with the recesses in its base filled.
 
     Raises
@@ -197,7 +189,6 @@ def filled(finger: Body, options: MoldOptions) -> Body:
         If the lid could not be pulled out of a recess.
     """
     tolerance = options.machine.tolerance_mm
-    fillings = recesses(finger)
     for filling in fillings:
         depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
         if depth > max(options.undercut_mm, tolerance):
@@ -209,100 +200,11 @@ def filled(finger: Body, options: MoldOptions) -> Body:
     return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
 
-def halves_and_features(
-    body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions
-) -> tuple[Layout, list[Feature], Pegs, tuple[Solid, ...]]:
-    """Return the places, all features but those of the lid's openings, the pegs of the halves, and the slots."""
-    layout = layout_of(*body.box, options)
-    cast = [body.at(x) for x in layout.places]
-    pegs = half_pegs(layout, options)
-    slots = tuple(slot(foil, layout, options, x) for x in layout.places for foil in foils)
-    fillings = [recesses(b) for b in cast]
-    cavities = [solid for b, own in zip(cast, fillings, strict=True) if b.cad is not None for solid in (b.cad, *own)]
-    features = [
-        screws(layout, options),
-        band_grooves(layout, options),
-        pry_notches(layout, options),
-        seal([b.surface for b in cast], layout, options),
-        plugs(foils, layout, options),
-        Feature(add={"half_b": pegs.pegs}, cut={"half_a": pegs.holes}),
-        Feature(add={"lid": list(itertools.chain(*fillings))}),
-        Feature(cut={name: [*slots, *cavities] for name in HALVES}),
-    ]
-    return layout, features, pegs, slots
-
-
-def part(name: str, base: Solid, features: Sequence[Feature], label: str) -> Solid:
-    """Return a part: a box, with what features add to it, without what they cut from it."""
-    whole = base + added(features, name) if added(features, name) else base
-    tools = cuts(features, name)
-    solid = one(whole - tools if tools else whole, label)
-    solid.label = label
-    return solid
-
-
 def halves(layout: Layout, features: Sequence[Feature]) -> dict[str, Solid]:
     """Return both halves."""
     front = between([layout.outer_low[0], 0.0, layout.split], layout.outer_high)
     back = between(layout.outer_low, [layout.outer_high[0], layout.top, layout.split])
     return {name: part(name, box, features, name) for name, box in zip(HALVES, (front, back), strict=True)}
-
-
-def cover(layout: Layout, options: MoldOptions) -> Solid:
-    """Return the plate of a lid or a carrier."""
-    low, high = layout.outer_low, layout.outer_high
-    return between([low[0], -options.cover_mm, low[2]], [high[0], 0.0, high[2]])
-
-
-def _assembled(body: Body, foils: tuple[FoilSlot, ...], options: MoldOptions, draft: Draft) -> Mold:
-    layout, features, pegs, slots = halves_and_features(body, foils, options)
-    base = base_region(body.surface)
-    lid_ports = ports(base, body.volume_mm3, options, vented=not options.carrier)
-    gripped = keys(base, lid_ports, options) if options.carrier else None
-    upright = None if options.carrier else lid_pegs(layout, options)
-    if upright is None:
-        features.append(carrier_pins(layout, options))
-    else:
-        features.append(Feature(add={"lid": upright.pegs}, cut=dict.fromkeys(HALVES, upright.holes)))
-    holes = [solid for x in layout.places for solid in openings(lid_ports, x, options)]
-    if gripped is not None:
-        holes += [solid for x in layout.places for solid in key_solids(gripped, x, options)]
-    features.append(Feature(cut={"lid": holes}))
-    name = "carrier" if options.carrier else "lid"
-    parts = {**halves(layout, features), name: part("lid", cover(layout, options), features, name)}
-    if lid_ports.riser is not None:
-        for i, x in enumerate(layout.places, 1):
-            parts[_numbered("riser", i, layout)] = riser_cup(lid_ports, x, options)
-    for feature in features:
-        parts.update(feature.parts)
-    for label, solid in parts.items():
-        solid.label = label
-    return Mold(
-        options=options,
-        body=body,
-        layout=layout,
-        parts=parts,
-        pours=(
-            Pour(
-                "",
-                name,
-                body.volume_mm3 * len(layout.places),
-                lid_ports,
-                tuple(body.at(x) for x in layout.places),
-                tuple(part for part in parts if part not in HALVES),
-            ),
-        ),
-        slots=slots,
-        foils=foils,
-        pegs=pegs,
-        lid_pegs=upright,
-        keys=gripped,
-        draft=draft,
-    )
-
-
-def _numbered(name: str, i: int, layout: Layout) -> str:
-    return name if len(layout.places) == 1 else f"{name}_{i}"
 
 
 # --- refusals ---------------------------------------------------------------------------------------------------------
@@ -330,7 +232,7 @@ def overlaps(mold: Mold) -> dict[str, float]:
         boxes[name] = np.array([*box.min]), np.array([*box.max])
     shared: dict[str, float] = {}
     for pour in mold.pours:
-        names = [name for name in mold.parts if name in pour.others or not any(name in p.others for p in mold.pours)]
+        names = [*HALVES, *pour.others]
         for a, b in itertools.combinations(names, 2):
             apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
             if f"{a}, {b}" not in shared:

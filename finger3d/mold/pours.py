@@ -1,169 +1,170 @@
-"""A mold for each pour of a finger of several solids: both halves serve all pours, and each pour has a lid of its own.
+"""Pours into a mold: both halves serve all of them, and each has a lid of its own.
 
 The solid at the contact face is poured first. The lid of a pour carries a positive of all solids that are poured
 later, so that the silicone fills its own solid only; the next lid carries less. All positives are cut from the
-same CAD as the cavity, so that every solid fits the next. Solids that are printed (`inserts`) sit on pegs of the lid
-and stay in the finger.
+same CAD as the cavity, so that every solid fits the next. Rigid parts are inserts: they are printed, sit on pegs of
+the last lid, and stay in the finger.
 
-A solid that does not reach the base has no pour hole: its silicone is poured into the open halves, and the lid with
-the positive is pushed in slowly. Surplus and air leave through channels at both ends of the positive, and through the
-clearance between the positive and the walls.
+A solid whose base has no room for a pour hole is poured into the open halves, and the lid with its positive or its
+inserts is pushed in slowly. Surplus and air leave through channels at both ends of what is pushed in, and through the
+clearance between it and the walls.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.body import Body
-from finger3d.mold.cover import Ports, base_region, openings, ports, riser_cup
-from finger3d.mold.demould import check_opening, undercut_depth
-from finger3d.mold.fasteners import lid_pegs
-from finger3d.mold.foils import FoilSlot, check_foils, slot
+from finger3d.mold.cover import Ports, openings, ports
+from finger3d.mold.demould import undercut_depth
+from finger3d.mold.fasteners import pegs
+from finger3d.mold.foils import FoilSlot
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.parts import (
-    HALVES,
-    MAIN,
-    Mold,
-    Pour,
-    check_parts,
-    check_split,
-    cover,
-    filled,
-    halves,
-    halves_and_features,
-    part,
-)
-from finger3d.mold.solids import Feature, common, cylinder, one, peg
+from finger3d.mold.regions import base_region, nearest
+from finger3d.mold.solids import Feature, between, common, cylinder, one, part
 
 if TYPE_CHECKING:
     from build123d import Solid
 
+MAIN = "body"
+"""Name of the solid without a label."""
+
 _TOUCHING = 1e-6  # of the body's height: a solid that reaches down so far stands on the base
-_CHANNEL_INSET = 0.3  # distance of a channel's axis from the side of the positive, to which it is open, over its width
+_CHANNEL_INSET = 0.3  # distance of a channel's axis from the end of what is pushed in, over the channel's width
 _SHARED_TOLERANCE = 1e-6  # relative volume that booleans leave
 
 
-def poured(whole: Solid, solids: Mapping[str, Solid], gauges: Sequence[FoilSlot], options: MoldOptions) -> Mold:
-    """Build a mold with a lid for each pour of a body of several solids.
+@dataclass(frozen=True)
+class Pour:
+    """One pour into the mold.
+
+    Attributes
+    ----------
+    label : of the solid that is poured; "" for the main body
+    lid : name of the part that closes the mold
+    silicone_mm3 : volume of the cavity
+    ports : openings of the lid; None where silicone is poured before the lid is pushed on
+    cast : silicone in the cavity after this pour, in place
+    pushed : positive and fillings of recesses, which belong to the lid
+    inserts : rigid parts on the lid, by their labels
+    """
+
+    label: str
+    lid: str
+    silicone_mm3: float
+    ports: Ports | None
+    cast: tuple[Body, ...]
+    pushed: tuple[Solid, ...]
+    inserts: Mapping[str, Solid]
+
+    @property
+    def name(self) -> str:
+        """Label, or "body" for the main body."""
+        return self.label or MAIN
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Names of the parts that belong to this pour only."""
+        return (self.lid, *map(insert_name, self.inserts))
+
+    @property
+    def inside(self) -> tuple[Solid, ...]:
+        """All that the lid brings into the cavity."""
+        return (*self.pushed, *self.inserts.values())
+
+
+def insert_name(label: str) -> str:
+    """Return the name of the part that is printed for a rigid part."""
+    return f"insert_{label or MAIN}"
+
+
+def pour_order(solids: Mapping[str, Solid], rigid: Collection[str], options: MoldOptions) -> list[str]:
+    """Return the labels of the solids that are poured, in the order of their pours, the highest first."""
+    soft = [label for label in solids if label not in rigid]
+    if not soft:
+        raise Finger3dError("--mold: all parts of the finger are rigid, and nothing is left to pour")
+    if len(solids) < 2:
+        raise Finger3dError("--parts: the finger is one solid; leave --parts out, or choose a body of several solids")
+    if not options.pour_order:
+        return sorted(soft, key=lambda label: -float(solids[label].center().Y))
+    names = [name.strip() for name in options.pour_order.split(",")]
+    if sorted(names) != sorted(label or MAIN for label in soft):
+        raise Finger3dError(
+            f"--pour-order {options.pour_order}: must name each once: {', '.join(label or MAIN for label in soft)}"
+        )
+    return ["" if name == MAIN and MAIN not in soft else name for name in names]
+
+
+def pours(
+    silicones: Mapping[str, Body],
+    inserts: Mapping[str, Body],
+    fillings: Sequence[Solid],
+    body: Body,
+    options: MoldOptions,
+) -> tuple[Pour, ...]:
+    """Return the pours with the openings of their lids.
 
     Parameters
     ----------
-    whole : the whole body, y up, base on y = 0, mm
-    solids : its solids by their labels; "" is the main body
+    silicones : solids that are poured, in their order
+    inserts : rigid parts
+    fillings : what fills the recesses in the base
+    body : the whole body
 
     Raises
     ------
     Finger3dError
-        If labels are unknown, a lid's positive cannot stand on it or cannot be pulled out, a gauge's strip would run
-        through a positive, or for the reasons of `finger3d.mold.parts.mold`.
+        If a positive or an insert cannot stand on its lid, a positive cannot be pulled out of the silicone, or a base
+        has no room for the openings.
     """
-    order, inserts = pour_order(solids, options)
-    finger = Body.of(whole, options.machine.tolerance_mm)
-    check_split(finger, options)
-    if options.split == "x" and gauges:
-        raise Finger3dError(f'--split x: gauge "{gauges[0].names[0]}" needs halves that open along z')
-    draft = check_opening(filled(finger, options), options, may_turn=not gauges)
-    body = finger.scaled(options.scale).opening_along_z(options.split)
-    tolerance = options.machine.tolerance_mm
-    cast = {
-        label: Body.of(solid, tolerance, label or MAIN).scaled(options.scale).opening_along_z(options.split)
-        for label, solid in solids.items()
-    }
-    check_foils(body, gauges, options)
-    layout, features, pegs, slots = halves_and_features(body, tuple(gauges), options)
-    upright = lid_pegs(layout, options)
-    features.append(Feature(add={"lid": upright.pegs}, cut=dict.fromkeys(HALVES, upright.holes)))
-    parts = halves(layout, features)
-    pours: list[Pour] = []
-    poured: list[Body] = []
-    steps = [label for label in order if label not in inserts]
-    for label in steps:
-        poured.append(cast[label])
-        later = order[order.index(label) + 1 :]
-        placed = [] if label != steps[-1] else [name for name in later if name in inserts]
-        positive = _positive([cast[name] for name in later if name not in placed], body, layout, options, label)
-        lid_parts, lid_ports = _lid(
-            label, cast[label], positive, [(name, cast[name]) for name in placed], layout, features, options
-        )
-        _check_strips(gauges, cast, label, positive, layout, options)
-        parts.update(lid_parts)
-        pours.append(
-            Pour(label, f"lid_{label or MAIN}", cast[label].volume_mm3, lid_ports, tuple(poured), tuple(lid_parts))
-        )
-    if pours[-1].ports is None:
-        raise Finger3dError(f"mold: {pours[-1].name} has no base to pour it through; choose another --pour-order")
-    for feature in features:
-        parts.update(feature.parts)
-    for name, solid in parts.items():
-        solid.label = name
-    assembled = Mold(
-        options=options,
-        body=body,
-        layout=layout,
-        parts=parts,
-        pours=tuple(pours),
-        slots=slots,
-        foils=tuple(gauges),
-        pegs=pegs,
-        lid_pegs=upright,
-        keys=None,
-        draft=draft,
-    )
-    check_parts(assembled)
-    return assembled
-
-
-def pour_order(solids: Mapping[str, Solid], options: MoldOptions) -> tuple[list[str], list[str]]:
-    """Return the labels in the order of their pours, the highest first, and the labels that are printed."""
-    label_of = {label or MAIN: label for label in solids}
-    if len(solids) < 2:
-        raise Finger3dError("--parts: the finger is one solid; leave --parts out, or choose a body of several solids")
-
-    def labels(option: str, text: str) -> list[str]:
-        names = [name.strip() for name in text.split(",")]
-        if unknown := [name for name in names if name not in label_of]:
-            raise Finger3dError(
-                f"--{option} {text}: there is no solid {unknown[0]}; the finger has {', '.join(label_of)}"
+    pins: list[Solid] = []
+    placed: dict[str, Solid] = {}
+    for label, insert in inserts.items():
+        on_lid, placed[label] = _on_pegs(label, insert, body, options)
+        pins += on_lid
+    made = []
+    for i, (label, silicone) in enumerate(silicones.items()):
+        lid = "lid" if len(silicones) == 1 else f"lid_{label or MAIN}"
+        later = list(silicones.values())[i + 1 :]
+        pushed = [*fillings, *([_positive([*later, *inserts.values()], body, options, lid)] if later else pins)]
+        made.append(
+            Pour(
+                label=label,
+                lid=lid,
+                silicone_mm3=silicone.volume_mm3,
+                ports=_ports(silicone, body, bool(pushed), options),
+                cast=tuple(silicones.values())[: i + 1],
+                pushed=tuple(pushed),
+                inserts={} if later else placed,
             )
-        return [label_of[name] for name in names]
-
-    order = sorted(solids, key=lambda label: -float(solids[label].center().Y))
-    if options.pour_order:
-        order = labels("pour-order", options.pour_order)
-        if sorted(order) != sorted(solids):
-            raise Finger3dError(f"--pour-order {options.pour_order}: must name each once: {', '.join(label_of)}")
-    inserts = labels("inserts", options.inserts) if options.inserts else []
-    first = [label for label in order if label not in inserts]
-    if not first:
-        raise Finger3dError(f"--inserts {options.inserts}: leaves nothing to pour")
-    for label in inserts:
-        if order.index(label) < order.index(first[-1]):
-            raise Finger3dError(
-                f"--inserts {options.inserts}: {label or MAIN} must stand on the base, and be the last of the order"
-            )
-    return order, inserts
+        )
+    return tuple(made)
 
 
-def _positive(later: list[Body], body: Body, layout: Layout, options: MoldOptions, label: str) -> Solid | None:
-    """Return the solids poured later as one positive, clear of the walls of the cavity; None without any."""
-    if not later:
-        return None
+def _clear_of_walls(solids: Sequence[Body], body: Body, options: MoldOptions) -> Solid:
+    """Return solids as one, with the clearance to the walls of the cavity."""
     from build123d import Pos
 
-    gap = options.gap_mm
-    name = f"the positive of lid_{label or MAIN}"
-    advice = "choose another --pour-order, or --inserts"
-    whole = later[0].solid
-    for other in later[1:]:
+    gap = float(options.gap_mm)
+    whole = solids[0].solid
+    for other in solids[1:]:
         whole = whole + other.solid
-    for shift in ((gap, 0), (-gap, 0), (0, gap), (0, -gap)):
-        whole = whole & (Pos(float(shift[0]), 0, float(shift[1])) * body.solid)
-    positive = one(whole, name, advice)
+    for x, z in ((gap, 0), (-gap, 0), (0, gap), (0, -gap)):
+        whole = whole & (Pos(x, 0, z) * body.solid)
+    return whole
+
+
+def _positive(later: Sequence[Body], body: Body, options: MoldOptions, lid: str) -> Solid:
+    """Return the solids that come later as one positive."""
+    name, advice = f"the positive of {lid}", "choose another --pour-order, or make a part rigid, which is an insert"
+    positive = one(_clear_of_walls(later, body, options), name, advice)
     surface = Body.of(positive, options.machine.tolerance_mm, name).surface
     if surface.low[1] > _TOUCHING * body.box[1][1]:
         raise Finger3dError(f"mold: {name} does not reach the lid; {advice}")
@@ -176,91 +177,67 @@ def _positive(later: list[Body], body: Body, layout: Layout, options: MoldOption
     return positive
 
 
-def _lid(
-    label: str,
-    cast: Body,
-    positive: Solid | None,
-    placed: list[tuple[str, Body]],
-    layout: Layout,
-    features: Sequence[Feature],
-    options: MoldOptions,
-) -> tuple[dict[str, Solid], Ports | None]:
-    """Return the lid of a pour, with its riser and the inserts that stand on it, and its openings."""
-    name = f"lid_{label or MAIN}"
-    lid_ports = _ports(cast, layout, options)
-    adds = [positive] if positive is not None else []
-    tools = openings(lid_ports, 0.0, options) if lid_ports is not None else _channels(cast, positive, layout, options)
-    insert_parts: dict[str, Solid] = {}
-    for insert, solid in placed:
-        pins, holes = _insert_pegs(insert, solid, options)
-        adds += pins
-        insert_parts[f"insert_{insert or MAIN}"] = one(solid.solid - holes, insert or MAIN)
-    lid = part("lid", cover(layout, options), [*features, Feature(add={"lid": adds}, cut={"lid": tools})], name)
-    lid_parts = {name: lid}
-    if lid_ports is not None and lid_ports.riser is not None:
-        lid_parts[f"riser_{label or MAIN}"] = riser_cup(lid_ports, 0.0, options)
-    return {**lid_parts, **insert_parts}, lid_ports
-
-
-def _ports(cast: Body, layout: Layout, options: MoldOptions) -> Ports | None:
-    """Return the openings over the base of a solid; None where it has no base wide enough for them."""
-    if cast.surface.low[1] > _TOUCHING * layout.high[1]:
-        return None
+def _ports(cast: Body, body: Body, pushed: bool, options: MoldOptions) -> Ports | None:
+    """Return the openings over the base of a solid; None where it is narrow or none, and something is pushed in."""
     base = base_region(cast.surface)
-    x0, z0, x1, z1 = base.bounds()
-    if base.offset(-max(options.rim_mm, 0.02 * min(x1 - x0, z1 - z0))).is_empty():
-        return None
-    return ports(base, cast.volume_mm3, options)
+    on_base = cast.surface.low[1] <= _TOUCHING * body.box[1][1]
+    wide = on_base and (options.pour_mm is not None or not base.offset(-options.rim_mm).is_empty())
+    return None if pushed and not wide else ports(base, options)
 
 
-def _channels(cast: Body, positive: Solid | None, layout: Layout, options: MoldOptions) -> list[Solid]:
-    """Return channels along both ends of a positive, through which surplus silicone and air leave."""
-    if positive is None:
-        return []
-    bounds = positive.bounding_box()
-    low, high = np.array([*bounds.min]), np.array([*bounds.max])
+def lid_parts(pour: Pour, layout: Layout, features: Sequence[Feature], options: MoldOptions) -> dict[str, Solid]:
+    """Return the lid of a pour, and the inserts that stand on it."""
+    channels = _channels(pour, layout, options) if pour.ports is None else []
+    holes = openings(pour.ports, options.lid_mm) if pour.ports is not None else channels
+    # Where the silicone has a base, channels in the lid alone reach it, and the inserts stay whole.
+    through = channels if pour.cast[-1].surface.low[1] > _TOUCHING * layout.high[1] else []
+    inserts = {insert_name(n): one(solid - through, n) if through else solid for n, solid in pour.inserts.items()}
+    low, high = layout.outer_low, layout.outer_high
+    plate = between([low[0], -options.lid_mm, low[2]], [high[0], 0.0, high[2]])
+    own = Feature(add={"lid": pour.pushed}, cut={"lid": holes})
+    return {pour.lid: part("lid", plate, [*features, own], pour.lid), **inserts}
+
+
+def _channels(pour: Pour, layout: Layout, options: MoldOptions) -> list[Solid]:
+    """Return channels along both ends of what is pushed in, through which surplus silicone and air leave."""
+    boxes = [solid.bounding_box() for solid in pour.inside]
+    low, high = np.min([[*box.min] for box in boxes], axis=0), np.max([[*box.max] for box in boxes], axis=0)
     wide = min(2.0, 0.1 * float(min(high[0] - low[0], high[2] - low[2])))
     wide = wide if options.vent_mm is None else options.vent_mm
-    length = float(high[1]) + options.lid_mm
     return [
-        cylinder((x, -options.lid_mm, layout.split), wide, length, "y")
+        cylinder((x, -options.lid_mm, layout.split), wide, float(high[1]) + options.lid_mm, "y")
         for x in (float(low[0]) + _CHANNEL_INSET * wide, float(high[0]) - _CHANNEL_INSET * wide)
     ]
 
 
-def _insert_pegs(label: str, solid: Body, options: MoldOptions) -> tuple[list[Solid], list[Solid]]:
-    """Return two pegs on the lid that hold an insert, one thinner, and their holes in it."""
-    low, high = solid.box
-    d = min(options.peg_mm, 0.25 * float(high[2] - low[2]), 0.25 * float(high[0] - low[0]))
-    deep = min(d, 0.5 * float(high[1]))
-    if deep < 2.0 * options.machine.thinnest_mm or solid.surface.low[1] > _TOUCHING * high[1]:
-        raise Finger3dError(f"--inserts {label or MAIN}: must stand on the base, and be large enough to hold two pegs")
-    middle, quarter = 0.5 * (low + high), 0.25 * (high - low)
-    along = np.array([quarter[0], 0.0, 0.0]) if quarter[0] >= quarter[2] else np.array([0.0, 0.0, quarter[2]])
-    pins, holes = [], []
-    for sign, size in ((-1.0, 0.7 * d), (1.0, d)):
-        x, _, z = middle + sign * along
-        pins.append(peg((x, 0.0, z), size, deep, "y"))
-        holes.append(cylinder((x, 0.0, z), size + 2.0 * options.gap_mm, deep + options.gap_mm, "y"))
-    return pins, holes
+def _on_pegs(label: str, insert: Body, body: Body, options: MoldOptions) -> tuple[list[Solid], Solid]:
+    """Return two pegs of the lid, one thinner, and the insert that sits on them."""
+    (x0, _, z0), (x1, high, z1) = insert.box
+    d = min(options.peg_mm, 0.25 * float(x1 - x0), 0.25 * float(z1 - z0))
+    deep, thinnest = min(d, 0.5 * float(high)), options.machine.thinnest_mm
+    around = d / 2.0 + options.gap_mm + thinnest
+    foot = base_region(insert.surface).offset(-around)
+    on_base = insert.surface.low[1] <= _TOUCHING * high
+    x, z, dx, dz = 0.5 * (x0 + x1), 0.5 * (z0 + z1), 0.25 * (x1 - x0), 0.25 * (z1 - z0)
+    ends = [((x - dx, z), (x + dx, z)), ((x, z - dz), (x, z + dz))]
+    first, second = max((tuple(nearest(foot, end) for end in pair) for pair in ends), key=lambda pair: math.dist(*pair))
+    room = not foot.is_empty() and math.dist(first, second) >= 2.0 * around
+    if not (on_base and room and d >= 2.0 * thinnest and deep >= thinnest):
+        raise Finger3dError(
+            f"[parts.{label}] rigid = true: it is an insert, which the lid holds; it must stand on the base and be "
+            f"large enough for two pegs of {2.0 * thinnest:g} mm or more"
+        )
+    places = [(px, 0.0, pz) for px, pz in (first, second)]
+    made, sockets = pegs(places, d, deep, "y", options.gap_mm)
+    return made, one(_clear_of_walls([insert], body, options) - sockets, label)
 
 
-def _check_strips(
-    gauges: Sequence[FoilSlot],
-    cast: Mapping[str, Body],
-    label: str,
-    positive: Solid | None,
-    layout: Layout,
-    options: MoldOptions,
-) -> None:
-    """Raise a Finger3dError if the strip of a gauge in this solid runs through the positive of its pour."""
-    for foil in gauges:
-        strip = slot(foil, layout, options, 0.0)
-        inside = {name: body.shared(strip) for name, body in cast.items()}
-        if max(inside, key=lambda name: inside[name]) != label or positive is None:
-            continue
-        if common(strip, positive) > _SHARED_TOLERANCE * float(strip.volume):
+def check_strips(pours: Sequence[Pour], strips: Mapping[FoilSlot, Solid]) -> None:
+    """Raise a Finger3dError if the strip of a gauge runs through what the lid of its pour brings into the cavity."""
+    for foil, strip in strips.items():
+        home = max(pours, key=lambda pour: pour.cast[-1].shared(strip))
+        if any(common(strip, solid) > _SHARED_TOLERANCE * float(strip.volume) for solid in home.inside):
             raise Finger3dError(
-                f'gauge "{foil.names[0]}": its strip runs through the positive of lid_{label or MAIN}; move it into '
-                "one solid, clear of the others"
+                f'gauge "{foil.names[0]}": its strip runs through what {home.lid} brings into the cavity; move it into '
+                "one solid of silicone, clear of the others"
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,13 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 
 if TYPE_CHECKING:
-    from build123d import Solid
     from manifold3d import CrossSection, Manifold
 
 CIRCLE_SEGMENTS = 64
 """Segments of a full circle where a region is widened."""
 
 _SIMPLIFY_MM = 0.04  # deviation of the outlines of widened regions, below half of any clearance
-_ORDER = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}  # right-handed axes with the normal of a section last
+_BASE_HEIGHT = 1e-4  # over the body's height: where its base is cut
 
 
 def manifold(surface: Triangles) -> Manifold:
@@ -50,26 +49,10 @@ def triangles(solid: Manifold) -> Triangles:
     return Triangles(np.array(mesh.vert_properties[:, :3], dtype=np.float64), np.array(mesh.tri_verts, dtype=np.int64))
 
 
-def section(surface: Triangles, axis: Literal["x", "y", "z"], coordinate: float) -> CrossSection:
-    """Return the plane region in which a body is cut at a coordinate.
-
-    Its coordinates are (x, y) for "z", (z, x) for "y" and (y, z) for "x".
-    """
-    turned = Triangles(surface.points[:, list(_ORDER[axis])], surface.faces)
-    return manifold(turned).slice(coordinate)
-
-
-def footprint(surface: Triangles, height: float) -> CrossSection:
-    """Return the region (x, z) in which a body is cut a little above its base, by `height` times its own height."""
-    region = section(surface, "y", float(surface.low[1] + height * (surface.high[1] - surface.low[1])))
-    return exchanged(region)
-
-
-def exchanged(region: CrossSection) -> CrossSection:
-    """Return a region with its two coordinates exchanged."""
-    from manifold3d import CrossSection
-
-    return CrossSection([np.ascontiguousarray(p[::-1, ::-1]) for p in region.to_polygons()])
+def base_region(surface: Triangles) -> CrossSection:
+    """Return the region (x, z) of a body's base."""
+    turned = Triangles(surface.points[:, [0, 2, 1]], surface.faces[:, ::-1])
+    return manifold(turned).slice(float(turned.low[2] + _BASE_HEIGHT * (turned.high[2] - turned.low[2])))
 
 
 def widened(region: CrossSection, distance: float) -> CrossSection:
@@ -78,13 +61,6 @@ def widened(region: CrossSection, distance: float) -> CrossSection:
 
     grown = region.offset(distance, JoinType.Round, 2.0, CIRCLE_SEGMENTS)
     return grown.simplify(min(_SIMPLIFY_MM, 0.1 * abs(distance)))
-
-
-def rectangle(low: Sequence[float], high: Sequence[float]) -> CrossSection:
-    """Return the rectangle between two corners."""
-    from manifold3d import CrossSection
-
-    return CrossSection.square((high[0] - low[0], high[1] - low[1])).translate((low[0], low[1]))
 
 
 def disc(middle: Sequence[float], diameter: float) -> CrossSection:
@@ -121,32 +97,6 @@ def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]
         if off.min() < distance:
             best, distance = feet[int(off.argmin())], float(off.min())
     return float(best[0]), float(best[1])
-
-
-def prisms(region: CrossSection, axis: Literal["y", "z"], start: float, length: float) -> list[Solid]:
-    """Return the CAD solids over a region, (x, y) or (x, z), from a coordinate of the axis over a signed length."""
-    from build123d import Face, Location, Polyline, Wire, extrude
-
-    def wire(polygon: Float) -> Wire:
-        return Wire(Polyline(*((float(a), float(b)) for a, b in polygon), close=True).edges())
-
-    solids = []
-    for piece in region.decompose():
-        outlines = sorted(piece.to_polygons(), key=lambda p: -abs(_area(p)))
-        face = Face(wire(outlines[0]), [wire(p) for p in outlines[1:]])
-        if face.normal_at().Z < 0.0:
-            face = -face
-        solid = extrude(face, amount=abs(length), dir=(0, 0, 1)).solids()[0]
-        low = min(start, start + length)
-        # A rotation about x by 90 degrees takes (x, y, h) to (x, -h, y).
-        placed = Location((0, 0, low)) if axis == "z" else Location((0, low + abs(length), 0), (90, 0, 0))
-        solids.append(solid.moved(placed))
-    return solids
-
-
-def _area(polygon: Float) -> float:
-    x, y = polygon.T
-    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 def difference(body: Triangles, tools: Sequence[Triangles]) -> Triangles:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -71,16 +71,6 @@ def hexagon(start: Place, flats: float, length: float, axis: Axis) -> Solid:
     return (_placed(start, axis) * prism).solids()[0]
 
 
-def revolved(profile: Sequence[tuple[float, float]], start: Place, axis: Axis) -> Solid:
-    """Return the solid of revolution of a closed polygon of radii and heights; the heights run along an axis."""
-    from build123d import Axis as Line
-    from build123d import Plane, Polyline, make_face, revolve
-
-    wire = Polyline(*((r, 0.0, h) for r, h in profile), close=True)
-    body = revolve(make_face(Plane.XZ * Plane.XZ.to_local_coords(wire)), Line.Z)
-    return (_placed(start, axis) * body).solids()[0]
-
-
 def _placed(start: Place, axis: Axis):  # type: ignore[no-untyped-def]  # a build123d location
     from build123d import Pos, Rot
 
@@ -117,21 +107,15 @@ def common(a: Shape, b: Shape) -> float:
 
 @dataclass(frozen=True)
 class Feature:
-    """Solids that are added to parts, and solids that are then cut from parts, both by the name of the part.
-
-    Parts are half_a, half_b and lid; `parts` are further ones of the feature itself.
-    """
+    """Solids that are added to half_a, half_b and lid, and solids that are then cut from them, by the part's name."""
 
     add: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
     cut: Mapping[str, Sequence[Solid]] = field(default_factory=dict)
-    parts: Mapping[str, Solid] = field(default_factory=dict)
 
 
-def added(features: Iterable[Feature], name: str) -> list[Solid]:
-    """Return all that features add to a part."""
-    return [solid for feature in features for solid in feature.add.get(name, ())]
-
-
-def cuts(features: Iterable[Feature], name: str) -> list[Solid]:
-    """Return all that features cut from a part."""
-    return [solid for feature in features for solid in feature.cut.get(name, ())]
+def part(name: str, base: Solid, features: Sequence[Feature], label: str) -> Solid:
+    """Return a part: a box, with what features add to it, without what they cut from it."""
+    add = [solid for feature in features for solid in feature.add.get(name, ())]
+    cut = [solid for feature in features for solid in feature.cut.get(name, ())]
+    whole = base + add if add else base
+    return one(whole - cut if cut else whole, label)

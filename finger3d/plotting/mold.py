@@ -22,19 +22,14 @@ COLOURS = {
     "half_a": "#9db4c8",
     "half_b": "#c9d9ee",
     "lid": "#8d8a84",
-    "carrier": "#59636e",
-    "riser": "#bdb7a9",
-    "plug": "#e0c341",
-    "pin": "#bdb7a9",
     "insert": "#6f4e7c",
     "sensor": "#f28e2b",
     "strips": "#222222",
-    "bed": "#e9e9e4",
     "silicone": "#f28e2b",
     "silicone_2": "#e15759",
     "silicone_3": "#4e79a7",
 }
-"""Colours of parts by their kind, the first word of their name."""
+"""Colours of parts by their kind."""
 
 OPACITY = {"half_b": 0.35}
 """Opacity of parts that are not opaque: the front half would hide its pegs, the gauge strips and the sensor."""
@@ -42,7 +37,7 @@ OPACITY = {"half_b": 0.35}
 LABELS = {"half_a": "half A", "half_b": "half B", "strips": "gauge strips"}
 
 _VIEW = np.array([0.55, 0.5, 1.0])  # direction towards the viewer
-_LYING = np.array([0.1, 1.0, 0.7])  # the same for parts on the bed, from above
+_LYING = np.array([0.1, 1.0, 0.7])  # the same for parts as they lie, from above
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
 _SEPARATION = 0.45  # distance between the parts, relative to their largest extent
 _WINDOW_OVER_PARTS = 1.08  # size of the window over that of the parts
@@ -94,46 +89,29 @@ def colour(name: str) -> str:
     return COLOURS.get(name, COLOURS.get(kind(name), "#a8a8a8"))
 
 
-def separations(sizes: Mapping[str, tuple[Float, Float]]) -> dict[str, Float]:
+def separations(parts: Mapping[str, Triangles]) -> dict[str, Float]:
     """Return the shift (3,), mm, of each part that takes an assembled mold apart, in the axes of the mold.
 
-    Halves and their plugs move along z, lids one above the other along -y, and cups and pins further than the lids.
-
-    Parameters
-    ----------
-    sizes : lowest and highest corner (3,) of each part
+    Halves move along z, lids one above the other along -y, and inserts to below the last lid.
     """
-    size = max(float((high - low).max()) for low, high in sizes.values())
-    halves = [sizes[name] for name in ("half_a", "half_b") if name in sizes]
-    thick = float(max(high[2] for _, high in halves) - min(low[2] for low, _ in halves)) if halves else 0.0
+    size = max(float((part.high - part.low).max()) for part in parts.values())
+    halves = [parts[name] for name in ("half_a", "half_b") if name in parts]
+    thick = float(max(half.high[2] for half in halves) - min(half.low[2] for half in halves)) if halves else 0.0
     apart, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
-    lids = [name for name in sizes if kind(name) in ("lid", "carrier")]
-    shifts = {}
-    for name in sizes:
-        what, shift = kind(name), np.zeros(3)
-        if what == "half_a" or (what == "plug" and name.endswith("a")):
-            shift[2] = apart * (1.3 if what == "plug" else 1.0)
-        elif what == "half_b" or (what == "plug" and name.endswith("b")):
-            shift[2] = -apart * (1.3 if what == "plug" else 1.0)
-        elif name in lids:
-            shift[1] = -above * (1.0 + lids.index(name))
-        elif what in ("riser", "pin"):
-            below = name.replace("riser", "lid")  # a riser of one of several lids
-            level = 1.0 + lids.index(below) if below in lids else float(len(lids))
-            shift[1] = -above * (level + 0.4)
-        elif what == "insert":
-            shift[1] = -0.5 * above
-        shifts[name] = shift
+    lids = [name for name in parts if kind(name) == "lid"]
+    shifts = dict.fromkeys(parts, np.zeros(3))
+    for name in parts:
+        if kind(name) in ("half_a", "half_b"):
+            shifts[name] = np.array([0.0, 0.0, apart if name == "half_a" else -apart])
+        elif kind(name) in ("lid", "insert"):
+            shifts[name] = np.array([0.0, -above * (lids.index(name) + 1.0 if name in lids else len(lids) - 0.5), 0.0])
     return shifts
 
 
-def exploded(assembled: Mapping[str, Triangles]) -> Scenery:
-    """Return the exploded view of an assembled mold: halves apart along z, the lid above, the sensor in place."""
-    shifts = separations({name: (part.low, part.high) for name, part in assembled.items()})
-    parts = {
-        name: Triangles((part.points + shifts[name]) @ _POURING_AXES.T, part.faces) for name, part in assembled.items()
-    }
-    return scenery(parts)
+def taken_apart(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
+    """Return the parts of an assembled mold apart."""
+    shifts = separations(assembled)
+    return {name: Triangles(part.points + shifts[name], part.faces) for name, part in assembled.items()}
 
 
 def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
@@ -161,7 +139,8 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     Parameters
     ----------
     path : PNG file to write
-    assembled : surfaces of half_a, half_b, lid, sensor and, if the scene has gauges, strips, in the axes of the mold
+    assembled : surfaces of half_a, half_b, lids, inserts, sensor and, if the scene has gauges, strips, in the axes of
+        the mold
     title : title of the picture
     sizes : remark on each part, shown below its name; a part without a remark has no label
 
@@ -175,7 +154,7 @@ def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: M
     MissingError
         If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
     """
-    view = exploded(assembled)
+    view = scenery(standing(taken_apart(assembled)))
     images = rendered([view])
     image = None if images is None else images[0]
     width, height = view.half
@@ -267,18 +246,18 @@ class StepPicture:
     Attributes
     ----------
     path : PNG file
-    parts : surfaces, mm, by the names of parts, y up, or z up on the bed
-    on_bed : whether the parts lie on the bed of the printer
+    parts : surfaces, mm, by the names of parts, y up, or z up as they lie
+    lying : whether the parts lie as they are printed
     """
 
     path: Path
     parts: Mapping[str, Triangles]
-    on_bed: bool = False
+    lying: bool = False
 
 
 def step_pictures(pictures: Sequence[StepPicture]) -> str:
     """Write the pictures of all steps, in one run of the renderer; returns the renderer."""
-    views = [scenery(_y_up(p), _LYING, opaque=True) if p.on_bed else scenery(p.parts) for p in pictures]
+    views = [scenery(_y_up(p), _LYING, opaque=True) if p.lying else scenery(p.parts) for p in pictures]
     images = rendered(views)
     for i, (one, view) in enumerate(zip(pictures, views, strict=True)):
         width, height = view.half
@@ -290,6 +269,6 @@ def step_pictures(pictures: Sequence[StepPicture]) -> str:
 
 
 def _y_up(picture: StepPicture) -> dict[str, Triangles]:
-    """Return parts on a bed (z up) with y up, as the camera stands."""
+    """Return parts that lie (z up) with y up, as the camera stands."""
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     return {name: Triangles(part.points @ turn.T, part.faces) for name, part in picture.parts.items()}
