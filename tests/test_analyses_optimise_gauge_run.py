@@ -24,6 +24,7 @@ def test_more_gauges_tell_more(tmp_path: Path) -> None:
     first, second = data["gauges"]
     assert second["mean_mu_sd_with_those_before"] < first["mean_mu_sd_with_those_before"]
     assert found.found.objective == pytest.approx(data["mean_mu_sd"])
+    assert math.dist(*([g[f"{axis}_mm"] for axis in "xyz"] for g in data["gauges"])) >= 3.0 - 1e-9
     for gauge in found.scene.model().gauges:
         assert abs(gauge.x_mm) < 50.0
         assert 0.0 < gauge.y_mm < 50.0

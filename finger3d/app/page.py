@@ -157,7 +157,8 @@ class Slider:
             updatemode="drag",
             allow_direct_input=False,
         )
-        return html.Div([html.Label(self.label, htmlFor=f"{name}-typed"), box, slider], style={"marginBottom": "0.5rem"})
+        label = html.Label(self.label, htmlFor=f"{name}-typed")
+        return html.Div([label, box, slider], style={"marginBottom": "0.5rem"})
 
 
 def numbers_of(press: LivePress) -> str:

@@ -34,6 +34,9 @@ def optimise(
             "tolerances of a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg."
         ),
     ] = None,
+    spacing: Annotated[
+        float, Parameter(help="Least distance of two of these, mm: their length, so that none overlap.")
+    ] = 3.0,
     tolerance: Tolerances = None,
     objective: Annotated[
         str, Parameter(help="sensitivity, or a Python file with objective(table) -> number; the largest is best.")
@@ -65,7 +68,7 @@ def optimise(
         The scene file (TOML).
     """
     if gauges is not None:
-        _place_gauges(scene, gauges, free or [], out, mu, noise, tolerance, set_, json_)
+        _place_gauges(scene, gauges, free or [], out, mu, noise, tolerance, set_, json_, spacing)
         return
     from finger3d.analyses.optimise.run import optimise as run
 
@@ -108,6 +111,7 @@ def _place_gauges(
     tolerance: list[str] | None,
     set_: list[str] | None,
     json_: bool,
+    spacing_mm: float,
 ) -> None:
     """Find the places of several gauges, and print them."""
     from finger3d.analyses.optimise.gauge_run import place_gauges
@@ -115,7 +119,7 @@ def _place_gauges(
     check_writable(out, scene)
     with job(json_, lambda _: "nothing was written") as report:
         mus, tolerances = _mus(mu) if mu else None, parsed_tolerances(tolerance)
-        result = place_gauges(scene, count, out, free, mus, noise, tolerances, set_ or (), report)
+        result = place_gauges(scene, count, out, free, mus, noise, tolerances, set_ or (), report, spacing_mm)
     data = result.as_dict()
     if json_:
         print_json(data)

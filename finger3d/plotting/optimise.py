@@ -92,7 +92,7 @@ def draw_places(path: Path, mus: Sequence[float], mu_sd: Float, maps: Sequence[G
     count = len(maps)
     columns = 2 if count in (1, 3) else _COLUMNS
     made = sheet(count + 1, columns, (5.6, 4.6), (0.75, 0.25, 0.6, 0.5))
-    every = np.concatenate([one.mean_mu_sd for one in maps])
+    every = np.concatenate([one.mean_mu_sd[np.isfinite(one.mean_mu_sd)] for one in maps])
     low, high = float(every.min()), float(np.quantile(every, _HIGHEST))
     for i, (one, axes) in enumerate(zip(maps, made.axes, strict=False)):
         drawn = axes.scatter(

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
-from finger3d.analyses.optimise.gauge_search import NOWHERE, Candidates, GaugeSet, Region, objectives, search
+from finger3d.analyses.optimise.gauge_search import NOWHERE, SPACING_MM, Candidates, GaugeSet, Region, search
 from finger3d.analyses.optimise.task import MUS
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, claimed, write_csv, write_json
@@ -41,7 +42,7 @@ class GaugePlaces:
     mus : (m,) coefficients of friction at which they are judged
     found : the gauges and their Fisher matrices
     maps : for each gauge, places (c, 3) and the mean standard deviation (c,) of mu if the gauge is moved there, in the
-        best direction, while the others stay
+        best direction, while the others stay; infinite near these
     scene : with these gauges instead of its own
     """
 
@@ -53,13 +54,14 @@ class GaugePlaces:
     def as_dict(self) -> Tree:
         """Return the content of gauges.json."""
         sd, each = self.found.mu_sd, self.found.alone
-        gauges, before = self.found.gauges, self.found.prior
-        first = [GaugeSet(gauges[: i + 1], before).objective for i in range(len(gauges))]
+        gauges = self.found.gauges
+        first = [replace(self.found, gauges=gauges[: i + 1]).objective for i in range(len(gauges))]
         return {
             "scene": self.scene.as_dict(),
             "mu": list(self.mus),
             "mu_sd": sd,
             "mean_mu_sd": self.found.objective,
+            "spacing_mm": self.found.spacing_mm,
             "gauges": [
                 {
                     "name": f"g{i + 1}",
@@ -71,7 +73,7 @@ class GaugePlaces:
                     "mean_mu_sd_with_those_before": first[i],
                     "mu_sd_alone": own,
                 }
-                for i, (g, own) in enumerate(zip(self.found.gauges, each, strict=True))
+                for i, (g, own) in enumerate(zip(gauges, each, strict=True))
             ],
         }
 
@@ -86,6 +88,7 @@ def place_gauges(
     tolerances: Mapping[str, float] | None = None,
     overrides: Sequence[str] = (),
     report: Progress | None = None,
+    spacing_mm: float = SPACING_MM,
 ) -> GaugePlaces:
     """Find the places and directions of gauges that together determine mu best, as ``finger3d optimise --gauges``.
 
@@ -101,6 +104,7 @@ def place_gauges(
     tolerances : standard deviations by name, in place of the defaults of `calibrate`; 0 omits one
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     report : told about stages
+    spacing_mm : least distance between the middles of two gauges: at their length, no two overlap
 
     Returns
     -------
@@ -115,7 +119,7 @@ def place_gauges(
     report = report or Progress()
     given, path = tables_of(scene, overrides)
     keys, mus = free_keys(free or ()), MUS if mus is None else mus
-    _check(count, mus, noise)
+    _check(count, mus, noise, spacing_mm)
     scene = parse(given, path)
     model = scene.model()
     if model.inclusions is not None:
@@ -126,7 +130,7 @@ def place_gauges(
     region = _region(model, keys)
     with claimed(out, "optimise") as folder:
         fields = GaugeFields.of(model, mus, noise, with_defaults(tolerances, largest_spread(scene.tables)), report)
-        found, everywhere = search(fields, region, count, report)
+        found, everywhere = search(fields, region, count, report, spacing_mm)
         maps = tuple(_map(found, i, everywhere) for i in range(count))
         result = GaugePlaces(tuple(mus), found, maps, _with_gauges(given, path, found))
         report.stage("writing")
@@ -134,13 +138,15 @@ def place_gauges(
     return result
 
 
-def _check(count: int, mus: Sequence[float], noise: float) -> None:
+def _check(count: int, mus: Sequence[float], noise: float, spacing_mm: float) -> None:
     if not 1 <= count <= MOST:
         raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
     if len(mus) < 3 or any(b <= a for a, b in zip(mus, mus[1:], strict=False)):
         raise Finger3dError("--mu: must be at least three numbers, ascending")
     if not 1e-12 <= noise <= LARGEST_STRAIN:
         raise Finger3dError(f"--noise {noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
+    if not 0.0 <= spacing_mm <= FARTHEST_MM:
+        raise Finger3dError(f"--spacing {spacing_mm:g}: must be a number from 0 to {FARTHEST_MM:g} (mm)")
 
 
 def _region(model: Model, free: Sequence[FreeKey]) -> Region:
@@ -167,7 +173,7 @@ def _region(model: Model, free: Sequence[FreeKey]) -> Region:
 
 def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, Float]:
     """Return places (c, 3), and the mean standard deviation (c,) of mu with gauge `number` there, at its best angle."""
-    values = objectives(found.fisher(without=number), everywhere)
+    values = found.objectives(everywhere, instead=number)
     places, which = np.unique(everywhere.places, axis=0, return_inverse=True)
     best = np.full(len(places), np.inf)
     np.minimum.at(best, which.ravel(), values)

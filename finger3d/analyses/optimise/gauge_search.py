@@ -1,7 +1,8 @@
 """Search for the places and directions of gauges that together determine mu best.
 
 The gauges are found one after another, each the best beside those before it (greedy), and then exchanged one at a time
-as long as that helps: first on a grid over the whole region, then on finer and finer ones around each gauge.
+as long as that helps: first on a grid over the whole region, then on finer and finer ones around each gauge.  Their
+middles keep a distance: two gauges of that length then overlap in no direction.
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects, mu_sd, prior
 
 NOWHERE = "no gauge within these bounds lies in the finger"
+
+SPACING_MM = 3.0
+"""Least distance between the middles of two gauges: the length of the measuring grid of a common foil gauge (HBM offers
+1.5, 3 and 6 mm, and recommends 3 to 6 mm)."""
 
 _PLACES = 1200
 """Places of the grid over the whole region, about."""
@@ -115,10 +120,23 @@ class GaugeSet:
     ----------
     gauges : in the order in which they were found
     prior : (1 + q, 1 + q) Fisher matrix without them
+    spacing_mm : least distance between the middles of two
     """
 
     gauges: tuple[PlacedGauge, ...]
     prior: Float
+    spacing_mm: float
+
+    def objectives(self, candidates: Candidates, instead: int | None = None) -> Float:
+        """Return the mean standard deviation (c,) of mu with each candidate more, or instead of a gauge.
+
+        It is infinite for a candidate too near to another gauge.
+        """
+        values = objectives(self.fisher(without=instead), candidates)
+        for i, gauge in enumerate(self.gauges):
+            near = np.linalg.norm(candidates.places - gauge.place, axis=1) < self.spacing_mm * (1.0 - 1e-9)
+            values[near & (i != instead)] = np.inf
+        return values
 
     def fisher(self, without: int | None = None) -> Float:
         """Return the Fisher matrices (m, 1 + q, 1 + q) of all gauges but one."""
@@ -153,20 +171,28 @@ def objectives(fixed: Float, candidates: Candidates) -> Float:
     return np.asarray(mu_sd(fixed + candidates.effects.fisher).mean(axis=-1))
 
 
-def search(fields: GaugeFields, region: Region, count: int, report: Progress) -> tuple[GaugeSet, Candidates]:
-    """Return the best `count` gauges, and the candidates of the whole region.
+def search(
+    fields: GaugeFields, region: Region, count: int, report: Progress, spacing_mm: float = SPACING_MM
+) -> tuple[GaugeSet, Candidates]:
+    """Return the best `count` gauges at a distance `spacing_mm` or more, and the candidates of the whole region.
 
     The prior standard deviation of mu is that of a uniform distribution over the range of the pressed values.
     """
     report.stage("comparing places")
     spread = (fields.mus[-1] - fields.mus[0]) / math.sqrt(12.0)
-    found = GaugeSet((), prior(len(fields.shared), spread))
+    found = GaugeSet((), prior(len(fields.shared), spread), spacing_mm)
     points, spacing = region.grid()
     everywhere = Candidates.of(fields, points, region.angles())
     if not len(everywhere.angles):
         raise Finger3dError(f"optimise --gauges: {NOWHERE}; widen the bounds")
     for number in range(count):
-        found = found.placed(_best(found.fisher(), everywhere)[0])
+        best, value = _best(found, everywhere)
+        if not math.isfinite(value):
+            raise Finger3dError(
+                f"optimise --gauges {count}: only {number} have room {spacing_mm:g} mm apart within these bounds; "
+                "lower --spacing, or widen the bounds"
+            )
+        found = found.placed(best)
         report.stage(f"{number + 1} gauge{'s' if number else ''}: mu +- {found.objective:.3g} in the mean")
     found = _exchanged(found, lambda _: everywhere)
     turn = math.radians(7.5)
@@ -180,9 +206,9 @@ def search(fields: GaugeFields, region: Region, count: int, report: Progress) ->
     return found, everywhere
 
 
-def _best(fixed: Float, candidates: Candidates) -> tuple[PlacedGauge, float]:
-    """Return the best candidate beside gauges of Fisher matrices `fixed`, and its objective."""
-    values = objectives(fixed, candidates)
+def _best(found: GaugeSet, candidates: Candidates, instead: int | None = None) -> tuple[PlacedGauge, float]:
+    """Return the best candidate beside gauges, or instead of one of them, and its objective."""
+    values = found.objectives(candidates, instead)
     i = int(np.argmin(values))
     effects, variance = candidates.effects.effects[i], candidates.effects.variance[i]
     chosen = PlacedGauge(candidates.places[i], float(candidates.angles[i]), ReadingEffects(effects, variance).fisher)
@@ -194,7 +220,7 @@ def _exchanged(found: GaugeSet, candidates: Callable[[PlacedGauge], Candidates])
     for _ in range(_LARGEST_SWEEPS):
         before = found.objective
         for i, gauge in enumerate(found.gauges):
-            other, value = _best(found.fisher(without=i), candidates(gauge))
+            other, value = _best(found, candidates(gauge), instead=i)
             if value < found.objective * (1.0 - _GAIN):
                 found = found.placed(other, instead=i)
         if found.objective >= before * (1.0 - _GAIN):
