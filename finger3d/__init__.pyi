@@ -10,6 +10,7 @@ from finger3d.analyses.plan import plan as plan
 from finger3d.analyses.press import press as press
 from finger3d.analyses.reduced import ReducedModel as ReducedModel
 from finger3d.analyses.result import PressResult as PressResult
+from finger3d.analyses.result import load as load
 from finger3d.analyses.sensitivity import sensitivity as sensitivity
 from finger3d.analyses.sweep.run import sweep as sweep
 from finger3d.contact.friction import Coulomb as Coulomb
@@ -31,7 +32,6 @@ from finger3d.objects import Sphere as Sphere
 from finger3d.objects import Wave as Wave
 from finger3d.objects import Wedge as Wedge
 from finger3d.scene import Scene as Scene
-from finger3d.scene import load as load
 from finger3d.scene import parse as parse
 from finger3d.sensor import estimate as estimate
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
+from collections.abc import Callable
 from dataclasses import asdict
 from html import escape
 from pathlib import Path
@@ -129,3 +131,54 @@ def test_steps_have_typed_numbers_that_are_those_of_the_summary(solid: PressResu
     assert [asdict(step) for step in solid.steps] == [without_others | step for step in solid.summary()["steps"]]
     assert solid.last == solid.steps[-1]
     assert solid.last.normal_force_N > solid.last.friction_sum_N > 0.0
+
+
+def test_a_folder_opens_as_the_result_that_was_written_there(solid: PressResult) -> None:
+    opened = finger3d.load(str(solid.out))
+    assert (repr(opened), opened.outcome, opened.steps) == (repr(solid), solid.outcome, solid.steps)
+    assert opened.history is None
+    for table in ("history", "contact"):
+        assert opened.to_dataframe(table).equals(solid.to_dataframe(table))
+    assert np.array_equal(opened.to_pyvista(2)["pressure"], solid.to_pyvista(2)["pressure"])
+    assert opened._repr_html_() == solid._repr_html_()
+    assert opened.plot_contact() == solid.plot_contact()
+    assert opened.plot_forces() == solid.plot_forces()
+    assert opened.plot_map() == solid.plot_map()
+
+
+def test_a_result_keeps_its_tables_when_its_folder_is_used_again(tmp_path: Path) -> None:
+    given = finger3d.load(written(tmp_path, SECTION))
+    first = finger3d.press(given, tmp_path / "out", figures=False, error=False)
+    before = first.to_dataframe("contact")
+    finger3d.press(given, tmp_path / "out", figures=False, error=False, overrides=["material.E_MPa=3.0"])
+    assert first.to_dataframe("contact").equals(before)
+    with pytest.raises(Finger3dError, match="a section has no map"):
+        first.plot_map()
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "said"),
+    [
+        ("summary.json", lambda text: text[:-9], "summary.json: cannot be read"),
+        ("summary.json", lambda text: "{}", "summary.json: is damaged"),
+        ("summary.json", lambda text: text.replace('"depth_mm"', '"deep_mm"'), "summary.json: its steps .*deep_mm"),
+        ("history.csv", lambda text: text.replace("0.25,", "a quarter,", 1), "history.csv: is damaged .*a quarter"),
+        ("history.csv", lambda text: text[:-40], "history.csv: is damaged"),
+        ("contact.csv", lambda text: text.replace("pressure_MPa", "p", 1), "contact.csv: has no column pressure_MPa"),
+        ("steps.npz", lambda text: "", "steps.npz: cannot be read"),
+    ],
+)
+def test_a_damaged_folder_is_one_line(name: str, edit: Callable, said: str, solid: PressResult, tmp_path: Path) -> None:
+    shutil.copytree(solid.out, tmp_path / "out")
+    path = tmp_path / "out" / name
+    path.write_text(edit(path.read_text(encoding="utf-8", errors="replace")), encoding="utf-8")
+    with pytest.raises(Finger3dError, match=said) as told:
+        finger3d.load(tmp_path / "out").plot_contact()
+    assert "\n" not in str(told.value)
+
+
+def test_what_is_no_folder_of_a_press_is_refused(solid: PressResult, tmp_path: Path) -> None:
+    with pytest.raises(Finger3dError, match=r"holds no results of a press .no summary.json"):
+        finger3d.load(tmp_path)
+    with pytest.raises(Finger3dError, match=r"friction.mu=0.5 changes a scene; load .*scene.toml"):
+        finger3d.load(solid.out, ["friction.mu=0.5"])

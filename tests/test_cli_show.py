@@ -79,7 +79,7 @@ def test_nothing_to_show_is_one_line(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     (tmp_path / "empty").mkdir()
     (tmp_path / "cut").mkdir()
-    cut = {"outcome": "incomplete", "scene": {}}
+    cut = {"outcome": "incomplete", "scene": {"finger": {"geometry": "block"}}, "warnings": [], "advice": []}
     (tmp_path / "cut" / "summary.json").write_text(json.dumps(cut))
     (tmp_path / "swept").mkdir()
     (tmp_path / "swept" / "sweep.json").write_text(json.dumps({"vary": {"friction.mu": ["0.1", "0.2"]}}))

@@ -11,7 +11,15 @@ import pytest
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.plotting import solid as render
-from finger3d.plotting.figures import contact_figure, force_figure, marker_figure, middle_line, zones
+from finger3d.plotting.figures import (
+    contact_figure,
+    force_figure,
+    map_figure,
+    marker_figure,
+    middle_line,
+    path_figure,
+    zones,
+)
 from tests.commands import loaded
 from tests.pictures import MU, STEPS, finger, finger_picture, pixels, pressed, share, solid_finger
 
@@ -100,6 +108,37 @@ def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
     force_figure(tmp_path / "many.png", many)
     force_figure(tmp_path / "few.png", many[::10])
     assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
+
+
+def test_forces_are_drawn_against_depth_and_against_the_slides_that_there_are(tmp_path: Path) -> None:
+    table = {
+        "depth_mm": [0.5, 1.0, 1.0], "slide_x_mm": [0.0, 0.0, 0.4], "slide_z_mm": [0.0] * 3,
+        "normal_force_N": [1.0, 2.0, 2.1], "friction_sum_N": [0.2, 0.4, 0.6],
+        "tangential_force_x_N": [0.0, 0.0, 0.5], "tangential_force_z_N": [1e-12] * 3,
+    }  # fmt: skip
+    path_figure(tmp_path / "slid.png", table)
+    path_figure(tmp_path / "pressed.png", {**table, "slide_x_mm": [0.0] * 3})
+    assert pixels(tmp_path / "slid.png").shape[1] == 2 * pixels(tmp_path / "pressed.png").shape[1]
+    assert share(tmp_path / "slid.png", "#2c5f9e", within=0.05) > 1e-4
+    assert share(tmp_path / "slid.png", "#3c8d4f", within=0.05) == 0.0  # round-off along z
+
+
+def test_a_flat_map_shows_the_status_of_the_contact_face(tmp_path: Path) -> None:
+    x, z = (v.ravel() for v in np.meshgrid(np.linspace(-3.0, 3.0, 13), np.linspace(-2.0, 2.0, 9)))
+    near = np.hypot(x, z)
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
+    shown = {}
+    for name, largest in (("open", 0.0), ("touching", 0.2)):
+        status = np.select([largest * (near < 0.8) > 0.0, largest * (near < 1.6) > 0.0], ["stick", "slip"], "open")
+        pressure = largest * np.maximum(1.0 - (near / 1.6) ** 2, 0.0)
+        table = {
+            "face": [top] * len(x) + [wall], "x_mm": [*x, 9.0], "z_mm": [*z, 0.0], "pressure_MPa": [*pressure, 9.0],
+            "shear_x_MPa": [*(0.3 * pressure), 0.0], "shear_z_MPa": [0.0] * (len(x) + 1), "status": [*status, "slip"],
+        }  # fmt: skip
+        map_figure(tmp_path / f"{name}.png", table)
+        shown[name] = [share(tmp_path / f"{name}.png", render.COLOURS[s], within=0.05) for s in (STICK, SLIP)]
+    legend, both = np.array(shown["open"]), np.array(shown["touching"])
+    assert (both > 1.3 * legend).all()
 
 
 @pytest.mark.parametrize(

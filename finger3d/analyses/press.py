@@ -10,11 +10,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from finger3d._types import Tree
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody
-from finger3d.analyses.result import PressResult
+from finger3d.analyses.result import PressResult, result_in
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, measure
@@ -69,23 +68,19 @@ def press(
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
-        record, summary = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures)
-    return PressResult(record.history, folder, summary, temporary)
+        record = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures)
+    return result_in(folder, record.history, temporary)
 
 
 def run_press(
     scene: Scene, writer: ResultWriter, report: Progress, started: float, error: bool, figures: bool
-) -> tuple[PressRecord, Tree]:
+) -> PressRecord:
     """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
 
     Parameters
     ----------
     started : `time.perf_counter()` at the start of the job, s
     error, figures : whether to estimate the errors; whether to draw
-
-    Returns
-    -------
-    record, summary : the press, and the content of summary.json
     """
     need = None
     if scene.auto is not None:
@@ -96,21 +91,21 @@ def run_press(
     record = _solve(scene, writer, report, started)
     record.need = need
     fields = _recover(record, writer, report)
-    summary = writer.summary(record, record.outcome())
+    writer.summary(record, record.outcome())
     with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
         if error:
             _estimate_errors(record, report)
             writer.error_shares(record)
             writer.markers(record)
             _estimate_changes(record, report)
-            summary = writer.summary(record, record.outcome())
+            writer.summary(record, record.outcome())
         if figures:
             from finger3d.report.press import press_page
 
             report.stage("drawing")
             draw()
             press_page(writer.folder)
-    return record, summary
+    return record
 
 
 # --- solve --------------------------------------------------------------------------------------------------------

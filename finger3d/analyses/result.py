@@ -1,21 +1,23 @@
-"""Result of a press: its numbers, tables, pictures and fields, for a script or a notebook."""
+"""Result of a press, made just now or opened from its folder: numbers, tables, pictures and fields."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from finger3d._extras import require
 from finger3d._types import Tree
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.analyses.press_files import history_table
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
-from finger3d.mechanics.results.history import History, contact_table, measure
-from finger3d.results.summary import PressStep, read_rows, steps_of
+from finger3d.mechanics.results.history import History
+from finger3d.results.states import load_states
+from finger3d.results.summary import PressStep, press_summary, read_columns, steps_of
 from finger3d.results.vtu import grid
+from finger3d.scene import load as load_scene
 
 if TYPE_CHECKING:
     import pandas
@@ -37,14 +39,85 @@ class Picture:
             temporary.write_bytes(self.png)
 
 
+_NEEDED = {
+    "history": ("depth_mm", "slide_x_mm", "slide_z_mm", "normal_force_N", "friction_sum_N"),
+    "contact": ("face", "x_mm", "z_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status"),
+    "markers": ("step", "marker"),
+}
+"""Tables of a press, and the columns that must be in each."""
+
+
+def load(path: str | Path, overrides: Iterable[str] = ()) -> Any:
+    """Read a scene file, or open the folder of a press.
+
+    Parameters
+    ----------
+    path : TOML file, or the folder that a press was written into
+    overrides : of a scene: texts such as ``friction.mu=0.5``, applied before anything is checked
+
+    Returns
+    -------
+    Scene or PressResult
+
+    Raises
+    ------
+    Finger3dError
+        With one line: of a scene, it names the file, the key, the value and what is allowed; of a folder, what is
+        missing or damaged.
+
+    Examples
+    --------
+    >>> import finger3d
+    >>> finger3d.load("scene.toml", ["friction.mu=0.5"]).tables.friction.mu
+    0.5
+    >>> _ = finger3d.press("scene.toml", "out")
+    >>> finger3d.load("out").plot_forces().save("forces.png")
+    """
+    if not Path(path).is_dir():
+        return load_scene(path, overrides)
+    if overrides := list(overrides):
+        raise Finger3dError(f"{path}: holds results, and {overrides[0]} changes a scene; load {path}/scene.toml")
+    return result_in(Path(path))
+
+
+def result_in(
+    folder: Path, history: History | None = None, temporary: TemporaryDirectory[str] | None = None
+) -> PressResult:
+    """Open the folder of a press.
+
+    Parameters
+    ----------
+    history : of a press that was made just now
+    temporary : the folder, if it is to be removed with the result
+
+    Raises
+    ------
+    Finger3dError
+        If the folder holds no press, or its tables are damaged.
+    """
+    numbers = press_summary(folder)
+    try:
+        steps_of(numbers)
+    except TypeError as error:
+        raise Finger3dError(
+            f"{folder / 'summary.json'}: its steps are damaged, or of another version of finger3d ({error}); press "
+            f"{folder}/scene.toml again"
+        ) from None
+    tables = {name: read_columns(folder / f"{name}.csv") for name in _NEEDED}
+    for name, table in tables.items():
+        if table and (missing := [column for column in _NEEDED[name] if column not in table]):
+            raise Finger3dError(f"{folder / name}.csv: has no column {missing[0]}; press {folder}/scene.toml again")
+    return PressResult(folder, history, numbers, tables, temporary)
+
+
 @dataclass(frozen=True, repr=False)
 class PressResult:
     """A finished press, also one that stopped at a step that did not converge.
 
     Attributes
     ----------
-    history : the contact state of every increment
     out : folder of the files; a temporary one, removed together with this object, if none was asked for
+    history : the contact state of every increment; None if the folder was opened by `load`
 
     Examples
     --------
@@ -66,15 +139,16 @@ class PressResult:
     True
     """
 
-    history: History
     out: Path
+    history: History | None
     _numbers: Tree
+    _tables: Mapping[str, Tree]
     _folder: TemporaryDirectory[str] | None = field(default=None, compare=False)
 
     @property
     def outcome(self) -> Outcome:
-        """CONVERGED if every increment is."""
-        return self.history.outcome
+        """CONVERGED if every increment is, else the first other outcome."""
+        return next((Outcome(s.outcome) for s in self.steps if s.outcome != "converged"), Outcome.CONVERGED)
 
     @property
     def steps(self) -> tuple[PressStep, ...]:
@@ -116,17 +190,11 @@ class PressResult:
         require("to_dataframe()", "pandas")
         import pandas
 
-        if table == "contact":
-            return pandas.DataFrame(self._contact())
-        if table == "markers":
-            if not (self.out / "markers.csv").exists():
-                raise Finger3dError("to_dataframe('markers'): the scene has no [[marker]] and no [marker_grid]")
-            rows = pandas.DataFrame(read_rows(self.out / "markers.csv"))
-            return rows.astype({name: int if name == "step" else float for name in rows if name != "marker"})
-        if table != "history":
+        if table not in self._tables:
             raise Finger3dError(f'to_dataframe({table!r}): must be "history", "contact" or "markers"')
-        points, steps = self.history.points, self.history.steps
-        return pandas.DataFrame(history_table(steps, [measure(points, step) for step in steps]))
+        if table == "markers" and not self._tables[table]:
+            raise Finger3dError("to_dataframe('markers'): the scene has no [[marker]] and no [marker_grid]")
+        return pandas.DataFrame(self._tables[table])
 
     def derivatives(self, number: str, falling: bool = False) -> dict[str, float]:
         """Return the derivatives of a number at the end of the press by the keys of its scene, per unit of each key.
@@ -148,13 +216,34 @@ class PressResult:
         """Draw pressure, friction, its limit and the zones of stick and slip along x in the last good increment."""
         from finger3d.plotting.figures import contact_figure
 
+        mu, table = (self._numbers["scene"].get("friction") or {}).get("mu", 0.0), self._contact()
+        if self.history is None:
+            half_width = load_states(self.out / "steps.npz").half_width_mm
+            return _picture(contact_figure, table, mu, None, half_width or None)
         points = self.history.points
-        half_width = points.half_width_mm if points.dim == 3 else None
-        with TemporaryDirectory(prefix="finger3d-") as folder:
-            path = Path(folder) / "contact.png"
-            mu = (self._numbers["scene"].get("friction") or {}).get("mu", 0.0)
-            contact_figure(path, self._contact(), mu, points.band_mm, half_width)
-            return Picture(path.read_bytes())
+        return _picture(contact_figure, table, mu, points.band_mm, points.half_width_mm if points.dim == 3 else None)
+
+    def plot_forces(self) -> Picture:
+        """Draw normal force and friction against depth, and against the slides of the object."""
+        from finger3d.plotting.figures import path_figure
+
+        self._contact()
+        return _picture(path_figure, self._tables["history"])
+
+    def plot_map(self) -> Picture:
+        """Draw a flat map of the contact face in the last good increment: pressure, friction, and stick and slip.
+
+        Raises
+        ------
+        Finger3dError
+            If the press is that of a section.
+        """
+        from finger3d.plotting.figures import map_figure
+
+        table = self._contact()
+        if not table["z_mm"].any():
+            raise Finger3dError("plot_map(): a section has no map; plot_contact() draws it along x")
+        return _picture(map_figure, table)
 
     def to_pyvista(self, step: int | None = None) -> pyvista.UnstructuredGrid:
         """Return the finger at rest with its fields; ``warp_by_vector("displacement")`` deforms it.
@@ -166,11 +255,9 @@ class PressResult:
         return grid(self.out, step)
 
     def _contact(self) -> Tree:
-        steps = self.history.steps
-        if not steps:
+        if not self._tables["contact"]:
             raise Finger3dError(f"{self.out}: no increment was finished, so there is no contact to show")
-        last = next((f for f in reversed(steps) if f.outcome.ok), steps[-1])
-        return contact_table(self.history.points, last.state)
+        return self._tables["contact"]
 
     def __repr__(self) -> str:
         """One line: title, outcome, force and depth of the last good increment."""
@@ -188,7 +275,7 @@ class PressResult:
     def _status(self) -> str:
         good = self._good()
         last = f", {good[-1].normal_force_N:.5g} N at {good[-1].depth_mm:.4g} mm" if good else ""
-        return f"{self.outcome}, {len(good)} steps{last}"
+        return f"{self._numbers['outcome']}, {len(good)} steps{last}"
 
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
@@ -201,3 +288,10 @@ class PressResult:
             for row in (headline(good[-1], bars.totals(), bars.modulus) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])
+
+
+def _picture(draw: Callable[..., None], *arguments: object) -> Picture:
+    with TemporaryDirectory(prefix="finger3d-") as folder:
+        path = Path(folder) / "picture.png"
+        draw(path, *arguments)
+        return Picture(path.read_bytes())

@@ -13,7 +13,7 @@ from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.plotting.layout import WIDEST, finish, sheet
-from finger3d.plotting.panels import patches
+from finger3d.plotting.panels import CMAP, patches
 from finger3d.plotting.solid import COLOURS
 
 if TYPE_CHECKING:
@@ -25,6 +25,11 @@ _FEWEST_ON_LINE = 5
 _MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
+
+_FORCE_COLOURS = ("#222222", "#c0392b", "#2c5f9e", "#3c8d4f")
+_NO_FORCE = 1e-6  # share of the normal force below which a force is not drawn: round-off
+
+_MAP_MARGINS, _MOST_ASPECT = (0.8, 1.1, 0.55, 0.45), 1.6  # of a flat map: inches; height over width, or the inverse
 
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 
@@ -148,6 +153,79 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> Non
         axes.set_xlim(left=float(depth.min(initial=0.0)))
         axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
         finish(axes, loc="upper left")
+    made.save(path)
+
+
+def path_figure(path: str | Path, table: Mapping[str, ArrayLike]) -> None:
+    """Draw normal force and friction (N) against depth and, if the object slides, against its slides (mm).
+
+    Parameters
+    ----------
+    path : PNG file to write
+    table : columns of history.csv
+    """
+    slides = {f"slide_{axis}_mm": f"slide of the object along {axis} (mm)" for axis in "xz"}
+    against = {"depth_mm": "depth (mm)", **{name: text for name, text in slides.items() if np.any(table[name])}}
+    normal = _column(table, "normal_force_N")
+    forces = {"normal force": normal, "sum of |friction|": _column(table, "friction_sum_N")}
+    forces |= {f"net friction along {axis}": _column(table, f"tangential_force_{axis}_N") for axis in "xz"}
+    made = sheet(len(against), len(against), (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
+    mark = "o" if len(normal) <= _MOST_MARKERS else ""
+    for axes, (name, text) in zip(made.axes, against.items(), strict=True):
+        for (label, values), colour in zip(forces.items(), _FORCE_COLOURS, strict=True):
+            if np.abs(values).max() > _NO_FORCE * np.abs(normal).max():
+                axes.plot(_column(table, name), values, f"{mark}-", color=colour, ms=4, label=label)
+        axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the legend
+        finish(axes, text, "force on the finger (N)", loc="upper left", ncols=2)
+    made.save(path)
+
+
+def map_figure(path: str | Path, table: Mapping[str, ArrayLike]) -> None:
+    """Draw the contact of a solid along the press axis: pressure with arrows of the friction, and stick and slip.
+
+    Parameters
+    ----------
+    path : PNG file to write
+    table : columns of contact.csv
+    """
+    from matplotlib.tri import Triangulation
+
+    top = _on_contact_face(table)
+    x, z, pressure, shear_x, shear_z = (
+        _column(table, name)[top] for name in ("x_mm", "z_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa")
+    )
+    status, spacing = _status(table)[top], _spacing(x, z)
+    touches = status != OPEN if np.any(status != OPEN) else np.ones(len(x), dtype=bool)
+    (x0, x1), (z0, z1) = ((v[touches].min(), v[touches].max()) for v in (x, z))
+    wide, tall = x1 - x0 + 3.0 * spacing, z1 - z0 + 3.0 * spacing
+    wide, tall = max(wide, tall / _MOST_ASPECT), max(tall, wide / _MOST_ASPECT)
+    left, right, below, above = _MAP_MARGINS
+    height = (WIDEST - left - right) * tall / wide
+    made = sheet(2, 2, (WIDEST, height + below + above), _MAP_MARGINS)
+    for axes, title in zip(made.axes, ("pressure, and friction on the finger", "stick and slip"), strict=True):
+        axes.set_aspect("equal")
+        axes.set(xlim=(x0 + x1 + np.array([-wide, wide])) / 2.0, ylim=(z0 + z1 + np.array([-tall, tall])) / 2.0)
+        axes.set_title(title, fontsize=11, loc="left")
+        finish(axes, "x at rest (mm)", "z at rest (mm)")
+    first, second = made.axes
+    mesh = Triangulation(x, z)
+    mesh.set_mask(~touches[mesh.triangles].any(axis=1))
+    colours = first.tripcolor(mesh, pressure, shading="gouraud", cmap=CMAP, vmin=0.0)
+    bar = first.inset_axes((1.03, 0.0, 0.04, 1.0))
+    made.figure.colorbar(colours, cax=bar).set_label("contact pressure (MPa)")
+    largest = float(np.hypot(shear_x, shear_z).max())
+    if largest > 0.0:
+        at = np.flatnonzero(touches)
+        arrows = first.quiver(
+            x[at], z[at], shear_x[at], shear_z[at], color="#c0392b", scale=12.0 * largest, width=0.004
+        )
+        value = _round(largest)
+        first.quiverkey(arrows, 0.82, 1.0 + 0.13 / height, value, f"{value:g} MPa", labelpos="E")
+    for state in (OPEN, STICK, SLIP):
+        mine = status == state
+        second.plot(x[mine], z[mine], "o", ms=4, color=COLOURS[state])
+    second.legend(handles=patches(COLOURS, (STICK, SLIP, OPEN)), loc="lower right", bbox_to_anchor=(1.0, 1.0),
+                  ncols=3, frameon=False, borderaxespad=0.0, borderpad=0.2)  # fmt: skip
     made.save(path)
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Marks = Sequence[tuple[str, Float]]
 """Labels of gauges, and their start, middle and end, shape (3, d), mm."""
 
-_CMAP = "viridis"  # of the contact pressure
+CMAP = "viridis"  # of the contact pressure
 
 
 def patches(colours: dict[int, str], states: Sequence[int]) -> list[Patch]:
@@ -73,7 +73,7 @@ def keys(figure: Figure, highest: float, lines: dict[str, str]) -> None:
 
     inch = 1.0 / figure.get_figheight()
     bar = figure.add_axes((0.10, 0.62 * inch, 0.3, 0.16 * inch))
-    figure.colorbar(ScalarMappable(Normalize(0.0, highest), _CMAP), cax=bar, orientation="horizontal")
+    figure.colorbar(ScalarMappable(Normalize(0.0, highest), CMAP), cax=bar, orientation="horizontal")
     bar.set_xlabel("contact pressure (MPa)")
     handles = patches(COLOURS, (STICK, SLIP, OPEN)) + [Line2D([], [], color=c, label=n) for n, c in lines.items()]
     figure.legend(
@@ -113,7 +113,7 @@ def pressure_colours(values: Float, highest: float, status: Int) -> Float:
     import matplotlib
     from matplotlib.colors import to_rgb
 
-    colours = matplotlib.colormaps[_CMAP](values / highest)[..., :3]
+    colours = matplotlib.colormaps[CMAP](values / highest)[..., :3]
     return np.where((status != OPEN)[..., None], colours, np.array(to_rgb(BODY)))
 
 

@@ -24,7 +24,7 @@ from finger3d.plotting.deformed import DeformedFinger, draw_fingers
 from finger3d.plotting.gauges import Mark, marks_of
 from finger3d.plotting.renderer import WINDOW
 from finger3d.results.states import States, load_states
-from finger3d.results.summary import gauges_of, read_json
+from finger3d.results.summary import gauges_of, press_summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,25 +109,12 @@ def found(folder: str | Path) -> tuple[States, str, list[Gauge]]:
         If the press was interrupted, so that there are numbers but no fields.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise Finger3dError(f"{folder}: there is no such folder; give the --out of a press")
-    if not (folder / "summary.json").exists():
-        raise Finger3dError(f"{folder}: holds no results of a press (no summary.json); give the --out of a press")
-    summary = read_json(folder / "summary.json")
+    summary = press_summary(folder)
     if not (folder / "steps.npz").exists():
-        why = " ".join(str(summary.get("outcome", "unknown")).split())
+        why = " ".join(summary["outcome"].split())
         raise MissingError(f"{folder}: has no fields to show; its outcome is: {why}; press {folder}/scene.toml again")
-    states = load_states(folder / "steps.npz")
-    try:
-        scene = summary["scene"]
-        title, gauges = scene.get("title") or folder.name, gauges_of(scene)
-        if not isinstance(title, str):
-            raise TypeError(title)
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
-        raise Finger3dError(
-            f"{folder / 'summary.json'}: the scene in it is damaged; press {folder}/scene.toml again"
-        ) from None
-    return states, title, gauges
+    scene = summary["scene"]
+    return load_states(folder / "steps.npz"), scene.get("title") or folder.name, gauges_of(scene)
 
 
 def show(

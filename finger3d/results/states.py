@@ -85,6 +85,11 @@ class States:
         return int(self.points.shape[1])
 
     @property
+    def half_width_mm(self) -> float:
+        """Largest abs(z) of a solid, 0 of a section."""
+        return float(np.abs(self.points[:, 2:]).max(initial=0.0))
+
+    @property
     def corners(self) -> Array:
         """Corners (t, d) of the boundary's facets, oriented outward."""
         return self.facets[:, : self.dim]

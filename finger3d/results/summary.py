@@ -8,11 +8,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.columns import Column, displacement_columns, pressure_column, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
+
+_KINDS = dict.fromkeys(("marker", "face", "status", "method", "outcome"), object) | dict.fromkeys(
+    ("step", "iterations"), int
+)
+"""Types of the columns of a press's tables that are no floating-point numbers."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +137,48 @@ def read_json(path: Path) -> Tree:
     if not isinstance(found, dict):
         raise Finger3dError(f"{path}: holds no JSON object; make the results again")
     return found
+
+
+def press_summary(folder: Path) -> Tree:
+    """Read summary.json in the folder of a press.
+
+    Raises
+    ------
+    Finger3dError
+        If the folder holds no results of a press, or the summary is not as a press writes it.
+    """
+    if not folder.is_dir():
+        raise Finger3dError(f"{folder}: there is no such folder; give the --out of a press")
+    if not (folder / "summary.json").exists():
+        raise Finger3dError(f"{folder}: holds no results of a press (no summary.json); give the --out of a press")
+    summary = read_json(folder / "summary.json")
+    try:
+        title_of(summary["scene"]), gauges_of(summary["scene"])
+        texts = [summary["outcome"], *summary["warnings"], *summary["advice"], summary["scene"].get("title") or ""]
+        if not all(isinstance(text, str) for text in texts):
+            raise TypeError(texts)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        raise Finger3dError(f"{folder / 'summary.json'}: is damaged; press {folder}/scene.toml again") from None
+    return summary
+
+
+def read_columns(path: Path) -> Tree:
+    """Return the columns of a table of a press, (n,) numbers or texts; none if the file does not exist.
+
+    Raises
+    ------
+    Finger3dError
+        If it cannot be read.
+    """
+    rows = read_rows(path)
+    try:
+        if any(None in (*row, *row.values()) for row in rows):
+            raise ValueError("rows of different lengths")
+        return {
+            name: np.array([row[name] for row in rows], dtype=_KINDS.get(name, float)) for name in (rows or [{}])[0]
+        }
+    except ValueError as error:
+        raise Finger3dError(f"{path}: is damaged ({error}); make the results again") from None
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
