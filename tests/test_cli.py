@@ -26,6 +26,7 @@ COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)
         (["prss"], '"press"'),
         (["press"], "SCENE"),
         (["press", "scene.toml"], "give --out FOLDER"),
+        (["press", "scene.toml", "--ouut", "out"], "--out instead of --ouut"),
         (["press", "scene.toml", "--out"], "--out"),
         (["press", "scene.toml", "--out", "out", "--fast"], "--fast"),
         (["press", "scene.toml", "more.toml", "--out", "out"], "more.toml"),

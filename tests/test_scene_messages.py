@@ -177,10 +177,15 @@ MISTAKES = {
         ["press.slide_z_mm = 1.0", "0.0 in a 2D domain"],
     ),
     "unknown effect": (PRESS, PRESS + "[effects.telepathy]\n", ["effects.telepathy", "no such effect"]),
+    "effects are numbers": (
+        PRESS,
+        PRESS + "[effects]\nviscosity = 1\n",
+        ["effects.viscosity = 1", "a table, [effects.viscosity], true or false"],
+    ),
     "effects not tables": (
         PRESS,
         PRESS + "[effects]\ntelepathy = true\n",
-        ["effects.telepathy = true", "no such effect"],
+        ["effects.telepathy", "no such effect"],
     ),
     "not TOML": ("mu = 0.25", "mu is 0.25", ["not TOML", "at line 18, column 4"]),
     "key twice": ("mu = 0.25", "mu = 0.25\nmu = 0.3", ["not TOML", "line 19"]),

@@ -48,6 +48,7 @@ def test_every_shipped_scene_and_the_template_are_valid(valid: Callable[[dict[st
         {"press": LEGS},
         {"parts": {"skin": {"rigid": True}}},
         {"effects": {"viscosity": {"prony": [[0.3, 0.5]]}, "large_deformation": {}}},
+        {"effects": {"viscosity": False, "large_deformation": True}},
     ],
 )
 def test_what_a_scene_takes_is_valid(valid: Callable[[dict[str, Any]], bool], change: dict[str, Any]) -> None:
@@ -70,6 +71,7 @@ def test_what_a_scene_takes_is_valid(valid: Callable[[dict[str, Any]], bool], ch
         {"press": {"steps": 5}},
         {"press": LEGS | {"depth_mm": 0.5}},
         {"effects": {"warmth": {}}},
+        {"effects": {"large_deformation": 1}},
         {"effects": {"viscosity": {"prony": [[0.3, 0.5, 0.1]]}}},
         {"gauge": [{"name": "a", "x_mm": 1.0}]},
     ],

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
+import pytest
+
 from finger3d.contact.friction import Coulomb
+from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Leg
 from finger3d.scene import load, parse
 from tests.scene_tables import SMALL
@@ -34,6 +39,49 @@ def test_an_override_reaches_into_a_list(tmp_path) -> None:
     legs = {"leg": [{"depth_mm": 5.0}, {"depth_mm": 0.0}]}
     path = written(tmp_path, parse({**SMALL, "press": legs}).to_toml())
     assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0, steps="auto"), Leg(2.5, steps="auto"))
+
+
+READINGS = {
+    "gauge": [{"name": "a", "x_mm": 1.0, "y_mm": 2.0}, {"name": "b.c", "x_mm": 2.0, "y_mm": 2.0}],
+    "marker": [{"name": "m", "x_mm": 0.0, "y_mm": 1.0}],
+    "taxel": [{"name": "t", "x_mm": 0.0, "z_mm": 0.0, "length_mm": 1.0, "width_mm": 1.0}],
+}
+
+
+def test_readings_are_overridden_by_name(tmp_path) -> None:
+    path = written(tmp_path, parse({**SMALL, **READINGS}).to_toml())
+    set_ = ["gauge.a.x_mm=3.0", "gauge.1.x_mm=4.0", "gauge.a.name=z", "gauge.z.y_mm=1.0", "marker.m.x_mm=0.5"]
+    tables = load(path, [*set_, "taxel.t.width_mm=2.0"]).tables
+    assert [(g.name, g.x_mm, g.y_mm) for g in tables.gauge] == [("z", 3.0, 1.0), ("b.c", 4.0, 2.0)]
+    assert tables.marker[0].x_mm == 0.5
+    assert tables.taxel[0].width_mm == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("gauge.q.x_mm=1", 'no gauge "q"; must be "a" or "b.c", or its number from 0'),
+        ("gauge.a.x_mm=far", "with --set gauge.0.x_mm: gauge.0.x_mm"),
+    ],
+)
+def test_an_override_of_no_reading_is_refused(tmp_path, text: str, said: str) -> None:
+    path = written(tmp_path, parse({**SMALL, **READINGS}).to_toml())
+    with pytest.raises(Finger3dError, match=re.escape(said)):
+        load(path, [text])
+
+
+def test_true_and_false_switch_effects(tmp_path) -> None:
+    path = written(
+        tmp_path,
+        parse({**SMALL, "effects": {"large_deformation": {"law": "mooney-rivlin", "c01_share": 0.2}}}).to_toml(),
+    )
+    law = load(path, ["effects.large_deformation=true"]).effects["large_deformation"].law
+    assert law == "mooney-rivlin"
+    assert not load(path, ["effects.large_deformation=false"]).effects
+    off = ["effects.large_deformation=false", "effects.large_deformation=true"]
+    assert load(path, off).effects["large_deformation"].law == "neo-hookean"
+    on = ["effects.kinetic_friction=true", "effects.kinetic_friction.ratio=0.5"]
+    assert load(path, on).effects["kinetic_friction"].ratio == 0.5
 
 
 def test_the_file_is_not_changed_by_an_override(tmp_path) -> None:

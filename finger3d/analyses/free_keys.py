@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d._types import Float, TreeView
-from finger3d.analyses.sweep.points import numbered
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
 from finger3d.scene.material import modulus_of
@@ -45,7 +44,7 @@ class FreeKey:
 
     def numbered(self, given: TreeView) -> str:
         """Return the key as it is set, with the number of a gauge in place of its name."""
-        return numbered(self.key, given, "--free")
+        return tree.numbered(self.key, given, "--free")
 
     def start(self, given: TreeView) -> float:
         """Return the value of the scene as written, or the middle of the bounds where it lies outside.

@@ -70,8 +70,10 @@ def _run(arguments: Sequence[str], program: App) -> int:
         _check_surroundings(arguments)
         return program(arguments, exit_on_error=False, print_error=False) or 0
     except MissingArgumentError as error:
-        option = error.argument.name if error.argument else ""
-        complain("give --out FOLDER, the folder for the results" if option == "--out" else str(error))
+        no_out = (
+            error.argument and error.argument.name == "--out" and not error.unused_tokens
+        )  # else it may be misspelt
+        complain("give --out FOLDER, the folder for the results" if no_out else str(error))
         return Finger3dError.exit_code
     except CycloptsError as error:
         complain(_gone(error, arguments) or f"{error} (finger3d --help lists the commands and options)")

@@ -159,11 +159,13 @@ def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str
     for name, settings in present.items():
         if name in AutoTable.model_fields:
             continue
-        place = ("effects", name)
+        place, settings = ("effects", name), {} if settings is True else settings
         if name not in effect_names():
             mistakes[place] = unknown(place, settings, (*effect_names(), *AutoTable.model_fields), kind="effect")
+        elif settings is False:
+            continue
         elif not isinstance(settings, Mapping):
-            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}]"
+            mistakes[place] = f"{dotted(place)} = {shown(settings)}: must be a table, [{dotted(place)}], true or false"
         elif table := checked(table_of(effect_type(name)), settings, place, mistakes):
             tables[name], effects[name] = table, built(effect_type(name), table, place, mistakes)
     return tables, effects, auto

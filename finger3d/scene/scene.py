@@ -129,7 +129,7 @@ class Scene:
     def with_effects(self, names: Iterable[str]) -> Scene:
         """Return the scene with some effects on, with its own settings of each or else the default ones."""
         given = self.given.get("effects", {})
-        return parse({**self.given, "effects": {name: given.get(name, {}) for name in names}}, self.path)
+        return parse({**self.given, "effects": {name: given.get(name) or {} for name in names}}, self.path)
 
     def model(self) -> Model:
         """Return the model: the baseline, and then every effect that is on. Angles are in radians.

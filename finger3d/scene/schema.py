@@ -51,7 +51,9 @@ def schema() -> Tree:
     keys["object"] = _one_of("what the finger is pressed on; without it a rigid plane", shapes)
     keys["press"] = _one_of("the motion of the object", [_press(), _legs()])
     keys["material"] |= _one_modulus()
-    effects = _of(AutoTable)["properties"] | {name: _documented(effect_type(name)) for name in effect_names()}
+    effects = _of(AutoTable)["properties"] | {
+        name: {"oneOf": [{"type": "boolean"}, _documented(effect_type(name))]} for name in effect_names()
+    }
     keys["effects"] = {"type": "object", "additionalProperties": False, "properties": effects}
     for name, description in descriptions(SceneTable).items():
         keys[name] |= {"description": description}

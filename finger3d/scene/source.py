@@ -41,7 +41,9 @@ def scene_of(source: Source, overrides: Iterable[str] = ()) -> Scene:
     overrides = list(overrides)
     if isinstance(source, Scene) and not overrides:
         return source
-    return parse(*tables_of(source, overrides), [o.partition("=")[0].strip() for o in overrides])
+    document, path = tables_of(source)
+    changed, keys = tree.overridden(document, overrides)
+    return parse(changed, path, keys)
 
 
 def tables_of(source: Source, overrides: Sequence[str] = ()) -> tuple[TreeView, Path | None]:

@@ -11,7 +11,7 @@ from typing import Any
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.scene.material import replace_modulus
-from finger3d.scene.messages import shown
+from finger3d.scene.messages import listed, nearest, shown
 
 
 def read(path: Path) -> Tree:
@@ -68,6 +68,11 @@ def override(tree: TreeView, overrides: Iterable[str], option: str = "--set") ->
 
     `option` is where the texts come from, for messages.
     """
+    return overridden(tree, overrides, option)[0]
+
+
+def overridden(tree: TreeView, overrides: Iterable[str], option: str = "--set") -> tuple[Tree, list[str]]:
+    """Return what `override` returns, and the keys, with the numbers of readings in place of their names."""
     changed = copy.deepcopy(plain(tree))
     keys = []
     for text in overrides:
@@ -75,10 +80,25 @@ def override(tree: TreeView, overrides: Iterable[str], option: str = "--set") ->
         parts = [p.strip() for p in key.split(".")]
         if not equals or not all(parts):
             raise Finger3dError(f"{option} {shown(text)}: must be KEY=VALUE, for instance {option} friction.mu=0.5")
-        _set(changed, parts, parsed(value.strip()), f"{option} {key.strip()}")
-        keys.append(".".join(parts))
+        keys.append(numbered(".".join(parts), changed, option))
+        _set(changed, keys[-1].split("."), parsed(value.strip()), f"{option} {key.strip()}")
     replace_modulus(changed, keys)
-    return frozen(changed)
+    return frozen(changed), keys
+
+
+def numbered(key: str, given: TreeView, option: str) -> str:
+    """Return the key with a reading's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
+    kind, name, last = (*key.split(".", 2), "", "")[:3]
+    tables = given.get(kind, ())
+    if kind not in ("gauge", "marker", "taxel") or not last or name.isdecimal() or not isinstance(tables, tuple | list):
+        return key
+    names = [str(table.get("name")) for table in tables if isinstance(table, Mapping)]
+    if name not in names:
+        near = nearest(name, names)
+        hint = f'did you mean "{near}"? ' if near else ""
+        known = f"must be {listed(names)}, or its number from 0" if names else f"the scene has no [[{kind}]]"
+        raise Finger3dError(f"{option} {key}: no {kind} {shown(name)}; {hint}{known}")
+    return f"{kind}.{names.index(name)}.{last}"
 
 
 def value_at(tree: TreeView, key: str) -> object:
@@ -111,10 +131,12 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
             index: Any = int(part)
         elif isinstance(node, dict):
             index = part
-            if not last:
-                node.setdefault(part, {})
+            if not last and node.get(part, True) is True:  # true stands for an empty table
+                node[part] = {}
         else:
             raise Finger3dError(f"{key}: {'.'.join(parts[:depth])} = {shown(node)} is not a table")
+        if last and value is True and isinstance(node, dict) and isinstance(node.get(index), dict):
+            return  # it is on already, with its own settings
         if last:
             node[index] = value
         else:

@@ -20,7 +20,7 @@ from finger3d.mechanics.readings.marker_grid import grid_markers
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
-from finger3d.scene.messages import listed, nearest, shown
+from finger3d.scene.messages import shown
 from finger3d.scene.tables import SceneTable
 
 MOST = 100_000
@@ -83,23 +83,6 @@ def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
         if key in keys[:i]:
             raise Finger3dError(f"--vary {key}: given twice; put all its values into one list")
     return found
-
-
-def numbered(key: str, given: TreeView, option: str) -> str:
-    """The key with a reading's name replaced by its number: ``gauge.g36.x_mm`` is ``gauge.0.x_mm``."""
-    parts = key.split(".")
-    kind, tables = parts[0], given.get(parts[0], ())
-    if kind not in ("gauge", "marker", "taxel") or len(parts) < 3 or parts[1].isdecimal():
-        return key
-    if not isinstance(tables, tuple | list):
-        return key
-    names = [str(table.get("name")) for table in tables if isinstance(table, Mapping)]
-    if parts[1] not in names:
-        near = nearest(parts[1], names)
-        hint = f'did you mean "{near}"? ' if near else ""
-        known = f"must be {listed(names)}, or its number from 0" if names else f"the scene has no [[{kind}]]"
-        raise Finger3dError(f"{option} {key}: no {kind} {shown(parts[1])}; {hint}{known}")
-    return ".".join([kind, str(names.index(parts[1])), *parts[2:]])
 
 
 @dataclass(frozen=True)
@@ -219,7 +202,7 @@ def _checked(
 ) -> Sweep:
     """Return the sweep over values that `joined` makes points of, each a checked scene."""
     base, path = tables_of(source, overrides)
-    keys = [numbered(v.key, base, option) for v in vary]
+    keys = [tree.numbered(v.key, base, option) for v in vary]
     if len(set(keys)) < len(keys):
         both = next(v.key for i, v in enumerate(vary) if keys[i] in keys[:i])
         raise Finger3dError(f"{option} {both}: given twice; put all its values into one list")
