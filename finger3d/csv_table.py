@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
+from finger3d.io import text_of
 
 _SEPARATORS = ",;\t"
 _ONE_COLUMN = "\x1f"
@@ -151,22 +150,17 @@ def read_table(path: Path, is_name: Callable[[str], bool]) -> CsvTable:
 
 
 def decoded(source: str, content: bytes) -> str:
-    """Return a text in UTF-8, UTF-16 with its mark, GB 2312 or Latin-1.
-
-    Numbers and separators are the same in the last two and in GB 18030; only names may be read wrongly.
+    """Return the text of a file; see `finger3d.io.text_of`.
 
     Raises
     ------
     Finger3dError
         If it is no text.
     """
-    is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    if not is_utf16 and b"\0" in content:
-        raise Finger3dError(f"{source}: holds zero bytes, as no text does; save it as CSV in UTF-8")
-    for encoding in ("utf-16",) if is_utf16 else ("utf-8-sig", "gb2312", "latin-1"):
-        with suppress(UnicodeDecodeError):
-            return content.decode(encoding).replace("\ufeff", "")
-    raise Finger3dError(f"{source}: is cut within a character of UTF-16; save it as CSV in UTF-8")
+    try:
+        return text_of(content)
+    except ValueError as error:
+        raise Finger3dError(f"{source}: {error}; save it as CSV in UTF-8") from None
 
 
 def with_names(source: str, lines: Sequence[str], is_name: Callable[[str], bool]) -> tuple[CsvTable, int]:

@@ -1,7 +1,8 @@
-"""CSV, JSON and npz files, each written completely or not at all."""
+"""Texts, CSV, JSON and npz files, each written completely or not at all."""
 
 from __future__ import annotations
 
+import codecs
 import csv
 import errno
 import hashlib
@@ -159,6 +160,25 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
             return {name: stored[name] for name in stored.files}
     except _DAMAGED as error:
         raise ValueError(f"no .npz file, or damaged: {error}") from error
+
+
+def text_of(content: bytes) -> str:
+    """Return a text in UTF-8, UTF-16 with its mark, GB 2312 or Latin-1.
+
+    ASCII, and with it numbers and separators, is the same in the last two and in GB 18030.
+
+    Raises
+    ------
+    ValueError
+        If it is no text.
+    """
+    is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    if not is_utf16 and b"\0" in content:
+        raise ValueError("holds zero bytes, as no text does")
+    for encoding in ("utf-16",) if is_utf16 else ("utf-8-sig", "gb2312", "latin-1"):
+        with suppress(UnicodeDecodeError):
+            return content.decode(encoding).replace("\ufeff", "")
+    raise ValueError("is cut within a character of UTF-16")
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:

@@ -42,6 +42,7 @@ def vtu_of(
     numbers: bool = False,
     names: bool = True,
     hexahedron: bool = False,
+    text: bool = False,
 ) -> Path:
     """Write a linear mesh with its facets by name, and cells that take the names of parts in turn."""
     import pyvista
@@ -57,11 +58,11 @@ def vtu_of(
     types = np.repeat([kind for kind, _ in blocks], [len(block) for _, block in blocks]).astype(np.uint8)
     grid_of = pyvista.UnstructuredGrid(cells, types, mesh.points)
     for key, values, known in (("label", label, labels), ("part", part, list(parts))):
-        text = np.array([*known, ""])
-        grid_of.cell_data[key] = values if numbers else text[values]
+        names_of = np.array([*known, ""])
+        grid_of.cell_data[key] = values if numbers else names_of[values]
         if numbers and names:
             grid_of.field_data[f"{key}_names"] = np.array([name or "body" for name in known])
     if numbers:  # the main body has no name as a text
         grid_of.cell_data["part"] = np.where(part > 0, part, -1)
-    grid_of.save(path)
+    grid_of.save(path, binary=not text)
     return path

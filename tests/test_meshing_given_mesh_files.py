@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
+from finger3d.fem.mesh.simplex import quadratic
 from finger3d.meshing.given.mesh_files import read_contents
+from finger3d.meshing.given.mesh_output import write_mesh_vtu
 from tests.given_meshes import GMSH, cube, refused, vtu_of
 
 # Gmsh 4.15 writes the middles of a tetrahedron's last two edges in the other order than VTK: (2, 3), then (1, 3)
@@ -121,6 +125,94 @@ def test_every_name_that_gmsh_writes_is_read(tmp_path: Path) -> None:
         found = read_contents(path)
         assert found.label.tolist() == labels, what
         assert found.part.tolist() == [part], what
+
+
+def stack(groups: Sequence[tuple[str, set[int]]]) -> str:
+    """A file of three tetrahedra on one facet each, each a volume, and groups of them in the order of their numbers."""
+    numbers = {tag: [k for k, (_, members) in enumerate(groups, 1) if tag in members] for tag in (1, 2, 3)}
+    entities = [f"{tag} 0 0 0 1 1 1 {len(own)} {' '.join(map(str, own))} 0" for tag, own in numbers.items()]
+    points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1", "1 1 1", "2 1 1"]
+    cells = ["3 1 4 1", "1 1 2 3 4", "3 2 4 1", "2 2 3 4 5", "3 3 4 1", "3 3 4 5 6"]
+    names = [f'3 {k} "{name}"' for k, (name, _) in enumerate(groups, 1)]
+    sections = {
+        "MeshFormat": ["4.1 0 8"],
+        "PhysicalNames": [str(len(names)), *names],
+        "Entities": ["0 0 0 3", *entities],
+        "Nodes": ["1 6 1 6", "3 1 0 6", *map(str, range(1, 7)), *points],
+        "Elements": ["3 3 1 3", *cells],
+    }
+    return "".join("\n".join([f"${name}", *lines, f"$End{name}\n"]) for name, lines in sections.items())
+
+
+@pytest.mark.parametrize(
+    ("groups", "parts"),
+    [
+        ({"all": {1, 2, 3}, "core": {1}}, ["core", "", ""]),
+        ({"all": {1, 2, 3}, "core": {1}, "skin": {2, 3}}, ["core", "skin", "skin"]),
+        ({"all": {1, 2, 3}, "core": {1, 2}, "bone": {1}}, ["bone", "core", ""]),
+        ({"finger": {1, 2, 3}, "all": {1, 2, 3}}, ["all", "all", "all"]),
+        ({"core": {1, 2}, "left": {2, 3}}, None),
+        ({"core": {1}, "bone": {1}}, None),
+    ],
+)
+def test_the_innermost_of_nested_volumes_names_a_part(
+    groups: dict[str, set[int]], parts: list[str] | None, tmp_path: Path
+) -> None:
+    path = tmp_path / "stack.msh"
+    for order in itertools.permutations(groups.items()):
+        path.write_text(stack(order), encoding="ascii")
+        if parts is None:
+            assert re.search("a volume is named both '.*' and '.*'", refused(lambda: read_contents(path)))
+        else:
+            assert read_contents(path).part.tolist() == parts
+
+
+@pytest.mark.parametrize("order", [("outside", "base"), ("base", "outside")])
+def test_a_surface_of_several_groups_has_the_name_that_counts(order: tuple[str, str], tmp_path: Path) -> None:
+    path = tmp_path / "one.msh"
+    text = TET10.replace("$PhysicalNames\n3\n2 1", f'$PhysicalNames\n4\n2 9 "{order[0]}"\n2 1')
+    text = text.replace('2 1 "base"', f'2 1 "{order[1]}"').replace("1 1 1 1 0\n2", "1 1 2 9 1 0\n2")
+    path.write_text(text, encoding="ascii")
+    found = read_contents(path)
+    assert set(found.label) == {"outside", "base", "contact"}
+    assert {name: found.triangles[found.label == name].tolist() for name in order} == dict.fromkeys(order, [[0, 2, 1]])
+
+
+@pytest.mark.parametrize(("name", "encoding"), [("K\u00f6rper", "latin-1"), ("\u529b", "gb18030"), ("\u529b", "utf-8")])
+def test_names_may_have_any_letters(name: str, encoding: str, tmp_path: Path) -> None:
+    path = tmp_path / "one.msh"
+    path.write_bytes(TET10.replace("skin", name).encode(encoding))
+    assert read_contents(path).part.tolist() == [name]
+    text = vtu_of(tmp_path / "one.vtu", cube(1), parts=["xyz"], text=True).read_bytes()
+    assert b"120 121 122 " in text
+    letters = b" ".join(b"%d" % letter for letter in name.encode(encoding))
+    (tmp_path / "one.vtu").write_bytes(text.replace(b"120 121 122 ", letters + b" "))
+    assert set(read_contents(tmp_path / "one.vtu").part) == {name}
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_lagrange_cells_of_vtk_are_read_up_to_degree_2(degree: int, tmp_path: Path) -> None:
+    import pyvista
+
+    path = tmp_path / "body.vtu"
+    if degree == 2:
+        write_mesh_vtu(path, quadratic(cube(1)))
+    else:
+        vtu_of(path, cube(1))
+    expected, grid = read_contents(path), pyvista.read(path)
+    types = np.select([np.isin(grid.celltypes, [10, 24]), True], [71, 69]).astype(np.uint8)
+    cells = np.append(grid.cells, [20, *np.arange(20) % 4]) if degree == 3 else grid.cells
+    lagrange = pyvista.UnstructuredGrid(cells, np.append(types, [71] * (degree == 3)).astype(np.uint8), grid.points)
+    if degree == 3:
+        lagrange.save(path)
+        assert "1 of type 71 of VTK with 20 nodes" in refused(lambda: read_contents(path))
+        return
+    lagrange.GetCellData().ShallowCopy(grid.GetCellData())
+    lagrange.GetFieldData().ShallowCopy(grid.GetFieldData())
+    lagrange.save(path)
+    found = read_contents(path)
+    for name in ("points", "cells", "triangles", "label", "part"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
 def test_a_file_of_gmsh_with_cells_of_no_group_is_read(tmp_path: Path) -> None:  # Mesh.SaveAll = 1

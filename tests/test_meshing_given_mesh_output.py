@@ -28,6 +28,6 @@ def test_a_mesh_comes_back(write, name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("write", "name"), [(write_mesh_msh, "again.msh"), (write_mesh_vtu, "again.vtu")])
 def test_names_of_parts_come_back_with_their_quotation_marks(write, name: str, tmp_path: Path) -> None:
-    mesh = replace(given_mesh(GMSH / "binary.msh").mesh, part_labels=("a\"b \\ 'c'",))
+    mesh = replace(given_mesh(GMSH / "binary.msh").mesh, part_labels=("a\"b \\ 'c' K\u00f6rper",))
     write(tmp_path / name, mesh)
     assert given_mesh(tmp_path / name).mesh.part_labels == mesh.part_labels

@@ -1,15 +1,16 @@
 """Finite element meshes in files of Gmsh (.msh, format 4.1) and VTK (.vtu): tetrahedra, named facets and named parts.
 
-In a .msh file facets and parts are physical surfaces and volumes.  In a .vtu file they are the values of the cell data
-``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k that stand for the k-th text, counted from
-0, of the field data ``label_names`` and ``part_names``; a negative number is no name.  The names of facets are compared
-in lower case.  meshio reads the nodes and cells of .msh and turns them into VTK's order; names are read here.  VTK
-reads .vtu, whose texts meshio does not know.
+In a .msh file facets and parts are physical surfaces and volumes; of nested volumes the innermost counts.  In a .vtu
+file they are the values of the cell data ``label`` at triangles and ``part`` at tetrahedra: texts, or whole numbers k
+that stand for the k-th text, counted from 0, of the field data ``label_names`` and ``part_names``; a negative number is
+no name.  The names of facets are compared in lower case.  meshio reads the nodes and cells of .msh and turns them into
+VTK's order; names are read here.  VTK reads .vtu, whose texts meshio does not know.
 """
 
 from __future__ import annotations
 
 import io
+import itertools
 import re
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from finger3d._ranges import printable
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
+from finger3d.io import text_of
 
 MSH, VTU = ".msh", ".vtu"
 MESH_SUFFIXES = (MSH, VTU)
@@ -35,8 +37,14 @@ MSH_VERSION = "4.1"
 
 _TETS = {"tetra": 4, "tetra10": 10}
 _TRIANGLES = {"triangle": 3, "triangle6": 6}
+_WIDTH = {**_TETS, **_TRIANGLES}
 _IGNORED = ("vertex", "line", "line3", "empty")
-_VTK = {0: "empty", 1: "vertex", 3: "line", 21: "line3", 5: "triangle", 22: "triangle6", 10: "tetra", 24: "tetra10"}
+_VTK = {
+    "empty": [0], "vertex": [1], "line": [3, 68], "line3": [21, 68], "triangle": [5, 69], "triangle6": [22, 69],
+    "tetra": [10, 71], "tetra10": [24, 71],
+}  # fmt: skip
+"""Types of VTK by those of meshio; 68 to 71 are Lagrange cells, whose number of nodes tells their degree."""
+
 _DAMAGED = (
     ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, MemoryError, StopIteration
 )  # fmt: skip
@@ -150,7 +158,7 @@ def _msh(path: Path) -> tuple[Float, list[_Block]]:
     import meshio
 
     try:
-        name_of = _names_of_entities(names, entities, is_binary, word)
+        names_of = _names_of_entities(path, names, entities, is_binary, word)
         with tempfile.TemporaryDirectory(prefix="finger3d_") as folder:
             (Path(folder) / "nameless.msh").write_bytes(content)
             mesh = meshio.gmsh.read(Path(folder) / "nameless.msh")
@@ -160,8 +168,9 @@ def _msh(path: Path) -> tuple[Float, list[_Block]]:
             raise Finger3dError(f"{path}: its nodes are parametric; save it with Mesh.SaveParametric = 0") from None
         raise Finger3dError(f"{path}: this Gmsh file is damaged or incomplete; save it again") from None
     blocks = [
-        _Block(b.type, np.asarray(b.data, dtype=np.int64), np.full(len(b.data), name_of.get((b.dim, tag), "")))
+        _Block(b.type, np.asarray(b.data, dtype=np.int64), np.full(len(b.data), name))
         for b, tag in zip(mesh.cells, entity, strict=True)
+        for name in names_of.get((b.dim, tag), [""])
     ]
     return np.asarray(mesh.points, dtype=float), blocks
 
@@ -176,15 +185,26 @@ def _without(content: bytes, section: bytes) -> tuple[bytes, bytes]:
     return before + after.lstrip(), inside[inside.index(b"\n") + 1 :]
 
 
-def _names_of_entities(names: bytes, entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], str]:
-    """Return the name of the physical group of each entity (dimension, tag); of several groups the first named."""
-    lines = re.findall(r'^[ \t]*(\d+)[ \t]+(\d+)[ \t]+"(.*)"', names.decode(), re.MULTILINE)
-    physical_names = [(int(dim), int(group), name) for dim, group, name in lines]
+def _names_of_entities(
+    path: Path, names: bytes, entities: bytes, is_binary: bool, word: int
+) -> dict[tuple[int, int], list[str]]:
+    """Return the names of the physical groups of each named entity (dimension, tag); of a volume the innermost."""
+    lines = re.findall(r'^[ \t]*(\d+)[ \t]+(\d+)[ \t]+"(.*)"', text_of(names), re.MULTILINE)
+    name_of = {(int(dim), int(group)): name for dim, group, name in lines}
     groups = _groups(entities, is_binary, word) if entities else {}
-    return {
-        (dim, tag): next((name for d, g, name in physical_names if d == dim and g in numbers), "")
+    found = {
+        (dim, tag): [name_of[dim, number] for number in numbers if (dim, number) in name_of]
         for (dim, tag), numbers in groups.items()
     }
+    volumes = {tag: names for (dim, tag), names in found.items() if dim == 3}
+    members = {name: {tag for tag in volumes if name in volumes[tag]} for names in volumes.values() for name in names}
+    inner = {name for name in members if len(members[name]) < len(volumes)}
+    for tag, own in volumes.items():
+        nested = sorted((name for name in own if name in inner), key=lambda name: len(members[name]))
+        if apart := next((two for two in itertools.pairwise(nested) if not members[two[0]] < members[two[1]]), None):
+            raise Finger3dError(f"{path}: a volume is named both '{apart[0]}' and '{apart[1]}'; give it one name")
+        found[3, tag] = nested[:1] if inner else sorted(own)[:1]
+    return {entity: names for entity, names in found.items() if names}
 
 
 def _groups(entities: bytes, is_binary: bool, word: int) -> dict[tuple[int, int], list[int]]:
@@ -245,23 +265,16 @@ def _vtu(path: Path) -> tuple[Float, list[_Block]]:
     import pyvista
 
     grid = pyvista.wrap(reader.GetOutput())
-    types = np.asarray(grid.celltypes)
-    count = grid.n_cells
     offset = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
     nodes = np.asarray(grid.cell_connectivity, dtype=np.int64)
-    label, part = (_names(path, grid, key, count) for key in (LABEL, PART))
-    blocks = []
-    for number in np.unique(types).tolist():
-        kind = _VTK.get(number, f"{number} of VTK")
-        of_type = np.flatnonzero(types == number)
-        width = {**_TETS, **_TRIANGLES}.get(kind)
-        if width is None:
-            blocks.append(_Block(kind, np.zeros((len(of_type), 0), dtype=np.int64), np.full(len(of_type), "")))
-            continue
-        if (np.diff(offset)[of_type] != width).any():
-            raise Finger3dError(f"{path}: a cell has not the {width} nodes of its type; save the mesh again")
+    label, part = (_names(path, grid, key, grid.n_cells) for key in (LABEL, PART))
+    blocks, forms = [], np.column_stack([grid.celltypes, np.diff(offset)])
+    for number, width in np.unique(forms, axis=0).tolist():
+        fitting = (kind for kind, numbers in _VTK.items() if number in numbers and width == _WIDTH.get(kind, width))
+        kind = next(fitting, f"{number} of VTK with {width} nodes")
+        cells = np.flatnonzero((forms == [number, width]).all(axis=1))
         names = part if kind in _TETS else label
-        blocks.append(_Block(kind, nodes[offset[of_type][:, None] + np.arange(width)], names[of_type]))
+        blocks.append(_Block(kind, nodes[offset[cells][:, None] + np.arange(width)], names[cells]))
     return np.asarray(grid.points, dtype=float), blocks
 
 
@@ -280,23 +293,31 @@ def _silent_vtk() -> Iterator[None]:
 
 def _names(path: Path, grid: Any, key: str, count: int) -> NDArray[np.str_]:
     """Return the name (count,) of every cell from its cell data, empty without one."""
-    if key not in grid.cell_data:
+    array = grid.GetCellData().GetAbstractArray(key)
+    if array is None:
         return np.full(count, "")
+    if not array.IsNumeric():
+        return _texts(array)
     values = np.asarray(grid.cell_data[key])
-    if values.dtype.kind in "US":
-        return values.astype(str)
     where = f"{path}: cell data '{key}'"
     names = f"{key}_names"
+    known = grid.GetFieldData().GetAbstractArray(names)
     if values.ndim != 1 or values.dtype.kind not in "iuf" or (values != np.round(values)).any():
         raise Finger3dError(f"{where} must hold a text or a whole number for each cell")
-    if names not in grid.field_data:
+    if known is None:
         raise Finger3dError(
             f"{where} holds numbers, and there is no field data '{names}' with the names they stand for"
         )
-    labels = np.asarray(grid.field_data[names]).astype(str).reshape(-1)
+    labels = _texts(known)
     number = values.astype(np.int64)
     if number.max(initial=-1) >= len(labels):
         raise Finger3dError(
             f"{where} has the number {number.max()}, and '{names}' has {len(labels)} names, counted from 0"
         )
     return np.append(labels, "")[np.where(number < 0, len(labels), number)]
+
+
+def _texts(array: Any) -> NDArray[np.str_]:
+    """Return the values (n,) of an array of VTK as texts; VTK gives bytes for what is no UTF-8."""
+    values = map(array.GetValue, range(array.GetNumberOfValues()))
+    return np.array([text_of(value) if isinstance(value, bytes) else str(value) for value in values])

@@ -25,6 +25,7 @@ def write_mesh_vtu(path: Path, mesh: Mesh) -> None:
     stand for are field data.
     """
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkStringArray
 
     labels = [label for label, facets in mesh.facets.items() if len(facets)]
     facets = [mesh.facets[label] for label in labels]
@@ -35,8 +36,12 @@ def write_mesh_vtu(path: Path, mesh: Mesh) -> None:
     grid = pyvista.UnstructuredGrid(np.concatenate(cells), types.astype(np.uint8), np.ascontiguousarray(mesh.points))
     grid.cell_data[PART] = np.concatenate([part, np.full(count, -1)])
     grid.cell_data[LABEL] = np.repeat([-1, *range(len(labels))], [len(mesh.cells), *map(len, facets)])
-    grid.field_data[f"{PART}_names"] = np.array(names)
-    grid.field_data[f"{LABEL}_names"] = np.array(labels)
+    for key, texts in ((PART, names), (LABEL, labels)):
+        array = vtkStringArray()  # PyVista refuses texts that are not ASCII
+        array.SetName(f"{key}_names")
+        for text in texts:
+            array.InsertNextValue(text)
+        grid.GetFieldData().AddArray(array)
     with atomic(path) as temporary:
         grid.save(temporary)
 
