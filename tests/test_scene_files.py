@@ -14,6 +14,7 @@ from finger3d.objects import MeshObject
 from finger3d.scene import load, parse
 from finger3d.scene.files import contents
 from tests.bodies import box, channel, write_stl
+from tests.given_meshes import cube, vtu_of
 from tests.scene_tables import scene_with_object
 
 
@@ -65,6 +66,22 @@ def test_a_finger_with_z_up_stays_so_in_the_scene_as_run(tmp_path: Path) -> None
     scene["finger"]["up"] = "x"
     with pytest.raises(Finger3dError, match='finger.up = "x": must be "y" or "z"'):
         parse(scene)
+
+
+def test_a_finger_that_was_drawn_in_another_unit_has_a_scale(tmp_path: Path) -> None:
+    scene = scene_with_object(write_stl(tmp_path / "plate.stl", box(6.0, 1.0, 6.0)))
+    inches = write_stl(tmp_path / "inches.stl", box(2.0, 1.0, 0.5))
+    metres = vtu_of(tmp_path / "metres.vtu", cube(2, edge_mm=4e-3))
+    for path, scale, size in ((inches, 25.4, (25.4, 12.7)), (metres, 1e3, (4.0, 4.0))):
+        scene["finger"] = {"geometry": str(path), "scale": scale}
+        found = parse(scene)
+        assert (found.design.height_mm, found.design.width_mm) == pytest.approx(size, rel=1e-9)
+        (tmp_path / "again.toml").write_text(found.to_toml(), encoding="utf-8")
+        assert load(tmp_path / "again.toml") == found
+        other = parse({**scene, "finger": {"geometry": str(path), "scale": 1.01 * scale}})
+        assert other.design.cache_fields != found.design.cache_fields
+    with pytest.raises(Finger3dError, match=r"give its scale in \[finger\], such as 1000 for metres"):
+        parse({**scene, "finger": {"geometry": str(metres)}})
 
 
 def test_object_scale_changes_the_object(tmp_path: Path) -> None:

@@ -137,8 +137,9 @@ class Imported(FileDesign):
     @property
     def extent(self) -> str:
         """Size along x, y and z, that of the base, and how the file was read, in words."""
+        scaled = f", times {self.scale:g}" if self.scale != 1.0 else ""
         turned = ", its z turned up" if self.up == "z" else ""
-        return f"{super().extent}; unit of the file: {self.unit}{turned}"
+        return f"{super().extent}; unit of the file: {self.unit}{scaled}{turned}"
 
     @property
     def part_labels(self) -> tuple[str, ...]:
@@ -201,7 +202,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
         A plane face named "base" in a STEP file (the name of its ADVANCED_FACE) is turned down. Solids of a STEP file
         are parts with their names as labels; those without a name are the main body. A body may be hollow.
     upside_down : turn it, so that its highest plane becomes the base
-    scale : for STL only
+    scale : factor of the lengths, which are mm before
     up : axis of the file that becomes y; z does by a quarter turn about x, before anything else
 
     Raises
@@ -359,7 +360,8 @@ def _check_size(path: str, surface: Triangles) -> None:
         extent = " x ".join(f"{e:.4g}" for e in surface.high - surface.low)
         raise Finger3dError(
             f"{path}: the body is {extent} mm large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; was "
-            "it drawn in another unit? An STL file's numbers are read as mm"
+            "it drawn in another unit? An STL file's numbers are read as mm; give its scale in [finger], such as 25.4 for "
+            "inches"
         )
 
 

@@ -61,10 +61,11 @@ def finger(path: str, table: TomlTable) -> Imported | GivenMesh:
     if path.lower().endswith(MESH_SUFFIXES):
         from finger3d.meshing.given.given import given_mesh
 
-        return given_mesh(path)
+        return given_mesh(path, cast(MeshFileTable, table).scale)
     from finger3d.geometry.imported import imported
 
-    return imported(path, up=cast(FileTable, table).up)
+    file = cast(FileTable, table)
+    return imported(path, scale=file.scale, up=file.up)
 
 
 def unit_mistake(design: Design, obj: RigidObject) -> str:

@@ -22,6 +22,7 @@ from finger3d.scene.tables import (
     MarkerGridTable,
     MarkerTable,
     MaterialTable,
+    MeshFileTable,
     MeshTable,
     PartTable,
     TaxelTable,
@@ -54,6 +55,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     for name, design in designs().items():
         yield f'[finger] geometry = "{name}"', _rows(table_of(design), design)
     yield "[finger] with a STEP or STL file", _rows(FileTable)
+    yield "[finger] with a .msh or .vtu file", _rows(MeshFileTable)
     yield "[material]", _rows(MaterialTable)
     yield "[parts.LABEL]", _rows(PartTable)
     common = _rows(table_of(RigidObject), RigidObject)

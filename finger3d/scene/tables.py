@@ -24,6 +24,7 @@ from finger3d._ranges import (
     Place,
     Poisson,
     Radians,
+    Scale,
     Seconds,
     Shore,
     SignedForce,
@@ -302,19 +303,28 @@ class AutoTable(TomlTable):
     auto_tolerance: Annotated[float, Gt(0), Lt(1)] | None = None
 
 
-class FileTable(TomlTable):
+class MeshFileTable(TomlTable):
+    """[finger] with a mesh of tetrahedra as its geometry.
+
+    Attributes
+    ----------
+    scale : what the lengths of the file are multiplied with, to be mm: 25.4 for inches, 1000 for metres
+    """
+
+    scale: Scale = 1.0
+
+
+class FileTable(MeshFileTable):
     """[finger] with a STEP or STL file as its geometry: all dimensions are the file's.
 
     Attributes
     ----------
+    scale : what the lengths of the file are multiplied with, to be mm: 25.4 for inches, 1000 for metres; those of a
+        STEP file are mm before, whatever unit it names
     up : the axis of the file that points from the base to the contact face; a body with z up is turned about x
     """
 
     up: Literal["y", "z"] = "y"
-
-
-class MeshFileTable(TomlTable):
-    """[finger] with a mesh of tetrahedra as its geometry."""
 
 
 @functools.cache

@@ -54,12 +54,14 @@ class GivenMesh(FileDesign):
     ----------
     path : the file
     content : SHA-256 of the file
+    scale : factor of the coordinates in the file
     mesh : quadratic, facets labelled contact, base, walls and ends, cells with their part; mm
     surface : its boundary, a curved facet as sixteen triangles
     """
 
     path: str
     content: str
+    scale: float
     mesh: Mesh = field(repr=False)
     surface: Triangles = field(repr=False)
 
@@ -70,8 +72,8 @@ class GivenMesh(FileDesign):
 
     @property
     def cache_fields(self) -> Mapping[str, object]:
-        """Content of the file; the file's name does not matter."""
-        return {"design": "mesh", "dimensions": {"content": self.content}}
+        """Content of the file and its scale; the file's name does not matter."""
+        return {"design": "mesh", "dimensions": {"content": self.content, "scale": repr(self.scale)}}
 
     @cached_property
     def volume_mm3(self) -> float:
@@ -105,8 +107,12 @@ class GivenMesh(FileDesign):
         return max(four_digits(_mean_edge(self.mesh.points, self.mesh.cells)), self.size_mm)
 
 
-def given_mesh(path: str | Path) -> GivenMesh:
+def given_mesh(path: str | Path, scale: float = 1.0) -> GivenMesh:
     """Read a finger from a .msh or .vtu file, check it, and move the middle of its base to the origin.
+
+    Parameters
+    ----------
+    scale : factor of the coordinates in the file, to be mm
 
     Raises
     ------
@@ -116,11 +122,11 @@ def given_mesh(path: str | Path) -> GivenMesh:
     """
     path = Path(path)
     contents = read_contents(path)
-    mesh = _labelled(path, contents)
+    mesh = _labelled(path, replace(contents, points=scale * contents.points))
     _check_cells(path, mesh)
     _check_connected(path, mesh)
     mesh = _on_its_base(path, mesh)
-    return GivenMesh(str(path), content(path), mesh, _surface(mesh))
+    return GivenMesh(str(path), content(path), scale, mesh, _surface(mesh))
 
 
 def mesh_given(design: GivenMesh, options: MeshSizes, zone: Zone) -> tuple[Mesh, MeshReport]:
@@ -290,7 +296,7 @@ def _on_its_base(path: Path, mesh: Mesh) -> Mesh:
         extent = " x ".join(f"{e:.4g}" for e in high - low)
         raise Finger3dError(
             f"{path}: the body is {extent} mm large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; was "
-            "it meshed in another unit? The file's numbers are read as mm"
+            "it meshed in another unit? Its numbers are read as mm; give its scale in [finger], such as 1000 for metres"
         )
     nodes = np.unique(mesh.facets["base"])
     level = mesh.points[nodes, 1]
