@@ -360,8 +360,8 @@ def _check_size(path: str, surface: Triangles) -> None:
         extent = " x ".join(f"{e:.4g}" for e in surface.high - surface.low)
         raise Finger3dError(
             f"{path}: the body is {extent} mm large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; was "
-            "it drawn in another unit? An STL file's numbers are read as mm; give its scale in [finger], such as 25.4 for "
-            "inches"
+            "it drawn in another unit? The numbers of an STL file are read as mm; give its scale in [finger], such as "
+            "25.4 for inches"
         )
 
 
