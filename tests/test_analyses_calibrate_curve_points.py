@@ -20,6 +20,6 @@ def test_a_press_that_fails_gives_a_reason_and_no_reading() -> None:
     curve = CurvePoints(problem, (0.1, 0.5), Increments(legs, False, 0.0), (good, bad), {}, 3)
     assert list(curve.frames) == [0.1]
     assert list(curve.failed) == [0.5]
-    assert curve.failed[0.5].startswith("at depth ")
+    assert curve.failed[0.5].startswith("at a depth of 10 mm: ")
     assert curve.reading("g36").tolist() == [good.frame.gauges["g36"]]
     assert curve.factorizations == 3 + 1  # small strain: only the build factors

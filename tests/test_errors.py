@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from finger3d import cli
 from finger3d.errors import OUT_OF_MEMORY, out_of_memory
+from tests.scenes import HALF_CYLINDER
 
 
 @pytest.mark.parametrize(
@@ -30,3 +33,22 @@ def test_what_says_that_memory_ran_out(error: BaseException, memory: bool, monke
     else:
         with pytest.raises(type(error)):
             cli.main(["info"])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "press --no-figures --out OUT", "sensitivity --of gauge_g --out OUT", "cost", "sweep --workers 1 --out OUT "
+        "--vary friction.mu=0.1,0.2", "identify --measured CSV --free material.E_MPa=0.1:1 --out OUT",
+        "optimise --budget 1 --free gauge.g.x_mm=1:2 --out OUT", "optimise --gauges 1 --out OUT",
+        "calibrate --gauge g --out OUT",
+    ],
+)  # fmt: skip
+def test_an_increment_that_does_not_converge_is_exit_code_3(command: str, tmp_path: Path, capsys) -> None:
+    """No force of 1000 N is reached in a finger 5 mm high and 2 mm wide with E = 1 MPa."""
+    scene, csv = tmp_path / "scene.toml", tmp_path / "bench.csv"
+    scene.write_text(HALF_CYLINDER.replace("depth_mm = 0.5", "force_N = 1e3"))
+    csv.write_text("step,gauge_g\n1,0.01\n2,0.02\n4,0.05\n")
+    name, *options = command.replace("OUT", str(tmp_path / "out")).replace("CSV", str(csv)).split()
+    assert cli.main([name, str(scene), *options]) == 3
+    assert "the prescribed force is not reached" in capsys.readouterr().err

@@ -167,8 +167,7 @@ def _last_of_press_to_less(problem: Problem, increments: int, ratio: float, work
         for leg in _finished_legs(problem.model, increments)
     )
     *_, last = march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace)
-    if not last.outcome.ok:
-        raise Finger3dError("the press to smaller forces did not converge")
+    last.check("the press to smaller forces")
     return last
 
 

@@ -217,8 +217,7 @@ def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, R
     start = time.perf_counter()
     problem = with_refined_borders(model)
     short, steps = short_press(problem)
-    if not steps[-1].outcome.ok:
-        raise Finger3dError(f"the press did not converge on this mesh: {steps[-1].outcome}")
+    steps[-1].check("the press on this mesh")
     try:
         bars = adjoint_bars(short, steps)
     except NoAdjointBarsError:

@@ -230,8 +230,7 @@ def _pilot(model: Model, factor: float) -> _Pilot:
     problem = PressedBody.with_refined_borders(replace(model, mesh=_scaled(model, factor))).problem
     meshed = problem.seconds["cad"] + problem.seconds["mesh"]
     steps, chosen = march_automatic(problem)
-    if not steps[-1].outcome.ok:
-        raise Finger3dError(f"cost: a coarse press did not converge: {steps[-1].outcome}")
+    steps[-1].check("cost: a coarse press")
     found = estimate(problem, steps, numbers=press_numbers, runs=chosen.runs if chosen else ())
     if not found.discretisation:
         raise Finger3dError(f"cost: a coarse press has no error bars: {found.method}")

@@ -142,10 +142,7 @@ class PressRecord:
     def outcome(self) -> str:
         """Return the outcome, with the depth of the increment that failed."""
         failed = next((step for step in self.steps if not step.outcome.ok), None)
-        if failed is None:
-            return str(self.history.outcome)
-        detail = failed.detail and f" ({failed.detail})"
-        return f"at a depth of {failed.target.depth_mm:.4g} mm: {failed.outcome}{detail}"
+        return str(self.history.outcome) if failed is None else failed.failure
 
     def _slip_limit(self) -> Tree | None:
         """Return what the contact of the last converged increment holds before it slips as a whole."""

@@ -143,8 +143,7 @@ def sensitivity(
     report.stage("meshing and pressing")
     body = PressedBody.with_refined_borders(model, report)
     pressed = body.steps()
-    if not pressed[-1].outcome.ok:
-        raise Finger3dError(f"sensitivity: at depth {pressed[-1].target.depth_mm:.4g} mm: {pressed[-1].outcome}")
+    pressed[-1].check("sensitivity")
     report.stage("differentiating")
     problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
     given, varying, variations = with_moduli_only(scene.as_dict()), VariedBody(problem), dict[str, Variation]()

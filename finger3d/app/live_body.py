@@ -19,7 +19,7 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import StepResult, contact_table, measure
+from finger3d.mechanics.results.history import contact_table, measure
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
 from finger3d.sensor.curve import ReadingCurve
@@ -118,7 +118,7 @@ class LiveBody:
             model = replace(model, legs=(Leg(model.largest_depth_mm, steps=STEPS),))
         body = PressedBody(model, report)
         steps = body.steps()
-        _check(steps[-1], scene.tables.friction.mu)
+        steps[-1].check(f"app: mu = {scene.tables.friction.mu:g}")
         return cls(scene.title, body.problem, steps[-1].target.depth_mm, len(steps))
 
     def press(self, mu: float, depth_mm: float) -> LivePress:
@@ -170,7 +170,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     problem = body.problem
     pressed = under(problem, problem.model.friction.with_mu(mu), (Leg(depth_mm, steps=body.steps),))
     steps = list(march(pressed))
-    _check(steps[-1], mu)
+    steps[-1].check(f"app: mu = {mu:g}")
     measured = measure(problem.points, steps[-1])
     table = contact_table(problem.points, steps[-1].state)
     z_mm, on = middle_line(table, problem.points.band_mm, problem.points.half_width_mm if problem.dim == 3 else None)
@@ -183,6 +183,3 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     )
 
 
-def _check(last: StepResult, mu: float) -> None:
-    if not last.outcome.ok:
-        raise Finger3dError(f"app: mu = {mu:g} at a depth of {last.target.depth_mm:g} mm: {last.outcome}")

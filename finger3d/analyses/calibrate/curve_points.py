@@ -42,11 +42,7 @@ class CurvePoints:
     @property
     def failed(self) -> dict[float, str]:
         """Outcome of every press that did not converge, by mu."""
-        return {
-            p.mu: f"at depth {p.frame.target.depth_mm:.4g} mm: {p.frame.outcome}"
-            for p in self.presses
-            if not p.frame.outcome.ok
-        }
+        return {p.mu: p.frame.failure for p in self.presses if not p.frame.outcome.ok}
 
     @property
     def factorizations(self) -> int:

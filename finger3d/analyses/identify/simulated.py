@@ -21,7 +21,7 @@ from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.analyses.sensitivity import varied
 from finger3d.analyses.shared_body import body_key
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
@@ -151,7 +151,7 @@ class Simulation:
             self._keep(row)
         found = self._known[point]
         if isinstance(found, str):
-            raise Finger3dError(found)
+            raise MissingError(found)
         return found
 
     def at(self, values: Sequence[float] | Float, measured: MeasuredPress) -> dict[str, Float]:
@@ -261,8 +261,7 @@ class Simulation:
             return {"values": list(point), "outcome": " ".join(str(error).split()), "curve": {}}
         bad = next((f for f in frames if not f.outcome.ok), None)
         if bad is not None:
-            outcome = f"at depth {bad.target.depth_mm:.4g} mm: {bad.outcome}"
-            return {"values": list(point), "outcome": outcome, "curve": {}}
+            return {"values": list(point), "outcome": bad.failure, "curve": {}}
         columns = _curve_of(problem, frames, self.with_zones)
         return {"values": list(point), "outcome": "converged", "curve": {n: v.tolist() for n, v in columns.items()}}
 

@@ -17,7 +17,6 @@ from finger3d.accuracy.companions import built_like, companion, edge_ratio
 from finger3d.accuracy.richardson import ORDERS, Kind, gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
-from finger3d.errors import Finger3dError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -55,8 +54,7 @@ class StrainField:
     def of_frames(cls, problem: Problem, frames: Sequence[StepResult], mus: Sequence[float]) -> StrainField:
         """Return the field of the last increments of presses."""
         for mu, frame in zip(mus, frames, strict=True):
-            if not frame.outcome.ok:
-                raise Finger3dError(f"optimise: mu = {mu:g}: at depth {frame.target.depth_mm:.4g} mm: {frame.outcome}")
+            frame.check(f"optimise: mu = {mu:g}")
         unknowns = formulation_of(problem.model).unknowns(problem, [f.meshed_state for f in frames])
         return cls(problem, np.array([displacement(problem.mesh, x) for x in unknowns]))
 

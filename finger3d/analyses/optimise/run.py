@@ -17,7 +17,7 @@ from finger3d.analyses.optimise.task import (
     evaluation_of,
     objective_of,
 )
-from finger3d.errors import Finger3dError
+from finger3d.errors import MissingError
 from finger3d.io import atomic, claimed, write_json
 from finger3d.plotting.optimise import draw
 from finger3d.progress import Progress
@@ -82,7 +82,7 @@ def optimise(
     Raises
     ------
     Finger3dError
-        For a mistake in the arguments, or if no design within the bounds can be built.
+        For a mistake in the arguments; a MissingError if no design within the bounds gives a number.
     """
     given, path = tables_of(scene, overrides)
     problem = OptimisationProblem(
@@ -111,7 +111,7 @@ def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | 
     Raises
     ------
     Finger3dError
-        For a mistake in the problem, or if no design within the bounds can be built.
+        For a mistake in the problem; a MissingError if no design within the bounds gives a number.
     """
     objective = objective_of(problem.objective)
     start = checked_start(problem)
@@ -149,7 +149,7 @@ def _write_result(search: Search, folder: Path, first: Evaluation) -> Optimisati
     """Write the best design with its increments, the figure and the page."""
     problem, best = search.problem, search.best()
     if best is None:
-        raise Finger3dError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
+        raise MissingError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
     search.report.stage("increments of the best")
     _write_best(search, folder, best, first, search.increments(best.values))
     known = tuple(search.known.values())

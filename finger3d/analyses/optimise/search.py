@@ -165,7 +165,7 @@ class Search:
             return _PressedDesign(outcome=" ".join(str(error).split()))
         for mu, frame in zip(mus, ends, strict=True):
             if not frame.outcome.ok:
-                return _PressedDesign(outcome=f"mu = {mu:g}: {frame.outcome}")
+                return _PressedDesign(outcome=f"mu = {mu:g}: {frame.failure}")
         steps = tuple(measure(body.problem.points, frame) for frame in ends)
         kept = with_steps(under(body.problem, legs=legs), AUTO_START) if self._by_gradient else None
         return _PressedDesign(steps, body.reader(ends), problem=kept)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float, Tree, TreeView, freeze_arrays
 from finger3d.contact.friction import STATUS_NAMES
 from finger3d.contact.state import ContactState
-from finger3d.errors import Outcome
+from finger3d.errors import MissingError, Outcome
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.mechanics.readings.columns import QUANTITIES, Column, by_key, in_space, of_kind
 from finger3d.mechanics.results.state import State
@@ -175,6 +175,17 @@ class StepResult:
     detail: str = ""
     parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
     path: Any = field(default=None, repr=False)
+
+    @property
+    def failure(self) -> str:
+        """Depth and outcome of an increment that did not converge."""
+        detail = self.detail and f" ({self.detail})"
+        return f"at a depth of {self.target.depth_mm:.4g} mm: {self.outcome}{detail}"
+
+    def check(self, what: str) -> None:
+        """Raise a MissingError, which begins with `what`, if the increment did not converge."""
+        if not self.outcome.ok:
+            raise MissingError(f"{what}: {self.failure}")
 
     @property
     def named_readings(self) -> dict[str, float]:
