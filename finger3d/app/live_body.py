@@ -181,5 +181,3 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
         displacement=displacement(problem.mesh, unknowns),
         **{name: np.asarray(table[name])[on] for name in _ALONG},
     )
-
-
