@@ -32,8 +32,9 @@ AUTOMATIC_S = 4.0
 LARGE_DEFORMATION_S = 10.0
 """Largest cost of a coarse press at large deformation; 30 % of a press of a million unknowns would hold 4 GB."""
 
-CALIBRATION_S = 60.0
-"""Estimated time of a calibration beyond which a finer mesh is recommended but not used."""
+CALIBRATION_S, CALIBRATION_PRESSES = 60.0, 40.0
+"""Forecast time of a calibration beyond which a finer mesh is recommended but not used, and its time over that of a
+press without output: 12 to 32 in sections of 8 000 to 75 000 unknowns, 45 at large deformation, 50 to 75 in solids."""
 
 GROWTH = {2: 1.2, 3: 1.6}
 """Power of the unknowns with which the seconds of a press grow, by dimension; from 161 000 to 523 000 of a solid."""

@@ -19,16 +19,15 @@ _FORMER_FORMAT = "finger3d joint calibration"
 
 
 def save(calibration: Calibration, path: str | Path) -> Path:
-    """Write calibration.json with its checksum."""
-    data = as_dict(calibration)
-    write_json(path, data | {"checksum": checksum(data)})
+    """Write calibration.json."""
+    write_json(path, as_dict(calibration))
     return Path(path)
 
 
 def as_dict(calibration: Calibration) -> Tree:
-    """Return the content of calibration.json, including what follows from the curves."""
+    """Return the content of calibration.json, including what follows from the curves, and its checksum."""
     c = calibration
-    return {
+    data = {
         "format": FORMAT,
         "version": VERSION,
         "verdict": c.verdict(),
@@ -45,6 +44,7 @@ def as_dict(calibration: Calibration) -> Tree:
         "hash": c.hash,
         "about": c.about,
     }
+    return data | {"checksum": checksum(data)}
 
 
 def _reading_dict(c: ReadingCurve) -> Tree:

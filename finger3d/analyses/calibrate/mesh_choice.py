@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger3d._cost import CALIBRATION_S
-from finger3d.accuracy.cost import forecast
+from finger3d._cost import CALIBRATION_PRESSES, CALIBRATION_S
+from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.errors import Finger3dError
@@ -45,17 +44,16 @@ def choose_mesh(
     report: Progress,
     longest_s: float = CALIBRATION_S,
 ) -> CalibratedMesh:
-    """Calibrate on finer and finer meshes, until the mesh matters little or the next one would take too long.
+    """Calibrate on finer and finer meshes, until the mesh matters little or the forecast of the next one is too long.
 
     Parameters
     ----------
     automatic : whether the mesh may be refined; otherwise a finer one is only named
     calibrated : calibrates a model
-    longest_s : estimated time of a calibration, s, beyond which a finer mesh is only named
+    longest_s : forecast time of a calibration, s, beyond which a finer mesh is only named
     """
     found: CalibratedMesh | None = None
     while True:
-        begin = time.perf_counter()
         try:
             curve, calibration = calibrated(model)
         except Finger3dError as error:
@@ -65,19 +63,17 @@ def choose_mesh(
         share = mesh_share(calibration)
         if share <= SHARE:
             return CalibratedMesh(curve, calibration, "")
-        finer = _finer(model, share)
-        before, after = (float(forecast(m)["total_s"]) for m in (model, finer))
-        seconds = (time.perf_counter() - begin) * after / before
-        sizes = f"mesh.size_mm = {finer.mesh.size_mm:.3g} and base_size_mm = {finer.mesh.base_size_mm:.3g}"
-        note = (
-            f"the mesh makes up to {100.0 * share:.0f} % of the variance of mu; {sizes} would make it less, "
-            f"in about {seconds:.2g} s"
-        )
-        found = CalibratedMesh(curve, calibration, note)
+        model = _finer(model, share)
+        sizes = f"mesh.size_mm = {model.mesh.size_mm:.3g} and base_size_mm = {model.mesh.base_size_mm:.3g}"
+        note = f"the mesh makes up to {100.0 * share:.0f} % of the variance of mu; {sizes} would make it less"
+        try:
+            seconds = CALIBRATION_PRESSES * without_output_s(forecast(model))
+        except Finger3dError as error:  # for want of memory
+            return CalibratedMesh(curve, calibration, f"{note}; {error}")
+        found = CalibratedMesh(curve, calibration, f"{note}, in about {seconds:.2g} s")
         if not automatic or seconds > longest_s:
             return found
-        report.say(f"{note}; calibrating again")
-        model = finer
+        report.say(f"{found.note}; calibrating again")
 
 
 def _finer(model: Model, share: float) -> Model:
