@@ -91,7 +91,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html",
                      "scene.toml", "map.png", "map.csv"}  # fmt: skip
     data = json.loads((out / "calibration.json").read_text())
-    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 4, 16)
+    assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 5, 16)
     assert data["about"]["factorizations"] == 1
     assert ReducedModel.load(out / "reduced.npz").gauges == ("g36", "long")
     found = load(out / "calibration.json")
