@@ -109,6 +109,17 @@ def test_orders_and_inserts_that_cannot_be(options, rigid, told) -> None:
     assert "\n" not in str(error.value)
 
 
+def test_silicone_in_two_pieces_is_refused_with_advice() -> None:
+    """A rigid wall from the base to the top has silicone on both sides."""
+    from build123d import Compound
+
+    block, wall = between((-10, 0, -8), (10, 8, 8)), between((-1, 0, -8), (1, 8, 8))
+    solids = {"": Compound((block - wall).solids()), "wall": wall}
+    for parts in (False, True):
+        with pytest.raises(Finger3dError, match="silicone of body falls into 2 pieces; .*--parts"):
+            mold(block, (), MoldOptions(parts=parts), solids, ["wall"])
+
+
 def test_one_solid_needs_no_parts() -> None:
     with pytest.raises(Finger3dError, match="--parts"):
         pour_order({"": TIP.solid()}, (), MoldOptions(parts=True))

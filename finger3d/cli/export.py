@@ -13,6 +13,8 @@ from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
 
 if TYPE_CHECKING:
+    from finger3d.analyses.export_model import ModelFiles
+    from finger3d.mold.export import Exported
     from finger3d.scene import Scene
 
 _INSERT = "draw it as a part of the design with [parts.LABEL] rigid = true: it is printed and inserted"
@@ -88,9 +90,12 @@ def export(
     ]
     if done.silicone_ml is not None:
         rows.append(("silicone", f"{done.silicone_ml:.3g} ml in the cavity; see sheet.txt"))
-    rows.append(("results", str(out)))
-    rows += [("", file.name) for file in done.files]
-    print_rows(loaded.title, rows)
+    _print(loaded.title, rows, out, done)
+
+
+def _print(title: str, rows: list[tuple[str, str]], out: Path, done: Exported | ModelFiles) -> None:
+    """Print a table that ends with the files, and the remarks."""
+    print_rows(title, [*rows, ("results", str(out)), *(("", file.name) for file in done.files)])
     for text in done.remarks:
         print(f"remark: {text}")
 
@@ -107,8 +112,4 @@ def _export_model(scene: Scene, out: Path, deck: bool, json_: bool) -> None:
     rows = [("mesh", f"{done.cells} cells, {done.points} points")]
     if done.multiple is not None:
         rows.append(("force", f"{done.multiple:.12g} times the total force that ccx prints"))
-    rows.append(("results", str(out)))
-    rows += [("", file.name) for file in done.files]
-    print_rows(scene.title, rows)
-    for text in done.remarks:
-        print(f"remark: {text}")
+    _print(scene.title, rows, out, done)

@@ -161,13 +161,14 @@ def _silicones(
     shape: Solid | Triangles, solids: Mapping[str, Solid], rigid: Collection[str], options: MoldOptions
 ) -> dict[str, Solid | Triangles]:
     """Return what is poured, in the order of the pours; all of it at once without --parts."""
-    if options.parts or rigid:
-        order = pour_order(solids, rigid, options)
-        if options.parts:
-            return {label: solids[label] for label in order}
-        soft = solids[order[0]].fuse(*(solids[label] for label in order[1:])) if order[1:] else solids[order[0]]
-        return {"": one(soft, "the silicone between rigid parts", "pour it part by part, with --parts")}
-    return {"": shape}
+    if not options.parts and not rigid:
+        return {"": shape}
+    order = pour_order(solids, rigid, options)
+    poured = {label: solids[label] for label in order}
+    if not options.parts:
+        poured = {"": solids[order[0]].fuse(*(solids[label] for label in order[1:])) if order[1:] else solids[order[0]]}
+    advice = "give each piece a name in the STEP file, and pour them one by one with --parts"
+    return {label: one(solid, f"the silicone of {label or MAIN}", advice) for label, solid in poured.items()}
 
 
 def recesses(body: Body) -> list[Solid]:
