@@ -13,7 +13,8 @@ from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.mechanics.model import Leg, MeshOptions
-from tests.models import half_cylinder, run, swept_fig9
+from finger3d.objects import Plane
+from tests.models import block, half_cylinder, run, swept_fig9
 
 
 def test_a_length_is_never_better_than_its_ends_are_resolved() -> None:
@@ -24,7 +25,7 @@ def test_a_length_is_never_better_than_its_ends_are_resolved() -> None:
     assert mesh_error(same, {name: 3.08}, 2.0, (own, other)) == {name: pytest.approx(0.04)}
 
 
-@pytest.mark.parametrize(("mu", "least"), [(0.25, 0.08), (0.0, 0.0)])
+@pytest.mark.parametrize(("mu", "least"), [(0.25, 0.375 * 0.25), (0.0, 0.0)])
 @pytest.mark.parametrize("size", [3.0, 2.5])
 def test_a_contact_no_longer_than_the_spacing_tells_nothing_of_friction(size: float, mu: float, least: float) -> None:
     # on the plane of symmetry it has none, on the companion either; with friction on, "0 +- 0" would be a lie
@@ -72,3 +73,27 @@ def test_the_contact_length_at_the_end_has_the_resolution_of_the_points_there() 
     told = press_numbers(problem, frames[-1])["contact_half_length_end_mm"]
     assert abs(told - 36.098) <= 2.0 * found
     assert 0.05 * (following - touching[-1]) <= found <= 0.25 * (following - touching[-1])
+
+
+@pytest.mark.parametrize(("size", "release"), [(0.25, 0.02), (0.5, 0.05), (0.8, 0.1)])
+def test_friction_that_few_points_keep_after_a_release_is_known_to_a_share_of_its_limit(
+    size: float, release: float
+) -> None:
+    """Against edges of 0.02 mm."""
+    legs = (Leg(0.3, steps=10), Leg(release, steps=10))
+    model = replace(half_cylinder(3.0), domain="plane-strain", friction=Coulomb(0.3), legs=legs)
+    found, bars = [], []
+    for edge in (0.02, size):
+        problem, frames = run(replace(model, mesh=MeshOptions(edge, 1.0, "swept")))
+        found.append(main_numbers(problem, frames[-1]))
+        bars.append(estimate(problem, frames).discretisation["friction_sum_N"])
+    assert abs(found[1]["friction_sum_N"] - found[0]["friction_sum_N"]) <= 2.0 * bars[1]
+    assert bars[1] <= 0.3 * found[1]["normal_force_N"]  # its limit
+    assert bars[0] < 0.1 * bars[1]
+
+
+def test_the_area_of_a_face_that_touches_as_a_whole_is_known_to_its_rim() -> None:
+    finger = block(object=Plane(), domain="plane-strain", legs=(Leg(0.2, steps=1),))
+    problem, frames = run(finger)
+    told, found = main_numbers(problem, frames[-1]), estimate(problem, frames).discretisation
+    assert 0.0 < found["contact_area_mm2"] < 0.1 * told["contact_area_mm2"]

@@ -66,9 +66,6 @@ _SHARES = {
 }
 """Calibrated on the sections of validation/error_bars.py; the normal force hardly changes with the multipliers."""
 
-_FEW_POINTS = 8.0
-"""Relative error of the friction in a section over (h/a)^3: a zone of few points has errors of higher order, too."""
-
 _UNDER_CURVED = {Kind.FRICTION_SUM: 3.0, Kind.DISSIPATION: 5.0}
 """Relative errors in a section under a curved object over (h/a)^2: presses with every second multiplier have the
 normals of this one, and do not see how few points follow the object's surface."""
@@ -169,12 +166,9 @@ def _bars(problem: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) ->
         shares = _SHARES[kind]
         # contact does not end within the width, so that the normal force does not depend on the spacing along z
         spacing = resolution.along if kind in (Kind.NORMAL_FORCE, Kind.WORK) else resolution.share
-        scale = scales.get(kind, abs(value))
-        if resolution.alone and kind is Kind.FRICTION_SUM:
-            scale = max(scale, abs(numbers["normal_force_N"]))
-        relative = shares.points * spacing**shares.power * scale
-        if kind is Kind.FRICTION_SUM and problem.dim == 2:
-            relative = math.hypot(relative, min(1.0, _FEW_POINTS * resolution.along**3) * scales[kind])
+        relative = shares.points * spacing**shares.power * scales.get(kind, abs(value))
+        if kind is Kind.FRICTION_SUM:
+            relative = math.hypot(relative, resolution.few_N)
         if kind is Kind.DISSIPATION and problem.dim == 3:
             relative = math.hypot(relative, spacing * _unused_friction(problem.model, numbers) * abs(value))
         if kind in _UNDER_CURVED and problem.dim == 2 and not problem.model.object.is_flat:

@@ -26,6 +26,10 @@ _IN_SECTIONS = 0.25
 contact, even where its companion agrees by chance: in plane stress 93 % of the cases of validation/error_bars.py then
 lie within twice the bar, and 89 % with a factor of 0.1."""
 
+_FEW_POINTS, _OF_LIMIT = 8.0, 0.375
+"""Relative error of friction over (h/a)^3: a zone of few points has errors of higher order, too.  Friction counts as at
+least this share of its limit: what remains of it after a release or a roll of few points may be found by chance."""
+
 _CORNER = 0.25
 """Error of the place of the edge of contact over the distance of the points, at most and under an object with edges."""
 
@@ -76,16 +80,16 @@ class PointResolution:
     ----------
     spacing_mm : spacing of the points along x
     share : the larger of `along` and of the spacing along z over the half width
-    alone : whether contact with friction is no longer than two spacings, so that friction is not resolved
     least : by name, lower bounds of the error bars of lengths, areas and friction; see `least_bars`
     along : spacing of the points along x over the half-length of contact
+    few_N : error of the friction that a zone of few points leaves open
     """
 
     spacing_mm: float
     share: float
-    alone: bool = False
     least: Mapping[str, float] = field(default_factory=dict)
     along: float = 1.0
+    few_N: float = 0.0
 
     @property
     def zone_bars(self) -> dict[str, float]:
@@ -97,28 +101,29 @@ class PointResolution:
     def of(cls, problem: Problem, step: StepResult) -> PointResolution:
         """Return the resolution of an increment; medians over the points in contact."""
         points, reach = problem.points, measure(problem.points, step)["contact_half_length_mm"]
-        has_friction = problem.model.friction.largest > 0.0
-        half_width = points.half_width_mm
+        half_width, touching = points.half_width_mm, step.state.status != OPEN
         if points.dim == 3 and problem.model.mesh.mesher != "swept":
-            spacing = float(np.sqrt(np.median(points.area)))
-            along_z = _edge_length(points, step.state.status != OPEN)
-            least = least_bars(points, step, along_z, problem.model)
-            share = _share(spacing, reach, spacing, half_width)
-            return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
-        at = np.round(points.points, 9)
-        line = np.unique(at[at[:, 2] == 0.0, 0])
-        near = line[np.abs(line - step.lowest[0]) <= 1.2 * reach]
-        spacings = np.diff(near if len(near) > 1 else line)
-        spacing = float(np.median(spacings)) if len(spacings) else problem.model.mesh.size_mm
-        rows = np.diff(np.unique(at[:, 2]))
-        along_z = float(np.median(rows)) if len(rows) else 0.0
+            spacing = along_z = float(np.sqrt(np.median(points.area)))
+            edges = _edge_length(points, touching)
+        else:
+            at = np.round(points.points, 9)
+            line = np.unique(at[at[:, 2] == 0.0, 0])
+            near = line[np.abs(line - step.lowest[0]) <= 1.2 * reach]
+            spacings = np.diff(near if len(near) > 1 else line)
+            spacing = float(np.median(spacings)) if len(spacings) else problem.model.mesh.size_mm
+            rows = np.diff(np.unique(at[:, 2]))
+            edges = along_z = float(np.median(rows)) if len(rows) else 0.0
         share = _share(spacing, reach, along_z, half_width)
-        least = least_bars(points, step, along_z, problem.model)
-        if points.dim == 2:
-            friction = float(np.linalg.norm(points.with_basis_of(step.state).friction(step.state.force), axis=1).sum())
-            least["friction_sum_N"] = _IN_SECTIONS * share * friction
-            least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
-        return cls(spacing, share, has_friction and reach <= spacing, least, _along(spacing, reach))
+        least = least_bars(points, step, edges, problem.model)
+        along, state = _along(spacing, reach), step.state
+        friction = float(np.linalg.norm(state.force[:, 1:], axis=1).sum())
+        limit = problem.model.friction.coefficients(state.status, state.force[:, 0] / points.area) @ state.force[:, 0]
+        scale = max(friction, _OF_LIMIT * float(limit))
+        few, of_rows = (min(1.0, _FEW_POINTS * h**3) * scale for h in (along, max(along, along_z / half_width)))
+        by_spacing = _IN_SECTIONS * share * friction if points.dim == 2 else least.get("friction_sum_N", 0.0)
+        least |= {"friction_sum_N": max(few, by_spacing), "outward_friction_x_N": few, "outward_friction_z_N": of_rows}
+        least["friction_sum_N_per_mm"] = least["friction_sum_N"] / (2.0 * half_width)
+        return cls(spacing, share, least, along, few)
 
 
 def _along(along: float, reach: float) -> float:
@@ -141,10 +146,11 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, model
     """Lower bounds of error bars that follow from the size of the zones in points, by name (mm, mm2, N, N/mm).
 
     An area is uncertain by a share of the area of the facets that the border of its zone cuts: the length of the border
-    times the error of its place.  A half-length is uncertain by a share of the mean distance from its ends to the next
-    points of the line z = 0.  In a solid a zone that is nowhere three points wide may be absent or longer, and its
-    half-length is uncertain by half of itself; that of stick by a share of what is that thin at its ends.  Friction
-    along z is uncertain by the spacing of the points along z.
+    times the error of its place; a zone that the face ends has the border of as many points side by side.  A
+    half-length is uncertain by a share of the mean distance from its ends to the next points of the line z = 0.  In a
+    solid a zone that is nowhere three points wide may be absent or longer, and its half-length is uncertain by half of
+    itself; that of stick by a share of what is that thin at its ends.  Friction along z is uncertain by the spacing of
+    the points along z.
 
     Parameters
     ----------
@@ -167,8 +173,9 @@ def least_bars(points: ContactPoints, step: StepResult, along_z_mm: float, model
         by_place = places.slip[0] * wide + places.thin * thin
         by_place += reaches * np.where(zone.inside, at_open, 0.0)[points.facets].max(axis=1)
         error = edge * (wide | reaches | thin) if name == "contact" else by_place
-        area = float(points.facet_area @ error)
-        found[f"{name}_area_mm2"] = area if np.count_nonzero(zone.inside) > 1 else max(area, one)
+        count = np.count_nonzero(zone.inside)
+        rim = one / _ONE_POINT * edge * 2.0 * (points.dim - 1) * count ** (1.0 - 1.0 / (points.dim - 1))
+        found[f"{name}_area_mm2"] = max(float(points.facet_area @ error), rim if count > 1 else one)
         found[f"{name}_half_length_mm"] = _half_length_bar(points, at_ends[name], zone.inside, line, reach)
         found[f"{name}_length_mm"] = 2.0 * found[f"{name}_half_length_mm"]
     if points.dim == 3:

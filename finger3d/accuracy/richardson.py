@@ -166,8 +166,7 @@ def mesh_error(
     """
     own, other = resolutions
     kinds = kinds_of(readings)
-    scales, normal_force = largest_readings(numbers, kinds), largest(numbers, kinds, Kind.NORMAL_FORCE)
-    found = {}
+    scales, found = largest_readings(numbers, kinds), {}
     for name, value in numbers.items():
         kind, change, bound = kinds[name], abs(value - companion[name]), own.least.get(name, 0.0)
         if kind.is_length or kind is Kind.AREA:
@@ -175,8 +174,6 @@ def mesh_error(
             change = max(0.0, change - other.least.get(name, 0.0))
         else:
             scale = scales.get(kind, abs(value))
-            if own.alone and kind is Kind.FRICTION_SUM:
-                scale = max(scale, normal_force)
             power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
             bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
         if kind is Kind.DISSIPATION:

@@ -228,13 +228,13 @@ def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
 
 
 def point_count_warning(record: PressRecord) -> list[str]:
-    """Return a warning if the widest contact zone has too few points, in all or along its shorter side."""
+    """Return a warning if the last contact zone has too few points, in all or along its shorter side."""
     problem, touching = record.problem, [step.state.status != OPEN for step in record.steps]
-    widest = max(touching, key=np.count_nonzero, default=np.zeros(0, dtype=bool))
-    count, size = int(np.count_nonzero(widest)), problem.model.mesh.size_mm
+    last = next((zone for zone in reversed(touching) if zone.any()), np.zeros(0, dtype=bool))
+    count, size = int(np.count_nonzero(last)), problem.model.mesh.size_mm
     if not count:
         return []
-    extents = np.ptp(problem.points.points[widest][:, :: 2 if problem.dim == 3 else 3], axis=0) / size
+    extents = np.ptp(problem.points.points[last][:, :: 2 if problem.dim == 3 else 3], axis=0) / size
     across, power = 1 + round(float(extents.min())), 1.0 / (problem.dim - 1)
     if count >= _RESOLVED_POINTS[problem.dim] and across >= _POINTS_ACROSS:
         return []
