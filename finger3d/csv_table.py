@@ -146,7 +146,7 @@ def read_table(path: Path, is_name: Callable[[str], bool]) -> CsvTable:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     lines = io.StringIO(decoded(str(path), content), newline=None).readlines()
     table, used = with_names(str(path), lines, is_name)
-    return table.with_rows(lines[used:], used + 1)
+    return table.with_rows(lines[used:], used + 1) if table.names else table
 
 
 def decoded(source: str, content: bytes) -> str:

@@ -113,19 +113,17 @@ def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_pa
         ("friction.mu,\n0.1,2\n", "line 2: has 2 cells"),
         ("friction.mu\n", "no row"),
         ("friction.mu,friction.mu\n0.1,0.2\n", 'two columns are called "friction.mu"'),
-        ("friction.mu,material.nu\n0.1,0.3\n0.2\n", "line 3"),
         ("friction.mu,material.nu\n0.1,\n", "line 2"),
         ("friction.mu\n0.1\n-2\n", "friction.mu = -2"),
         ("frictoin.mu\n0.1\n", "friction"),
         ("gauge.g36.x_mm,gauge.0.x_mm\n1,2\n", "given twice"),
-        (b"friction.mu\n\0\n", "zero bytes"),
         (None, "there is no such file"),
     ],
 )
 def test_a_bad_table_is_refused_in_one_line(text, expected, paper_scene, tmp_path, capsys) -> None:
     path = tmp_path / "points.csv"
     if text is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        path.write_text(text, encoding="utf-8")
     assert main(["sweep", str(paper_scene), "--points", str(path), "--out", str(tmp_path / "out")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "points" in line

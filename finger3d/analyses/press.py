@@ -95,7 +95,6 @@ def run_press(
     with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
         if error:
             _estimate_errors(record, report)
-            writer.error_shares(record)
             writer.markers(record)
             _estimate_changes(record, report)
             writer.summary(record, record.outcome())

@@ -36,7 +36,7 @@ _WRITE_SHARE = 10.0
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"
 _FILES = (
-    "history.csv", "contact.csv", "fields.vtu", "error_shares.vtu", "steps.npz", "report.html",
+    "history.csv", "contact.csv", "fields.vtu", "steps.npz", "report.html",
     "finger.png", "contact.png", "force.png", "markers.csv", "markers.png",
 )  # fmt: skip
 
@@ -133,14 +133,6 @@ class ResultWriter:
             self._scene, self._replaces = "", False
         record.seconds["output"] += time.perf_counter() - begin
         return content
-
-    def error_shares(self, record: PressRecord) -> None:
-        """Write error_shares.vtu, the share of each cell of the meshed part in the error of each number, if known."""
-        estimate = record.error_estimate
-        if estimate and estimate.body:
-            mesh = record.problem.mesh
-            at_rest = {"displacement": np.zeros_like(mesh.points)}
-            write_vtu(self.folder / "error_shares.vtu", mesh, at_rest, dict(estimate.body.shares))
 
     def markers(self, record: PressRecord) -> None:
         """Write markers.csv, if there are markers, with their errors as far as they are known."""

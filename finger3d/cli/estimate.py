@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Annotated, Literal
@@ -123,7 +125,7 @@ def _estimate_file(job: _Job, path: Path, out: Path | None, json_: bool) -> None
     if json_:
         print_json([asdict(e) for e in every])
     elif out is None:
-        print("\n".join([",".join(map(_cell, job.columns)), *(",".join(map(_cell, job.line(e))) for e in every)]))
+        print("\n".join(map(_csv_line, [job.columns, *map(job.line, every)])))
     else:
         from finger3d.io import write_csv
 
@@ -223,7 +225,7 @@ class _Job:
         if missing := [
             " or ".join(dict.fromkeys(self.column_names[n])) for n in self.names if n not in self.columns_in(table)
         ]:
-            has = ", ".join(repr(name)[:40] for name in table.names) or "nothing"
+            has = ", ".join(repr(name)[:40] for name in table.names) or "no line of names"
             raise Finger3dError(
                 f"{table.source}: must have a column named {' and one named '.join(missing)} and at least one reading; "
                 f"it has {has}"
@@ -243,7 +245,7 @@ def _followed(job: _Job, source: str) -> Iterator[str]:
 
     A line that is no reading is answered with the reason, so that it does not stop a robot.
     """
-    yield ",".join(map(_cell, job.columns))
+    yield _csv_line(job.columns)
     head, table, number = list[str](), None, 0
     for content in _written_lines(source):
         number, head = (number + 1, head) if content else (0, [])
@@ -258,12 +260,12 @@ def _followed(job: _Job, source: str) -> Iterator[str]:
                     job.check_columns(found)
             elif (row := table.with_rows([line], number)).rows:
                 (answer,) = job.estimates(*job.readings_in(row))
-                yield ",".join(map(_cell, job.line(answer)))
+                yield _csv_line(job.line(answer))
         except Finger3dError as error:
             if table is None:
                 raise
             nothing = dict.fromkeys(job.columns, math.nan)
-            yield ",".join(map(_cell, (nothing | {"status": "invalid", "verdict": str(error)}).values()))
+            yield _csv_line((nothing | {"status": "invalid", "verdict": str(error)}).values())
     if table is None and head:
         job.check_columns(found)
 
@@ -309,8 +311,7 @@ def _is_replaced(stream: IO[bytes], source: str) -> bool:
     return (now.st_dev, now.st_ino) != (read.st_dev, read.st_ino) or now.st_size < stream.tell()
 
 
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return repr(value)
-    text = str(value)
-    return '"' + text.replace('"', '""') + '"' if "," in text or '"' in text else text
+def _csv_line(cells: Iterable[object]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
+    return text.getvalue()

@@ -121,7 +121,7 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
     names = [name for name in table.names if name not in _NO_MEASUREMENTS]
     indices = [name for name in INDEX if name in names]
     if not indices:
-        has = ", ".join(repr(name)[:40] for name in table.names) or "nothing"
+        has = ", ".join(repr(name)[:40] for name in table.names) or "no line of names"
         raise Finger3dError(
             f"{path}: must have a column {listed(INDEX)}, which says when a row was measured; it has {has}"
         )
