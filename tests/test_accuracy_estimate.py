@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from finger3d._cost import Budget
-from finger3d.accuracy.companions import companion
+from finger3d.mechanics.discretise.companions import companion
 from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.accuracy.companions import companion
+from finger3d.mechanics.discretise.companions import companion
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.accuracy.companions import FACTOR, companion
+from finger3d.mechanics.discretise.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import press_with_errors, resized, widened

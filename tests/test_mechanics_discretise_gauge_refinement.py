@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finger3d._types import Float
-from finger3d.accuracy.companions import companion, edge_ratio
+from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.mesh.simplex import CONTACT

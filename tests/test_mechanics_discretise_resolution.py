@@ -237,7 +237,7 @@ def test_a_tolerance_begins_with_a_mesh_that_resolves_the_object() -> None:
 
 
 def test_a_companion_that_does_not_see_the_object_is_none() -> None:
-    from finger3d.accuracy.companions import companion
+    from finger3d.mechanics.discretise.companions import companion
 
     problem = build(fig9(Plane(), 0.1, 4.0))
     assert companion(problem).model.mesh.size_mm < 4.0

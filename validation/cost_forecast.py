@@ -76,7 +76,7 @@ def _pressed(model: Model, row: CostRow, names: tuple[str, ...]) -> Iterator[tup
     start = time.perf_counter()
     problem = PressedBody(own).problem
     steps, chosen = march_automatic(problem)
-    bars = estimate(problem, steps, numbers=press_numbers, runs=chosen.runs if chosen else ())
+    bars = estimate(problem, steps, numbers=press_numbers, chosen=chosen)
     seconds = time.perf_counter() - start - problem.seconds["cad"] - problem.seconds["mesh"]
     yield "unknowns", float(row.dofs), float(problem.size.dofs)
     yield "seconds", row.solving_s, seconds

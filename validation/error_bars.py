@@ -197,7 +197,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
     found, chosen = march_automatic(free)
     if chosen:
         kind = "automatic, met" if chosen.met else "automatic, not met"
-        bars = estimate(free, found, numbers=press_numbers, runs=chosen.runs).steps
+        bars = estimate(free, found, numbers=press_numbers, chosen=chosen).steps
         runs.append((kind, press_numbers(problem, found[-1]), bars))
     least = (1e-4 if chosen else ROUND_OFF) * exact["external_work_mJ"]  # else it is round-off, where nothing slips
     for part, numbers, bars in runs:

@@ -2,7 +2,7 @@
 
 In small strain under a rigid object the discretisation error follows from the condensed body itself
 (`finger3d.accuracy.adjoint_bars`).  At large deformation, with viscosity, inclusions or an elastic object, and under a
-prescribed force it is taken from a companion mesh (`finger3d.accuracy.companions`).
+prescribed force it is taken from a companion mesh (`finger3d.mechanics.discretise.companions`).
 
 Which counts of increments are solved, and on which mesh, follows from the numbers of increments, unknowns and contact
 points.  Two identical presses hence have identical error bars, whatever the load of the machine.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,19 +20,21 @@ import numpy as np
 from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float, Tree
 from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
-from finger3d.accuracy.companions import companion, edge_ratio, is_unstructured
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import ORDER, ORDERS, mesh_error
+from finger3d.accuracy.richardson import mesh_error, spread_error
 from finger3d.accuracy.weighted_residuals import BodyErrors
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.companions import coarse_companions, companion, edge_ratio, is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
     Run,
+    StepEstimate,
     errors_of_runs,
     last_step,
+    rough_workspace,
     step_error,
     with_increments_of,
 )
@@ -121,7 +123,7 @@ def estimate(
     steps: Sequence[StepResult],
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
-    runs: Sequence[Run] = (),
+    chosen: StepEstimate | None = None,
 ) -> ErrorEstimate:
     """Estimate the errors of the last increment from the mesh and from other counts of increments.
 
@@ -130,7 +132,7 @@ def estimate(
     problem, steps : the press as it was solved, all increments converged
     report : receives the messages
     numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
-    runs : runs that chose automatic increments
+    chosen : how automatic increments were chosen
 
     Returns
     -------
@@ -140,8 +142,8 @@ def estimate(
     start = time.perf_counter()
     if not steps or not steps[-1].outcome.ok:
         return ErrorEstimate(method="no estimate: the last increment did not converge")
-    automatic = len(runs) > 1 and all(leg.steps == "auto" for leg in problem.model.legs)
-    used = runs if automatic else ()
+    automatic = chosen is not None and all(leg.steps == "auto" for leg in problem.model.legs)
+    used = chosen if automatic else None
     # from here on, automatic increments are numbers
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
     beside, where = None, ""
@@ -167,7 +169,7 @@ def estimate_with_grid(
     steps: Sequence[StepResult],
     grid: MarkerGrid,
     report: Progress = QUIET,
-    runs: Sequence[Run] = (),
+    chosen: StepEstimate | None = None,
 ) -> tuple[ErrorEstimate, dict[str, float]]:
     """Estimate the errors of a press, and those of the displacements of a grid of markers.
 
@@ -186,15 +188,15 @@ def estimate_with_grid(
         return press_numbers(p, step) | moved(p, step)
 
     if not steps or not steps[-1].outcome.ok:
-        return estimate(problem, steps, report, press_numbers, runs), {}
+        return estimate(problem, steps, report, press_numbers, chosen), {}
     own = grid.readings(problem, steps[-1])
     if applies(problem.model):
-        found = estimate(problem, steps, report, press_numbers, runs)
-        markers = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, runs)
+        found = estimate(problem, steps, report, press_numbers, chosen)
+        markers = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, chosen)
         missing = "" if markers.discretisation else f"; marker grid: {markers.method}"
         return replace(found, method=found.method + missing), markers.totals()
     read = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)]
-    found = estimate(problem, read, report, both, runs)
+    found = estimate(problem, read, report, both, chosen)
     totals, of_grid = found.totals(), by_key(own)
 
     def of_press(errors: Mapping[str, float]) -> dict[str, float]:
@@ -210,20 +212,22 @@ def _of_increments(
     steps: Sequence[StepResult],
     companion: tuple[Problem | None, str, Mapping[str, float]],
     numbers: Measure,
-    runs: Sequence[Run],
+    chosen: StepEstimate | None,
 ) -> tuple[dict[str, float], str]:
     """Return the errors due to the increments by name, and how they were estimated.
 
     Parameters
     ----------
     companion : a press that costs less, or None, what it differs in, in words, and its numbers if they are known
-    runs : runs that chose automatic increments
+    chosen : runs that chose automatic increments
     """
     if has_exact_path(own.model):
         return dict.fromkeys(numbers(own, steps[-1]), 0.0), "exact"
-    if runs:
-        errors = errors_of_runs([(count, numbers(own, results[-1])) for count, results in runs])
-        return errors, f"{', '.join(str(count) for count, _ in runs[:-1])} and {runs[-1][0]}, order 1"
+    if chosen:
+        judged, where = chosen.beside or own, " on a coarser mesh" if chosen.beside else ""
+        errors = errors_of_runs([(count, numbers(judged, results[-1])) for count, results in chosen.runs])
+        counts = [str(count) for count, _ in chosen.runs]
+        return errors, f"{', '.join(counts[:-1])} and {counts[-1]}{where}, order 1"
     beside, where, known = companion
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
@@ -253,7 +257,7 @@ def discretisation(
     steps: Sequence[StepResult],
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
-    runs: Sequence[Run] = (),
+    chosen: StepEstimate | None = None,
 ) -> tuple[ErrorEstimate, Problem, str]:
     """Estimate the discretisation errors of the last increment.
 
@@ -263,7 +267,7 @@ def discretisation(
     beside : a press that costs less than this one
     where : what that press differs in, in words
     """
-    bars = _own_bars(own, steps, runs) if numbers in (main_numbers, press_numbers) else None
+    bars = _own_bars(own, steps, chosen.runs if chosen else ()) if numbers in (main_numbers, press_numbers) else None
     if bars is not None:
         named = {name: bars.bars[name] for name in numbers(own, steps[-1])}
         method = "mesh: dual-weighted residuals, and every second multiplier"
@@ -272,17 +276,45 @@ def discretisation(
             replace(bars.coarse, model=own.model, contact_geometry=None),  # it is pressed to other poses
             "with every second multiplier",
         )
-    beside = companion(own, report)
-    last = last_step(beside, cuts=FEW_CUTS)
-    ratio = edge_ratio(own, beside)
+    told = list(_pressed_companions(own, steps, report, numbers, chosen))
+    if not told:
+        raise Finger3dError("no other mesh of this body could be pressed for an estimate; change mesh.size_mm")
+    ratio, beside, known = told[0]
     kind = "coarse" if ratio > 1.0 else "finer"
+    spread = [(r, other) for r, _, other in told]
     found = ErrorEstimate(
-        discretisation=compared(own, steps[-1], beside, last, numbers),
-        method=_on_mesh(beside, kind),
-        companion_numbers=numbers(beside, last),
+        discretisation=spread_error(numbers(own, steps[-1]), spread, in_space(steps[-1].readings)),
+        method=_on_meshes([problem for _, problem, _ in told], kind),
+        companion_numbers=dict(known),
         ratio=ratio,
     )
     return found, beside, f"on the {kind} mesh"
+
+
+def _pressed_companions(
+    own: Problem, steps: Sequence[StepResult], report: Progress, numbers: Measure, chosen: StepEstimate | None
+) -> Iterator[tuple[float, Problem, Mapping[str, float]]]:
+    """Yield the ratio of edge lengths, the problem and the numbers of companions in the increments of the press.
+
+    They are those on coarser meshes, or a finer one where there are none; what does not converge is left out.
+    """
+    made = False
+    for ratio, beside in coarse_companions(own, report, chosen.beside if chosen else None):
+        try:
+            yield ratio, beside, numbers(beside, _last_of(beside, len(steps), chosen))
+        except _FAILURES:
+            continue
+        made = True
+    if not made:
+        beside = companion(own, report)
+        yield edge_ratio(own, beside), beside, numbers(beside, _last_of(beside, len(steps), None))
+
+
+def _last_of(beside: Problem, increments: int, chosen: StepEstimate | None) -> StepResult:
+    """Return the last increment of a companion, pressed roughly unless it is known."""
+    if chosen and chosen.beside and chosen.beside.mesh is beside.mesh and len(chosen.runs[-1][1]) == increments:
+        return chosen.runs[-1][1][-1]
+    return last_step(beside, rough_workspace(beside), cuts=FEW_CUTS)
 
 
 def _own_bars(own: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
@@ -302,16 +334,20 @@ def _marching_cost(problem: Problem) -> float:
     return count * size.contact_s + len(model.legs) * size.condensation_s * model.refactorises
 
 
-def _on_mesh(beside: Problem, kind: str) -> str:
-    """Return how the discretisation error was estimated, with the time of a mesh that was made for it."""
-    options = beside.model.mesh
-    given = isinstance(beside.model.design, GivenMesh)
-    mesher = "bisected" if given else options.mesher if beside.dim == 3 else "structured"
-    sizes = f"{mesher}, {options.size_mm:.4g} and {options.base_size_mm:.4g} mm"
-    sizes += ", of both bodies" if beside.model.object_compliance else ""
-    text = f"mesh: {beside.size.dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}"
-    text += f"orders {ORDER:g} to {max(ORDERS.values()):g}"
-    made = beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
-    if is_unstructured(beside.model) and made > _MESHED_S:
+def _on_meshes(companions: Sequence[Problem], kind: str) -> str:
+    """Return how the discretisation error was estimated, with the time of meshes that were made for it."""
+    own = companions[0].model
+    given = isinstance(own.design, GivenMesh)
+    mesher = "bisected" if given else own.mesh.mesher if companions[0].dim == 3 else "structured"
+    sizes = f"{mesher}, {', '.join(f'{beside.model.mesh.size_mm:.4g}' for beside in companions)} mm"
+    sizes += ", of both bodies" if own.object_compliance else ""
+    dofs = ", ".join(str(beside.size.dofs) for beside in companions)
+    text = f"mesh: {dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}spread"
+    made = sum(
+        beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
+        for beside in companions
+        if is_unstructured(beside.model)
+    )
+    if made > _MESHED_S:
         text += f" (meshing took {made:.1f} s; kept in the cache, it is paid once)"
     return text

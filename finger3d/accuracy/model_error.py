@@ -25,18 +25,18 @@ import numpy as np
 from finger3d._cost import CHANGES, LARGE_DEFORMATION_S
 from finger3d._types import Float
 from finger3d.accuracy.changes import FAILURES, ChangeEstimate, affordable_factor, changing_numbers, check_kind, judged
-from finger3d.accuracy.companions import LEAST_RATIO, coarser, edge_ratio
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import kinds_of
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import (
+    MARGIN,
     build,
     candidate_points,
     with_elastic_object,
     with_object_compliance,
 )
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.companions import LEAST_RATIO, coarser, edge_ratio
 from finger3d.mechanics.discretise.problem import Problem, free_surface
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of

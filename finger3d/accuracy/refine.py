@@ -18,12 +18,12 @@ from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
 from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_borders
-from finger3d.accuracy.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, press_numbers
 from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
 from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, relative_error
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import FACTOR, companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import MeshOptions, Model

@@ -143,6 +143,41 @@ def gain(ratio: float, order: float = ORDER) -> float:
     return abs(math.pow(ratio, order) - 1.0)
 
 
+_FITTED = 0.9
+"""Error bar over the root mean square of the errors that three companions give; see `spread_error`."""
+
+
+def spread_error(
+    numbers: Mapping[str, float], companions: Iterable[tuple[float, Mapping[str, float]]], readings: Iterable[Column]
+) -> dict[str, float]:
+    """Return the discretisation error by name, from the spread of a number q over several meshes.
+
+    With edges k times as long a number q_k would be off by k^p - 1 times the error of q ::
+
+        error of q = 0.9 root mean square over k of |q - q_k| / |k^p - 1|
+
+    A single difference is small by chance in one of five numbers, which the spread over three meshes is not.  The
+    factor was fitted to 79 drawn sections in small strain, of whose numbers 92 to 99 % then lie within two bars
+    (dissipation 86 %); of 74 sections at large deformation 85 to 97 % do.
+
+    Parameters
+    ----------
+    companions : edge length over that of the mesh, and numbers by name, of every companion
+    readings : columns of the readings among the numbers
+    """
+    kinds, told = kinds_of(readings), list(companions)
+    found = {}
+    for name, value in numbers.items():
+        order = _SPREAD_ORDERS.get(kinds[name], ORDER)
+        errors = [(value - other[name]) / gain(ratio, order) for ratio, other in told]
+        found[name] = _FITTED * math.sqrt(sum(error**2 for error in errors) / len(errors))
+    return {name: error for name, error in found.items() if math.isfinite(error)}
+
+
+_SPREAD_ORDERS = dict.fromkeys((Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT), 1.5)
+"""Orders of the errors of `spread_error`; of other kinds `ORDER`."""
+
+
 def mesh_error(
     numbers: Mapping[str, float],
     companion: Mapping[str, float],

@@ -17,13 +17,13 @@ from typing import Self
 from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
-from finger3d.accuracy.companions import coarser
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.refine import ALL
 from finger3d.accuracy.richardson import ORDER, kinds_of, relative_error
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
@@ -231,7 +231,7 @@ def _pilot(model: Model, factor: float) -> _Pilot:
     meshed = problem.seconds["cad"] + problem.seconds["mesh"]
     steps, chosen = march_automatic(problem)
     steps[-1].check("cost: a coarse press")
-    found = estimate(problem, steps, numbers=press_numbers, runs=chosen.runs if chosen else ())
+    found = estimate(problem, steps, numbers=press_numbers, chosen=chosen)
     if not found.discretisation:
         raise Finger3dError(f"cost: a coarse press has no error bars: {found.method}")
     numbers, kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)

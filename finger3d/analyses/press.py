@@ -255,12 +255,11 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     from finger3d.scene.derived import spreads
 
     report.stage("estimating the error")
-    runs = record.step_estimate.runs if record.step_estimate else ()
     grid, of_grid = record.marker_grid, dict[str, float]()
     if grid is None:
-        found = estimate(record.problem, record.steps, report, press_numbers, runs)
+        found = estimate(record.problem, record.steps, report, press_numbers, record.step_estimate)
     else:
-        found, of_grid = estimate_with_grid(record.problem, record.steps, grid, report, runs)
+        found, of_grid = estimate_with_grid(record.problem, record.steps, grid, report, record.step_estimate)
     record.marker_errors = found.totals() | of_grid
     known = spreads(record.scene.tables)
     by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers, record.workspace)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from finger3d._types import Tree, TreeView
-from finger3d.accuracy.companions import FACTOR
 from finger3d.errors import Outcome
+from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.readings.columns import Column
 
 FORCE = "force_N_per_mm"

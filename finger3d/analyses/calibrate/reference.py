@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.accuracy.companions import built_like
 from finger3d.analyses.pressed_body import PressesByMu, presses
+from finger3d.mechanics.discretise.companions import built_like
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult

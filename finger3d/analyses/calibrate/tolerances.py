@@ -20,7 +20,6 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float
-from finger3d.accuracy.companions import companion
 from finger3d.accuracy.estimate import reading_error
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
@@ -29,6 +28,7 @@ from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.companions import FACTOR
 from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
+from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.results.comparison import FORCE, Case
 
 WITHIN = 0.05

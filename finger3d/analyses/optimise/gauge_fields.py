@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.companions import built_like, companion, edge_ratio
 from finger3d.accuracy.richardson import ORDERS, Kind, gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.fem.recovery.recover import displacement
+from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import with_steps

@@ -9,6 +9,10 @@ of five errors that count are within twice their estimate (second order: two of 
 Two runs may agree by chance.  Three are therefore compared where they cost little, and an earlier pair of runs counts
 as if its error fell with the power 3/2 of the number of increments.  ``validation/error_bars.py`` measures how often
 the true error is within twice this estimate.
+
+At large deformation every increment factorises the tangent.  There the runs are those of a coarser mesh, on which
+increments leave the same errors (those of force, friction and strain within a third on meshes with twice and four times
+the edges), and the press itself is solved once.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from finger3d._cost import AUTOMATIC_S, PressSize
 from finger3d._types import Float
 from finger3d.contact.rules import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.companions import coarse_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
@@ -62,8 +67,11 @@ _FALL = 1.5
 FEW_CUTS = 1
 """Times that an increment of a press which serves an estimate is halved, at most: it may cost more than the press."""
 
-_FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 6, 12
-"""Counts if every increment factors the stiffness again: 6 and 12 increments cost nearly twice as much as 10."""
+_FIRST_IF_FACTORED, _LARGEST_IF_FACTORED = 3, 12
+"""Counts if every increment factors the tangent again: the first of a coarser mesh, and the largest."""
+
+ROUGH = 1e-4
+"""Residual at which increments at finite strain end on meshes that serve an estimate: friction is known to 0.02 %."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,7 @@ class StepEstimate:
     dissipation : relative to the dissipation, or to a fiftieth of the external work if that is larger
     met : whether every error is below its tolerance
     runs : in the order of their numbers of increments
+    beside : problem on a coarser mesh whose runs these are; None if they are those of the press
     """
 
     steps: int
@@ -89,10 +98,12 @@ class StepEstimate:
     tolerance: float = TOLERANCE
     dissipation_tolerance: float = DISSIPATION_TOLERANCE
     runs: tuple[Run, ...] = field(default=(), repr=False, compare=False)
+    beside: Problem | None = field(default=None, repr=False, compare=False)
 
     def as_dict(self) -> dict[str, float | bool]:
         """The estimate as an entry of summary.json."""
-        return {key: value for key, value in asdict(replace(self, runs=())).items() if key != "runs"}
+        entry = asdict(replace(self, runs=(), beside=None))
+        return {key: value for key, value in entry.items() if key not in ("runs", "beside")}
 
     @property
     def warning(self) -> str:
@@ -161,7 +172,7 @@ def refine(
 
     The iteration ends when three runs meet the tolerances or the largest number of increments is reached.  A run that
     fails is omitted if two with fewer increments converged or one with twice as many does.  If it fails before the
-    first automatic leg, none follows.
+    first automatic leg, none follows.  At finite strain there is one run, in increments chosen on a coarser mesh.
 
     Parameters
     ----------
@@ -170,7 +181,41 @@ def refine(
         Called after every increment of a run with the number of those solved, of all in the run, and its result.
     """
     workspace = workspace or formulation_of(problem.model).workspace()
+    if problem.model.finite_strain:
+        yield from _refined_beside(problem, workspace, cancel, advanced)
+        return
+    yield from _refined(problem, workspace, cancel, advanced)
+
+
+def _refined_beside(
+    problem: Problem, workspace: Workspace, cancel: Event | None, advanced: Callable[[int, int, StepResult], None]
+) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
+    """Yield the results of one run, in increments chosen on a coarser mesh; of more where these do not converge."""
+    beside = next((coarse for _, coarse in coarse_companions(problem)), None)
+    if beside is None:  # the mesh is small
+        yield from _refined(problem, workspace, cancel, advanced)
+        return
+    *_, (_, estimate) = _refined(beside, rough_workspace(beside), cancel, lambda done, total, step: None)
+    chosen = estimate.steps if estimate else AUTO_START
+    for steps in (chosen, 2 * chosen):
+        results = _run(with_steps(problem, steps), workspace, cancel, advanced)
+        if results[-1].outcome.ok or len(results) <= _fixed_first(problem.model):
+            break
+    yield results, estimate and replace(estimate, beside=beside)
+
+
+def rough_workspace(problem: Problem) -> Workspace:
+    """Return an empty workspace in which increments at finite strain end at the residual `ROUGH`."""
+    workspace = formulation_of(problem.model).workspace()
+    return replace(workspace, target=ROUGH) if problem.model.finite_strain else workspace
+
+
+def _refined(
+    problem: Problem, workspace: Workspace, cancel: Event | None, advanced: Callable[[int, int, StepResult], None]
+) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
+    """Yield the results of runs with twice as many increments each; see `refine`."""
     steps, last = limits(problem.model, problem.size)
+    least = 2 if problem.model.finite_strain else _LEAST_RUNS
     runs: list[Run] = []
     failed: tuple[StepResult, ...] = ()
     while steps <= last:
@@ -184,7 +229,7 @@ def refine(
             runs.append((steps, results))
             estimate = _estimate(problem, runs) if len(runs) > 1 else None
             yield results, estimate
-            if estimate and estimate.met and len(runs) >= _LEAST_RUNS:
+            if estimate and estimate.met and len(runs) >= least:
                 return
         steps *= 2
     if not runs:

@@ -11,7 +11,7 @@ import pytest
 
 from finger3d.accuracy import companions
 from finger3d.accuracy import estimate as estimates
-from finger3d.accuracy.companions import coarser, companion
+from finger3d.mechanics.discretise.companions import coarser, companion
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
