@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
 from finger3d._types import Tree
-from finger3d.accuracy.cost import forecast, without_output_s
-from finger3d.accuracy.richardson import Kind, relative_error
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.accuracy.richardson import Kind, kinds_of, largest
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
@@ -25,10 +24,7 @@ _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
 
 _LEAST_CHANGE = 0.01
-"""Least significant relative change, see `finger3d.accuracy.richardson.relative_error`."""
-
-_FACTORS = (2.0, 2.83, 4.0)
-"""Edge lengths of a coarse mesh over those of the press; the first that is cheap enough is taken."""
+"""Least significant change, over the natural scale of the number."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +36,13 @@ class Change:
     value : the number in the press
     change : what is to be added to it, in the same unit
     error : half-width of the interval of `change`
-    relative : change over the scale that errors of such a number are relative to
-    significant : whether the interval is narrow and the change large enough to be reported
+    scale : natural scale of the number, see `natural_scales`
     """
 
     value: float
     change: float
     error: float
-    relative: float
-    significant: bool
+    scale: float
 
     @property
     def low(self) -> float:
@@ -60,6 +54,16 @@ class Change:
         """Upper end of the interval of `change`."""
         return self.change + self.error
 
+    @property
+    def relative(self) -> float:
+        """The change over the natural scale; 0 where that is 0."""
+        return self.change / self.scale if self.scale else 0.0
+
+    @property
+    def significant(self) -> bool:
+        """Whether the interval is narrow and the change large enough to be reported."""
+        return self.error <= _SURE * abs(self.change) and abs(self.relative) >= _LEAST_CHANGE
+
 
 @dataclass(frozen=True, kw_only=True)
 class ChangeEstimate:
@@ -67,44 +71,30 @@ class ChangeEstimate:
 
     Attributes
     ----------
-    changes : changes of forces, lengths, areas and readings by name; empty if there is no estimate
+    changes : changes of forces, lengths, areas and readings by name
     method : one line that says how the changes were estimated, or ``no estimate: ...``
-    seconds : wall time of the estimate
-    resolution : of changes of lengths and areas by the contact points of the presses, by name
     """
 
     changes: Mapping[str, Change] = field(default_factory=dict)
     method: str = ""
-    seconds: float = 0.0
-    resolution: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def significant(self) -> dict[str, Change]:
         """The changes that are known well enough to be reported."""
         return {name: change for name, change in self.changes.items() if change.significant}
 
+    def of_press(self, numbers: Mapping[str, float]) -> Self:
+        """Return the changes of a press with these numbers, from which those of the coarse presses differ."""
+        changes = {
+            name: replace(c, value=numbers[name], error=max(c.error, abs(numbers[name] - c.value)))
+            for name, c in self.changes.items()
+            if name in numbers
+        }
+        return replace(self, changes=changes)
+
     def as_dict(self) -> Tree:
         """Return the entry of summary.json: change, and the ends of its interval, by number."""
         return {name: {"change": c.change, "low": c.low, "high": c.high} for name, c in self.changes.items()}
-
-
-def affordable_factor(coarse: Callable[[float], Model], budget_s: float, first: Sequence[float] = ()) -> float:
-    """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget.
-
-    Parameters
-    ----------
-    coarse : function of this factor that returns the model of the coarse press
-    first : factors to be tried before those of a coarse mesh
-
-    Raises
-    ------
-    Finger3dError
-        If all coarse presses cost more.
-    """
-    for factor in (*first, *_FACTORS):
-        if without_output_s(forecast(coarse(factor))) <= budget_s:
-            return factor
-    raise Finger3dError(f"it would take more than {budget_s:.2g} s")
 
 
 def two_digits(value: float) -> str:
@@ -119,42 +109,30 @@ def changing_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
-def judged(
-    values: Mapping[str, float], changes: Mapping[str, float], errors: Mapping[str, float], kinds: Mapping[str, Kind]
-) -> dict[str, Change]:
-    """Return the changes by name that are finite; those known within a factor of 1.5 and large are significant.
+def natural_scales(model: Model, depth_mm: float, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return the scale by name relative to which a change of a number of a press counts.
 
-    Parameters
-    ----------
-    values : numbers of the press by name, as `changing_numbers` returns them
-    changes, errors : estimated change of each, and half-width of its interval
-    kinds : of the numbers
+    It is the number itself for forces, extents of contact and the depth; for others what the number is a part of: mu
+    times the normal force for friction, contact for stick, the largest strain that is read or the depth over the height
+    for strains, the depth for displacements, and the mean pressure on the base for taxels.
     """
-    out = {}
-    for name, value in values.items():
-        change, error = changes[name], errors[name]
-        if all(map(math.isfinite, (value, change, error))):
-            relative = relative_error(values, kinds, name, change)
-            significant = error <= _SURE * abs(change) and _LEAST_CHANGE <= abs(relative) < math.inf
-            out[name] = Change(value, change, error, relative, significant)
-    return out
+    kinds, force, design = kinds_of(model.columns), abs(numbers["normal_force_N"]), model.design
+    base = 2.0 * design.half_length_mm * design.width_mm
 
+    def scale(name: str) -> float:
+        match kinds[name]:
+            case Kind.FRICTION_SUM:
+                return max(abs(numbers[name]), model.friction.largest * force)
+            case Kind.HALF_LENGTH:
+                return abs(numbers["contact_half_length_mm"])
+            case Kind.AREA:
+                return abs(numbers["contact_area_mm2"])
+            case Kind.STRAIN:
+                return max(largest(numbers, kinds, Kind.STRAIN), depth_mm / design.height_mm)
+            case Kind.DISPLACEMENT:
+                return max(largest(numbers, kinds, Kind.DISPLACEMENT), depth_mm)
+            case Kind.BASE_PRESSURE:
+                return max(largest(numbers, kinds, Kind.BASE_PRESSURE), force / base)
+        return abs(numbers[name])
 
-def check_kind(model: Model) -> None:
-    """Raise an error for a kind of press on which the estimates have not been validated.
-
-    Raises
-    ------
-    Finger3dError
-        For a model with an effect, a prescribed force or a triangulated object, and where the result depends on the
-        number of increments.
-    """
-    if model.filled:
-        names = ", ".join(name for _, name in model.filled)
-        raise Finger3dError(f"it was not compared with presses under {names}")
-    if not model.object.has_section:  # on coarse meshes its details may keep an increment from settling for minutes
-        raise Finger3dError("it was not compared with presses on triangulated objects")
-    if model.is_under_force:
-        raise Finger3dError("it was not compared with presses to a force")
-    if model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps:
-        raise Finger3dError("the result depends on the number of increments")
+    return {name: scale(name) for name in numbers if math.isfinite(numbers[name])}

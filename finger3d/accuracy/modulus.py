@@ -23,8 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d._cost import CHANGES
-from finger3d.accuracy.changes import affordable_factor
-from finger3d.accuracy.cost import forecast
+from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Material
 from finger3d.mechanics.discretise.companions import built_like, coarser
@@ -44,6 +43,9 @@ _STRESS_UNITS = ("_N", "_Nmm", "_mJ", "_MPa")
 
 _ROUND_OFF = 1e-9
 """Relative error of a number that does not depend on the modulus, such as the prescribed force."""
+
+_FACTORS = (2.0, 2.83, 4.0)
+"""Edge lengths of a coarse mesh over those of the press; the first that is cheap enough is taken."""
 
 _MOST_STEPS = 5
 """Largest number of increments in a leg on the coarser mesh."""
@@ -143,9 +145,17 @@ def _on_coarser_mesh(problem: Problem, increments: int, part: tuple[str, float],
         legs=few,
     )
     seconds = CHANGES.seconds(forecast(replace(model, legs=legs))["total_s"])
-    factor = affordable_factor(lambda factor: coarser(changed, factor), seconds)
+    factor = _affordable_factor(lambda factor: coarser(changed, factor), seconds)
     beside = built_like(problem, coarser(changed, factor))
     return numbers(beside, last_step(beside))
+
+
+def _affordable_factor(coarse: Callable[[float], Model], budget_s: float) -> float:
+    """Return the edge lengths of a coarse mesh over those of the press, whose modelled cost is within a budget."""
+    for factor in _FACTORS:
+        if without_output_s(forecast(coarse(factor))) <= budget_s:
+            return factor
+    raise Finger3dError(f"it would take more than {budget_s:.2g} s")
 
 
 def _times(material: Material, ratio: float) -> Material:

@@ -78,7 +78,7 @@ def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
         For instance ``plan.dofs``, ``plan.total_s`` and ``plan.memory_MB``.
     """
     scene = scene_of(scene, overrides)
-    model = scene.with_effects(scene.effects).model()  # with effects.auto at the most
+    model = scene.with_effects([*scene.fixed_effects, *scene.open_effects]).model()  # at the most
     expected, warnings = forecast(model, bars=True), warnings_before_meshing(model, symmetry(model))
     expected = {"finger": extent(model.design)} | expected
     tolerance = scene.tables.mesh.tolerance

@@ -82,12 +82,9 @@ def run_press(
     started : `time.perf_counter()` at the start of the job, s
     error, figures : whether to estimate the errors; whether to draw
     """
-    need = None
-    if scene.auto is not None:
-        from finger3d.analyses.effects_by_need import judge  # only a scene that leaves its effects open needs it
+    from finger3d.analyses.effects_by_need import settled
 
-        need = judge(scene, report)
-        scene = scene.with_effects(need.used)
+    scene, need = settled(scene, report)
     record = _solve(scene, writer, report, started)
     record.need = need
     fields = _recover(record, writer, report)
@@ -278,15 +275,15 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
     problem, steps = record.problem, record.steps
     if not steps or not steps[-1].outcome.ok:
         return
+    numbers = changing_numbers(problem, steps[-1])
     if record.need:
-        from finger3d.analyses.effects_by_need import of_press
-
-        record.model_error = of_press(record.need, changing_numbers(problem, steps[-1]))
+        record.model_error = record.need.changes(numbers)
     elif not problem.model.finite_strain:
-        from finger3d.accuracy.model_error import large_deformation
+        from finger3d.accuracy.model_error import LARGE_DEFORMATION, Judgement, at_large_deformation
 
         report.stage("estimating what large deformation would change")
-        record.model_error = {"large_deformation": large_deformation(problem, steps[-1], len(steps))}
+        (judged,) = Judgement(problem.model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+        record.model_error = {LARGE_DEFORMATION: judged.estimate.of_press(numbers)}
     _advise(record)
 
 

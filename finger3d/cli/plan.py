@@ -42,12 +42,13 @@ def effect_rows(scene: Scene) -> list[tuple[str, str]]:
     from finger3d.effects import effect_names
 
     def why(name: str) -> str:
-        if name not in scene.effects and scene.auto is not None and name == "large_deformation":
-            return f"on if it changes a number by more than {100 * scene.auto:g} %"
+        if_needed = f"on if it changes a number by more than {100 * scene.tolerance_of_effects:g} % of its scale"
+        if name in scene.open_effects and name not in scene.effects:
+            return if_needed
         if name not in scene.effects:
             return f"off: the scene has no [effects.{name}]"
         settings = ", ".join(f"{k} = {v}" for k, v in scene.tables.effects[name].items())
-        state = "on" if scene.auto is None else f"on if it changes a number by more than {100 * scene.auto:g} %"
+        state = if_needed if name in scene.open_effects else "on"
         return f"{state}: [effects.{name}] {settings}"
 
     return [(name, why(name)) for name in effect_names()]

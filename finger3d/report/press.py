@@ -189,13 +189,13 @@ def _changes(summary: TreeView) -> list[PageSection]:
     """Return which effects the scene calls for, if it left that open, and what those that are off would change."""
     out = []
     if need := summary.get("effects_auto"):
-        rows = [
-            (name, "used" if one["used"] else "not used", one["why"], f"{one['seconds']:.2g}")
-            for name, one in need["judged"].items()
-        ]
-        rows += [(name, "not judged", why, "") for name, why in need["not_judged"].items()]
-        text = f"An effect is used if it changes a number by more than {100.0 * need['tolerance']:g} %."
-        out.append(PageSection("Effects", [text, Table(("effect", "used", "why", "seconds"), rows)]))
+        rows = [(name, "used" if one["used"] else "not used", one["why"]) for name, one in need["judged"].items()]
+        rows += [(name, "not judged", why) for name, why in need["not_judged"].items()]
+        text = (
+            f"An effect is used if it changes a number by more than {100.0 * need['tolerance']:g} % of its natural "
+            "scale, or if that is not known."
+        )
+        out.append(PageSection("Effects", [text, Table(("effect", "used", "why"), rows)]))
     for name, changes in summary.get("model_error", {}).items():
         if changes:
             rows = [(key, c["change"], c["low"], c["high"]) for key, c in changes.items()]

@@ -144,7 +144,7 @@ def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | Leg
 
 def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:
     """Check the effects that are present, the only ones that are imported; return their tables and their settings, and
-    whether they are used only where they are needed.
+    which are used only where they are needed.
     """
     tables: dict[str, TomlTable] = {}
     effects: Tree = {}
@@ -152,9 +152,9 @@ def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str
     present = present if isinstance(present, Mapping) else {}
     keys = {name: value for name, value in present.items() if name in AutoTable.model_fields}
     auto = checked(AutoTable, keys, ("effects",), mistakes, also=effect_names())
-    if auto and auto.auto_tolerance and not auto.auto:
+    if auto and auto.auto_tolerance and auto.auto is False:
         mistakes["effects", "auto_tolerance"] = (
-            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: only with effects.auto = true"
+            f"effects.auto_tolerance = {shown(auto.auto_tolerance)}: nothing is judged with effects.auto = false"
         )
     for name, settings in present.items():
         if name in AutoTable.model_fields:

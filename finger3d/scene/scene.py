@@ -34,6 +34,9 @@ from finger3d.scene.tables import (
     record_of,
 )
 
+LARGE_DEFORMATION = "large_deformation"
+"""The effect that every scene has the data for."""
+
 _AUTO_TOLERANCE = 0.02
 """Default relative change of a number above which an effect is needed."""
 
@@ -49,7 +52,9 @@ class Scene:
     object : the rigid object
     mesh : edge lengths and mesher
     effects : name -> settings of the effects that are on, or that are on where they are needed
-    auto : relative change of a number above which an effect is needed; None: all are on
+    auto : whether effects are on only where they are needed: True: all; None: large deformation unless it is named;
+        False: none
+    tolerance_of_effects : change of a number, over its natural scale, above which an effect is needed
     given : what the user wrote, overrides included
     path : the file, or None
     """
@@ -59,7 +64,8 @@ class Scene:
     object: RigidObject = field(compare=False)
     mesh: MeshOptions = field(compare=False)
     effects: TreeView = field(compare=False)
-    auto: float | None
+    auto: bool | None
+    tolerance_of_effects: float
     given: TreeView = field(compare=False)
     path: Path | None = field(compare=False, default=None)
 
@@ -83,9 +89,25 @@ class Scene:
             if name not in ("title", "gauge", "marker", "taxel", "effects") and settings is not None
         ]
         named = [(f"{kind} {g['name']}", g) for kind in ("gauge", "marker", "taxel") for g in self.as_dict()[kind]]
-        named += [(f"effect {name}", settings) for name, settings in self.as_dict()["effects"].items()]
+        effects = self.as_dict()["effects"].items()
+        named += [(f"effect {name}", settings) for name, settings in effects if isinstance(settings, Mapping)]
         rows += [(name, ", ".join(f"{k} = {v}" for k, v in given.items() if k != "name")) for name, given in named]
         return card(self.title, self.domain, rows)
+
+    @property
+    def open_effects(self) -> tuple[str, ...]:
+        """Names of the effects that a press uses only if the scene calls for them; see `effects_by_need.settled`."""
+        if self.auto is False:
+            return ()
+        named = tuple(self.effects)
+        if self.auto:
+            return named if LARGE_DEFORMATION in named else (*named, LARGE_DEFORMATION)
+        return () if LARGE_DEFORMATION in named else (LARGE_DEFORMATION,)
+
+    @property
+    def fixed_effects(self) -> tuple[str, ...]:
+        """Names of the effects that are on in any case."""
+        return tuple(name for name in self.effects if name not in self.open_effects)
 
     @property
     def domain(self) -> Domain:
@@ -129,17 +151,18 @@ class Scene:
     def with_effects(self, names: Iterable[str]) -> Scene:
         """Return the scene with some effects on, with its own settings of each or else the default ones."""
         given = self.given.get("effects", {})
-        return parse({**self.given, "effects": {name: given.get(name) or {} for name in names}}, self.path)
+        chosen = {name: given.get(name) or {} for name in names}
+        return parse({**self.given, "effects": {"auto": False, **chosen}}, self.path)
 
     def model(self) -> Model:
-        """Return the model: the baseline, and then every effect that is on. Angles are in radians.
+        """Return the model: the baseline, and then every effect that the scene names. Angles are in radians.
 
         Raises
         ------
         Finger3dError
-            If it is still open which effects are on.
+            If it is still open which of them are on.
         """
-        if self.auto is not None:
+        if self.auto:
             raise Finger3dError(
                 "effects.auto = true: a press finds which effects this scene calls for; take the scene.toml that "
                 "finger3d press writes"
@@ -197,8 +220,8 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
         raise messages.refusal(lines, path, set_keys)
     try:
         mesh = parts.mesh()
-        filled, auto = parts.filled_in(mesh), parts.tolerance_of_effects
-        scene = Scene(filled, parts.design, parts.object, mesh, parts.effects, auto, given, path)
+        filled, auto, tolerance = parts.filled_in(mesh), parts.auto.auto, parts.tolerance_of_effects
+        scene = Scene(filled, parts.design, parts.object, mesh, parts.effects, auto, tolerance, given, path)
         _ = scene._model  # effects may refuse what the rest of the scene asks for
     except Finger3dError as error:
         raise messages.refusal([str(error)], path, set_keys) from None
@@ -231,10 +254,9 @@ class _Parts:
         return checks.check(self.tables, self.legs, self.design) + ([unit] if unit else [])
 
     @property
-    def tolerance_of_effects(self) -> float | None:
-        """Relative change of a number above which an effect is needed; None: all are on."""
-        given = self.auto.auto_tolerance or self.tables.mesh.tolerance or _AUTO_TOLERANCE
-        return given if self.auto.auto else None
+    def tolerance_of_effects(self) -> float:
+        """Change of a number, over its natural scale, above which an effect is needed."""
+        return self.auto.auto_tolerance or self.tables.mesh.tolerance or _AUTO_TOLERANCE
 
     def mesh(self) -> MeshOptions:
         """Return the edge lengths, given or chosen.
@@ -265,8 +287,9 @@ class _Parts:
                 "mesh": self.tables.mesh
                 if self.tables.mesh.tolerance
                 else self.tables.mesh.model_copy(update=mesh.as_table()),
-                "effects": {name: settings.model_dump() for name, settings in self.settings.items()}
-                | ({"auto": True, "auto_tolerance": self.tolerance_of_effects} if self.auto.auto else {}),
+                "effects": self.auto.model_dump(exclude_none=True)
+                | ({"auto_tolerance": self.tolerance_of_effects} if self.auto.auto else {})
+                | {name: settings.model_dump() for name, settings in self.settings.items()},
             }
         )
 

@@ -295,11 +295,13 @@ class AutoTable(TomlTable):
 
     Attributes
     ----------
-    auto : use large deformation and each effect named below only if it changes a number by more than the tolerance
-    auto_tolerance : relative; mesh.tolerance unless given, else 0.02
+    auto : absent: the effects below are on, and large deformation, unless it is among them, is used if it changes a
+        number by more than the tolerance; true: the effects below, too, are used only if they do; false: exactly the
+        effects below are on
+    auto_tolerance : relative to the natural scale of the number; mesh.tolerance unless given, else 0.02
     """
 
-    auto: bool = False
+    auto: bool | None = None
     auto_tolerance: Annotated[float, Gt(0), Lt(1)] | None = None
 
 
