@@ -15,12 +15,18 @@ FINGER = {
 }
 HEIGHT = 36.6 + 100.0 - math.sqrt(100.0**2 - 50.0**2)  # of its crown
 
-SMALL = {"finger": FINGER, "material": {"E_MPa": 1.0, "nu": 0.49}, "press": {"depth_mm": 10.0}}
+SMALL = {
+    "finger": FINGER,
+    "material": {"E_MPa": 1.0, "nu": 0.49},
+    "press": {"depth_mm": 10.0},
+    "effects": {"auto": False},
+}
 
 HALF_CYLINDER: dict[str, Any] = {
     "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0},
     "material": {"E_MPa": 1.0, "nu": 0.3},
     "press": {"depth_mm": 0.5},
+    "effects": {"auto": False},
 }
 
 

@@ -1,4 +1,4 @@
-"""Scene files that several tests press."""
+"""Scene files that several tests press, in small strain unless a test adds large deformation."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from finger3d.cli import main
 
 FIG9 = """
+effects.auto = false
 [finger]
 geometry = "clipped_cylinder"
 radius_mm = 100.0
@@ -20,6 +21,7 @@ width_mm = 20.0
 
 HALF_CYLINDER = """
 title = "half cylinder"
+effects.auto = false
 [finger]
 geometry = "half_cylinder"
 radius_mm = 5.0
@@ -45,6 +47,7 @@ angle_deg = 30.0
 """
 """A half cylinder of radius 5 mm on a plane, in 2D, with a gauge inside."""
 BLOCK = """
+effects.auto = false
 [finger]
 geometry = "block"
 half_length_mm = 10.0

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.borders import stick_borders, with_refined_borders
-from finger3d.mechanics.discretise.companions import coarser
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from finger3d._cost import Budget
-from finger3d.mechanics.discretise.companions import companion
 from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers, reading_error
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.accuracy.richardson import mesh_error
 from finger3d.cli import main
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error

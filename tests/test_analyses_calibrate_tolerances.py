@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.mechanics.discretise.companions import companion
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
@@ -16,6 +15,7 @@ from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_o
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from finger3d.mechanics.discretise.companions import FACTOR, companion
 from finger3d.accuracy.estimate import compared, estimate
 from finger3d.analyses.compare import cases
 from finger3d.analyses.compare.cases import press_with_errors, resized, widened
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import FACTOR, companion
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.results.comparison import FORCE

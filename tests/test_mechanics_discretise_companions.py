@@ -11,7 +11,6 @@ import pytest
 
 from finger3d.accuracy import companions
 from finger3d.accuracy import estimate as estimates
-from finger3d.mechanics.discretise.companions import coarser, companion
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -19,6 +18,7 @@ from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import coarser, companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model

@@ -21,6 +21,7 @@ from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.refine import ALL
 from finger3d.accuracy.richardson import ORDER, kinds_of, relative_error
+from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.companions import coarser
@@ -175,7 +176,7 @@ def cost(
         If the press has no number of such a name, if its mesh is given, or if a coarse press fails.
     """
     start = time.perf_counter()
-    scene = scene_of(scene, overrides)
+    scene, _ = settled(scene_of(scene, overrides), report)
     model = scene.model()
     if isinstance(model.design, GivenMesh):
         raise Finger3dError("cost: the mesh of this finger is given; it has no edge lengths to choose")

@@ -9,13 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from finger3d._types import Tree
+from finger3d._types import Tree, TreeView
 from finger3d.accuracy.changes import ChangeEstimate
 from finger3d.accuracy.model_error import Enriched, Judged, Judgement
 from finger3d.effects import effect_names
 from finger3d.progress import QUIET, Progress
-from finger3d.scene import Scene
+from finger3d.scene import Scene, parse
 
 _NEEDS = {
     "viscosity": "no Prony series",
@@ -88,6 +89,12 @@ def settled(scene: Scene, report: Progress = QUIET) -> tuple[Scene, Need | None]
     for name, why in need.rows():
         report.say(f"{name.replace('_', ' ')}: {why}")
     return scene.with_effects([*scene.fixed_effects, *need.used]), need
+
+
+def settled_tables(given: TreeView, path: Path | None, report: Progress = QUIET) -> TreeView:
+    """Return the tables of a scene with the effects that it calls for."""
+    scene, need = settled(parse(given, path), report)
+    return given if need is None else {**given, "effects": scene.given["effects"]}
 
 
 def judge(scene: Scene, report: Progress = QUIET) -> Need:

@@ -94,8 +94,10 @@ def export_deck(
         If CalculiX has no equal of what the scene asks for; the line names it.
     """
     from finger3d.analyses.calculix.press import press_deck
+    from finger3d.analyses.effects_by_need import settled
 
-    out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
+    out, report = Path(out), report or Progress()
+    scene, _ = settled(scene_of(scene, overrides), report)
     report.stage("meshing")
     made = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")

@@ -12,6 +12,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
+from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError
@@ -136,7 +137,7 @@ def sensitivity(
     Finger3dError
         If the press has no number of such a name, or its numbers have no derivatives.
     """
-    scene = scene_of(scene, overrides)
+    scene, _ = settled(scene_of(scene, overrides), report)
     model, names = scene.model(), scene.check_numbers(of)
     if text := refusal(model):
         raise Finger3dError(f"sensitivity: {text}")

@@ -88,11 +88,12 @@ def calibrate(
     MissingError
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
+    from finger3d.analyses.effects_by_need import settled
     from finger3d.scene import scene_of
     from finger3d.scene.derived import largest_spread
 
     report = report or Progress()
-    scene = scene_of(scene, overrides)
+    scene, _ = settled(scene_of(scene, overrides), report)
     model = scene.model()
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)

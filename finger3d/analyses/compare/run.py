@@ -93,6 +93,7 @@ def compare(
     Comparison
         Cases may have failed to converge; the verdict names them.
     """
+    from finger3d.analyses.effects_by_need import settled
     from finger3d.scene import scene_of
 
     report = report or Progress()
@@ -103,7 +104,7 @@ def compare(
             f"{scene.path or scene.title}: mesh.tolerance = {tolerance:g}: compare needs fixed edge lengths; press "
             "determines them and writes them to the scene.toml of its results, which compare accepts"
         )
-    solid = _as_solid(scene)
+    solid, _ = settled(_as_solid(scene), report)
     model = solid.model()
     other_widths = _other_widths(model, widths)
     _check(model, other_widths)

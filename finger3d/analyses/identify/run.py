@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from finger3d._types import Float, Tree, TreeView
+from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
 from finger3d.analyses.identify.fit import (
     FittedValues,
@@ -156,6 +157,7 @@ def identify(
     """
     report = report or Progress()
     given, path = tables_of(scene, overrides)
+    given = settled_tables(given, path, report)
     keys = free_keys(free)
     start = _checked_start(given, keys, path)
     model = parse(given, path).model()

@@ -12,6 +12,7 @@ import numpy as np
 from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.tolerances import with_defaults
+from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import NOWHERE, SPACING_MM, Candidates, GaugeSet, Region, search
@@ -118,6 +119,7 @@ def place_gauges(
     """
     report = report or Progress()
     given, path = tables_of(scene, overrides)
+    given = settled_tables(given, path, report)
     keys, mus = free_keys(free or ()), MUS if mus is None else mus
     _check(count, mus, noise, spacing_mm)
     scene = parse(given, path)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, free_keys
 from finger3d.analyses.optimise.search import Search
 from finger3d.analyses.optimise.task import (
@@ -20,7 +21,7 @@ from finger3d.analyses.optimise.task import (
 from finger3d.errors import MissingError
 from finger3d.io import atomic, claimed, write_json
 from finger3d.plotting.optimise import draw
-from finger3d.progress import Progress
+from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, Source, tables_of
@@ -85,6 +86,7 @@ def optimise(
         For a mistake in the arguments; a MissingError if no design within the bounds gives a number.
     """
     given, path = tables_of(scene, overrides)
+    given = settled_tables(given, path, report or QUIET)
     problem = OptimisationProblem(
         given=given,
         free=free_keys(free),

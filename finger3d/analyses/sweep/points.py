@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Tree, TreeView
+from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.readings.marker_grid import grid_markers
 from finger3d.mechanics.readings.reading import Marker
+
+
+from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
 from finger3d.scene.messages import shown
@@ -153,7 +157,7 @@ class Sweep:
         }
 
 
-def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str]) -> Sweep:
+def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str], report: Progress = QUIET) -> Sweep:
     """Read a scene and check every combination of some values.
 
     Parameters
@@ -170,10 +174,12 @@ def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str])
     count = math.prod(len(v.texts) for v in vary)
     if count > MOST:
         raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
-    return _checked(source, overrides, vary, "--vary")
+    return _checked(source, overrides, vary, "--vary", itertools.product, report)
 
 
-def listed_points(source: Source, overrides: Sequence[str], columns: tuple[Vary, ...], option: str) -> Sweep:
+def listed_points(
+    source: Source, overrides: Sequence[str], columns: tuple[Vary, ...], option: str, report: Progress = QUIET
+) -> Sweep:
     """Read a scene and check every point of a list.
 
     Parameters
@@ -190,7 +196,7 @@ def listed_points(source: Source, overrides: Sequence[str], columns: tuple[Vary,
     count = len(columns[0].texts)
     if count > MOST:
         raise Finger3dError(f"{option}: {count} points; at most {MOST} in one sweep, split it")
-    return replace(_checked(source, overrides, columns, option, zip), is_list=True)
+    return replace(_checked(source, overrides, columns, option, zip, report), is_list=True)
 
 
 def _checked(
@@ -198,7 +204,8 @@ def _checked(
     overrides: Sequence[str],
     vary: tuple[Vary, ...],
     option: str,
-    joined: Callable[..., Iterable[tuple[Any, ...]]] = itertools.product,
+    joined: Callable[..., Iterable[tuple[Any, ...]]],
+    report: Progress,
 ) -> Sweep:
     """Return the sweep over values that `joined` makes points of, each a checked scene."""
     base, path = tables_of(source, overrides)
@@ -218,6 +225,7 @@ def _checked(
                 "instance what finger3d press has chosen, in its summary.json"
             )
         scenes.append(scene)
+    scenes = _with_effects(scenes, report)
     values = joined(*(v.values for v in vary))
     points, members = [], dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
@@ -254,6 +262,26 @@ def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
 
 def _across(marker: Marker) -> tuple[float, float]:
     return round(marker.x_mm, 9), round(marker.z_mm, 9)
+
+
+def _with_effects(scenes: list[Scene], report: Progress) -> list[Scene]:
+    """Return scenes with the effects that the deepest press among them calls for: no table mixes two models."""
+    open_ones = [scene for scene in scenes if scene.open_effects]
+    if not open_ones:
+        return scenes
+
+    def deepest(scene: Scene) -> tuple[float, float]:
+        model = scene.with_effects(scene.fixed_effects).model()
+        return max(leg.force_N or 0.0 for leg in model.legs), model.largest_depth_mm / model.design.height_mm
+
+    _, need = settled(max(open_ones, key=deepest), report)
+    used = need.used if need else ()
+    return [
+        scene.with_effects([*scene.fixed_effects, *(n for n in used if n in scene.open_effects)])
+        if scene.open_effects
+        else scene
+        for scene in scenes
+    ]
 
 
 SAMPLERS = ("lhs", "random")

@@ -89,14 +89,14 @@ def sweep(
     report = report or Progress()
     report.stage("checking every point")
     if isinstance(vary, str | Path):
-        points = listed_points(scene, overrides, rows_of(Path(vary)), "--points")
+        points = listed_points(scene, overrides, rows_of(Path(vary)), "--points", report)
     elif isinstance(vary, Mapping) and sample == "list":
         lists = {key: [_as_toml(value) for value in values] for key, values in vary.items()}
-        points = listed_points(scene, overrides, columns_of(lists), "vary")
+        points = listed_points(scene, overrides, columns_of(lists), "vary", report)
     elif sample == "grid":
-        points = combinations(scene, overrides, _texts(vary, ","))
+        points = combinations(scene, overrides, _texts(vary, ","), report)
     else:
-        points = listed_points(scene, overrides, drawn(sample, _texts(vary, ":"), seed), "--sample")
+        points = listed_points(scene, overrides, drawn(sample, _texts(vary, ":"), seed), "--sample", report)
     store = press_points(points, out, scheduler, workers, report)
     columns = store.columns()
     return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]), store)
