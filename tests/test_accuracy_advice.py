@@ -29,12 +29,12 @@ DEEP = changed(HALF_CYLINDER, depth_mm=1.0, size_mm=0.2)
 
 def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
     changes = {
-        "normal_force_N": Change(10.0, 1.9, 0.2, 0.1, significant=True),
-        "friction_sum_N": Change(4.0, 1.0, 0.9, 0.1, significant=False),
-        "gauge_a": Change(-0.02, 0.0058, 0.0004, 0.1, significant=True),  # its magnitude falls
-        "gauge_b": Change(0.001, 0.01, 0.001, 0.1, significant=True),
-        "gauge_c": Change(0.01, 0.001, 0.0001, 0.1, significant=True),
-        "gauge_d": Change(0.01, 0.002, 0.0001, 0.1, significant=True),
+        "normal_force_N": Change(10.0, 1.9, 0.2, 10.0),
+        "friction_sum_N": Change(4.0, 1.0, 0.9, 4.0),
+        "gauge_a": Change(-0.02, 0.0058, 0.0004, 0.02),  # its magnitude falls
+        "gauge_b": Change(0.001, 0.01, 0.001, 0.02),
+        "gauge_c": Change(0.01, 0.001, 0.0001, 0.02),
+        "gauge_d": Change(0.01, 0.002, 0.0001, 0.02),
     }
     model = replace(half_cylinder(COARSE), gauges=tuple(Gauge(name, 1.0, 4.0) for name in "abcd"))
     large = advise(model, 0.2, ChangeEstimate(changes=changes))[0]
@@ -48,7 +48,7 @@ def test_a_line_of_advice_tells_changes_with_their_intervals() -> None:
 
 
 def test_without_a_known_change_no_number_is_told() -> None:
-    model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, 0.1, significant=False)}
+    model, unknown = half_cylinder(COARSE), {"normal_force_N": Change(10.0, 1.9, 2.0, 10.0)}
     for estimate in (None, ChangeEstimate(method="no estimate: why"), ChangeEstimate(changes=unknown)):
         line, *_ = advise(model, 0.2, estimate)
         assert "0.2" in line
@@ -81,7 +81,7 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     def forbidden(*_: Any) -> Any:
         raise AssertionError("estimated under --no-error")
 
-    monkeypatch.setattr(module, "large_deformation", forbidden)
+    monkeypatch.setattr(module, "Judgement", forbidden)
     alone = finger3d.press(scene, tmp_path / "alone", error=False).summary()
     assert alone["steps"] == told["steps"]  # to the last digit
     assert alone["model_error"] == {}

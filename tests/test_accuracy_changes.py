@@ -1,43 +1,55 @@
-"""Changes of the numbers of a press, and whether they are significant."""
+"""Changes of the numbers of a press: whether they are significant, and the scales relative to which they count."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
-from finger3d.accuracy.changes import check_kind, judged
-from finger3d.accuracy.richardson import kinds_of
-from finger3d.errors import Finger3dError
-from finger3d.mechanics.readings.columns import Column
-from finger3d.objects import Plane
-from finger3d.scene import load
-
-ZERO = {"normal_force_N": 0.0, "gauge_a": 0.0}
+from finger3d.accuracy.changes import Change, ChangeEstimate, natural_scales
+from finger3d.contact.friction import Coulomb
+from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.reading import Marker, Taxel
+from tests.models import half_cylinder
 
 
 def test_a_change_is_significant_if_its_interval_is_narrow_and_the_change_large() -> None:
-    values = {"normal_force_N": 10.0, "friction_sum_N": 4.0, "gauge_a": 0.1, "gauge_b": -0.001, "gauge_c": np.nan}
-    changes = {"normal_force_N": 3.0, "friction_sum_N": 0.03, "gauge_a": 0.01, "gauge_b": 0.0009, "gauge_c": 0.1}
-    errors = {"normal_force_N": 0.9, "friction_sum_N": 0.001, "gauge_a": 0.004, "gauge_b": 1e-5, "gauge_c": 1e-3}
-    kinds = kinds_of(Column(name, "gauge") for name in "abc")
-    found = judged(values, changes, errors, kinds)
-    # a strain is compared with the largest strain, of which 0.0009 is less than a hundredth
-    assert {name: change.significant for name, change in found.items()} == {
-        "normal_force_N": True, "friction_sum_N": False, "gauge_a": False, "gauge_b": False,
-    }  # fmt: skip
-    assert (found["normal_force_N"].low, found["normal_force_N"].high) == (2.1, 3.9)
+    found = Change(10.0, 3.0, 0.9, 10.0)
+    assert found.significant
+    assert (found.low, found.high) == (2.1, 3.9)
     # within a third of an estimate d lies what is within a factor of 1.5 of it: 2/3 d to 4/3 d
-    assert found["normal_force_N"].low > 3.0 / 1.5
-    assert not any(
-        change.significant for change in judged({"normal_force_N": 1.0, "gauge_a": 0.0}, ZERO, ZERO, kinds).values()
+    assert found.low > 3.0 / 1.5
+    assert not Change(10.0, 3.0, 1.1, 10.0).significant
+    assert not Change(0.1, 0.0009, 1e-5, 0.1).significant  # less than a hundredth of the scale
+    assert not Change(0.0, 0.0, 0.0, 0.0).significant
+
+
+def test_the_interval_holds_how_far_the_coarse_press_is_from_the_press() -> None:
+    coarse = ChangeEstimate(
+        changes={"normal_force_N": Change(10.0, 1.0, 0.1, 10.0), "other": Change(1.0, 0.0, 0.0, 1.0)}
     )
+    (found,) = coarse.of_press({"normal_force_N": 10.5}).changes.values()
+    assert (found.value, found.change, found.error) == (10.5, 1.0, 0.5)
 
 
-def test_triangulated_objects_are_not_judged_by_coarse_presses() -> None:
-    gear = load(Path(__file__).parents[1] / "geometries" / "gear.toml").model()
-    with pytest.raises(Finger3dError, match="triangulated"):
-        check_kind(gear)
-    check_kind(replace(gear, object=Plane()))
+def test_a_number_counts_relative_to_what_it_is_a_part_of() -> None:
+    model = replace(
+        half_cylinder(0.3), friction=Coulomb(0.25), gauges=(Gauge("a", 1.0, 4.0), Gauge("b", 1.0, 3.0)),
+        markers=(Marker("m", 0.0, 4.0, 0.0),), taxels=(Taxel("t", 0.0, 0.0, 1.0, 1.0),),
+    )  # fmt: skip
+    design = model.design
+    numbers = {
+        "normal_force_N": 8.0, "friction_sum_N": 0.1, "contact_half_length_mm": 2.0, "stick_half_length_mm": 0.1,
+        "contact_area_mm2": 5.0, "stick_area_mm2": 0.0, "gauge_a": -0.01, "gauge_b": 1e-4, "marker_m_x_mm": 1e-3,
+        "taxel_t_MPa": 1e-3,
+    }  # fmt: skip
+    base = 2.0 * design.half_length_mm * design.width_mm
+    assert natural_scales(model, 0.5, numbers) == pytest.approx(
+        {
+            "normal_force_N": 8.0, "friction_sum_N": 0.25 * 8.0, "contact_half_length_mm": 2.0,
+            "stick_half_length_mm": 2.0, "contact_area_mm2": 5.0, "stick_area_mm2": 5.0,
+            "gauge_a": 0.5 / design.height_mm, "gauge_b": 0.5 / design.height_mm, "marker_m_x_mm": 0.5,
+            "taxel_t_MPa": 8.0 / base,
+        }
+    )  # fmt: skip
+    assert natural_scales(model, 0.5, {**numbers, "gauge_a": 0.3})["gauge_b"] == 0.3

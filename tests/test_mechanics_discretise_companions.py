@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from finger3d.accuracy import companions
 from finger3d.accuracy import estimate as estimates
 from finger3d.accuracy.estimate import compared, estimate, main_numbers
 from finger3d.contact.friction import Coulomb
@@ -17,8 +16,9 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise import companions
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.companions import coarser, companion
+from finger3d.mechanics.discretise.companions import coarse_companions, coarser, companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
@@ -103,18 +103,27 @@ def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> 
     assert made == ["lump", "lump"]
 
 
-def test_a_companion_is_pressed_once_with_the_increments_of_the_press(monkeypatch: Any) -> None:
-    problem, frames = run(large_fig9(0.45, 4.0, legs=(Leg(4.0, steps=4),)))
-    pressed: list[Problem] = []
+def test_three_companions_are_pressed_once_in_the_increments_of_the_press(monkeypatch: Any) -> None:
+    problem, frames = run(large_fig9(0.45, 2.0, legs=(Leg(4.0, steps=4),)))
+    pressed: list[tuple[float, Any]] = []
 
-    def counted(beside: Problem, **more: Any) -> StepResult:
-        pressed.append(beside)
-        return last_step(beside, **more)
+    def counted(beside: Problem, *more: Any, **options: Any) -> StepResult:
+        pressed.append((beside.model.mesh.size_mm, beside.model.legs[0].steps))
+        return last_step(beside, *more, **options)
 
     monkeypatch.setattr(estimates, "last_step", counted)
     found = estimate(problem, frames)
     assert found.steps["normal_force_N"] > 0.0
-    assert len(pressed) == 1
+    assert pressed == [(pytest.approx(size), 4) for size in (4.0, 2.0 * 2.0**0.5, 8.0)]
+
+
+def test_companions_that_the_finger_makes_alike_are_left_out() -> None:
+    """Edges are no longer than the finger is wide, 4 mm."""
+    narrow = designs()["block"](half_length_mm=12.0, height_mm=12.0, width_mm=4.0)
+    model = replace(swept_fig9(2.5), design=narrow, mesh=MeshOptions(2.5, 5.0, "swept"), legs=(Leg(1.0, steps=2),))
+    ratios = [ratio for ratio, _ in coarse_companions(build(model))]
+    assert ratios[:1] == [pytest.approx(1.6)]
+    assert len(ratios) < 3
 
 
 def test_a_finer_companion_at_large_deformation_is_not_so_fine() -> None:
@@ -146,10 +155,11 @@ def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[st
     assert made == ["hemisphere"]
     found = estimate(problem, frames)
     assert "bodies" in found.method
-    assert made == ["hemisphere", "hemisphere"]
+    meshed = len(made)
+    assert meshed > 1
     assert 0.0 < found.discretisation["normal_force_N"] < 0.1 * main_numbers(problem, frames[-1])["normal_force_N"]
     assert estimate(problem, frames).discretisation == found.discretisation
-    assert made == ["hemisphere", "hemisphere"]
+    assert len(made) == meshed
 
 
 def test_a_swept_companion_that_is_no_coarser_gets_longer_edges(made: list[str]) -> None:

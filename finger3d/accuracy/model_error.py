@@ -127,15 +127,16 @@ class Judgement:
     neutral: Mapping[str, Enriched] = field(default_factory=dict)
     tolerance: float = 0.02
     _known: dict[tuple[bool, frozenset[str]], _Press] = field(default_factory=dict)
+    _decides: bool = True
 
     def found(self, shortcut: bool = True) -> dict[str, Judged]:
         """Return what was found about every effect, by name.
 
         Parameters
         ----------
-        shortcut : whether large strains decide on large deformation without a press that tells what it changes
+        shortcut : whether to decide only: large strains, or a large change whose error is not known, are enough
         """
-        everything = frozenset(self.effects)
+        everything, self._decides = frozenset(self.effects), shortcut
         factor = self._factor(everything)
         out = dict[str, Judged]()
         if LARGE_DEFORMATION in everything:
@@ -236,7 +237,7 @@ class Judgement:
         scales = {key: max(before.scales[key], after.scales.get(key, 0.0)) for key in change}
         zones = {key: bar + after.resolved.get(key, 0.0) for key, bar in before.resolved.items() if key in change}
         largest = max((abs(d) / scales[k] for k, d in change.items() if scales[k] and k not in zones), default=0.0)
-        if largest <= self.tolerance:  # otherwise it is used in any case
+        if largest <= self.tolerance or not self._decides:
             try:
                 less, more = (self._press(some, True, factor) for some in (beside - {name}, beside))
             except FAILURES:

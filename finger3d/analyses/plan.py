@@ -84,4 +84,5 @@ def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:
         expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
-    return Plan(scene.title, moduli(scene.tables), scene.as_dict()["effects"], expected, tuple(warnings))
+    effects = {name: settings for name, settings in scene.as_dict()["effects"].items() if name in scene.effects}
+    return Plan(scene.title, moduli(scene.tables), effects, expected, tuple(warnings))

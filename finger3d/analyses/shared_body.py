@@ -86,7 +86,7 @@ class VariantResult:
 def body_key(scene: Scene) -> str:
     """Return a hash of everything that changes the condensed body; scenes of one family have the same."""
     tree = scene.as_dict()
-    effects = {k: v for k, v in tree["effects"].items() if getattr(scene.effects[k], "slot", "") != "friction"}
+    effects = {k: v for k, v in tree["effects"].items() if k in scene.effects and scene.effects[k].slot != "friction"}
     kept = {k: v for k, v in tree.items() if k not in _FREE} | {"effects": effects}
     if "embedded_gauge" in effects:
         kept["gauge"] = tree["gauge"]

@@ -107,11 +107,12 @@ def coarse_companions(
 
     The first, with twice the edges, may be known.  Meshes that do not resolve the contact are left out.
     """
-    model, ratios = problem.model, list[float]()
+    model, ratios, sizes = problem.model, list[float](), {problem.mesh.points.size}
     if isinstance(model.design, GivenMesh):
         return
     if known:
         ratios.append(known.model.mesh.size_mm / model.mesh.size_mm)
+        sizes.add(known.mesh.points.size)
         yield ratios[0], replace(known, model=replace(known.model, legs=model.legs))
     for factor in _FACTORS[1:] if known else _FACTORS:
         options = coarser(model, factor).mesh
@@ -124,8 +125,10 @@ def coarse_companions(
             beside = built_like(problem, replace(model, mesh=options), report if is_unstructured(model) else QUIET)
         except Finger3dError:
             continue
-        ratios.append(ratio)
-        yield ratio, beside
+        if beside.mesh.points.size not in sizes:  # the finger allows no other number of cells
+            ratios.append(ratio)
+            sizes.add(beside.mesh.points.size)
+            yield ratio, beside
 
 
 def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
