@@ -135,10 +135,7 @@ def test_large_deformation_is_judged_unless_the_scene_says_otherwise() -> None:
 def test_analyses_take_the_effects_that_their_scene_calls_for(tmp_path: Path) -> None:
     """The sweep has one model in all rows: that of its deepest press."""
     given = {key: table for key, table in needs().given.items() if key != "effects"}
-    deep, shallow = (
-        {**given, "press": {"depth_mm": 10.0, "steps": 2}},
-        {**given, "press": {"depth_mm": 0.05, "steps": 2}},
-    )
+    deep = {**given, "press": {"depth_mm": 10.0, "steps": 2}}
     found = finger3d.sweep(deep, {"press.depth_mm": [0.5, 10.0]}, tmp_path / "sweep")
     large = finger3d.press(deep, overrides=["effects={large_deformation={}}", "press.depth_mm=0.5"], error=False)
     # in small strain it is 0.15 of mu times the normal force more; the meshes of sweep and press differ
