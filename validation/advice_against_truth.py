@@ -19,7 +19,7 @@ import numpy as np
 
 from finger3d.accuracy.advice import largest_principal_strain
 from finger3d.accuracy.changes import Change, changing_numbers
-from finger3d.accuracy.model_error import large_deformation
+from finger3d.accuracy.model_error import LARGE_DEFORMATION, Judgement, at_large_deformation
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.solids.material import Isotropic
@@ -127,7 +127,8 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     strain = formulation_of(problem.model).fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
-    estimate = large_deformation(problem, step, sum(int(leg.steps) for leg in model.legs))
+    (found,) = Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+    estimate = found.estimate.of_press(changing_numbers(problem, step))
     truth = build(LargeDeformation().apply(model))
     end = last(truth)
     if end.outcome.ok:

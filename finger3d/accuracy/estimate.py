@@ -210,7 +210,7 @@ def estimate_with_grid(
 def _of_increments(
     own: Problem,
     steps: Sequence[StepResult],
-    companion: tuple[Problem | None, str, Mapping[str, float]],
+    mesh: tuple[Problem | None, str, Mapping[str, float]],
     numbers: Measure,
     chosen: StepEstimate | None,
 ) -> tuple[dict[str, float], str]:
@@ -218,7 +218,7 @@ def _of_increments(
 
     Parameters
     ----------
-    companion : a press that costs less, or None, what it differs in, in words, and its numbers if they are known
+    mesh : a press that costs less, or None, what it differs in, in words, and its numbers if they are known
     chosen : runs that chose automatic increments
     """
     if has_exact_path(own.model):
@@ -228,7 +228,7 @@ def _of_increments(
         errors = errors_of_runs([(count, numbers(judged, results[-1])) for count, results in chosen.runs])
         counts = [str(count) for count, _ in chosen.runs]
         return errors, f"{', '.join(counts[:-1])} and {counts[-1]}{where}, order 1"
-    beside, where, known = companion
+    beside, where, known = mesh
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
     own_s = _marching_cost(own)

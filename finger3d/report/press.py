@@ -198,11 +198,11 @@ def _changes(summary: TreeView) -> list[PageSection]:
         out.append(PageSection("Effects", [text, Table(("effect", "used", "why"), rows)]))
     for name, changes in summary.get("model_error", {}).items():
         if changes:
-            rows = [(key, c["change"], c["low"], c["high"]) for key, c in changes.items()]
+            changed = [(key, c["change"], c["low"], c["high"]) for key, c in changes.items()]
             head = ("number, in the unit of its name", "change", "from", "to")
             text = f"Estimated from {summary['model_error_methods'][name]}."
             title = f"Model error: what {name.replace('_', ' ')} would change"
-            out.append(PageSection(title, [text, Table(head, rows)], folded=True))
+            out.append(PageSection(title, [text, Table(head, changed)], folded=True))
     return out
 
 

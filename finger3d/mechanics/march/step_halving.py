@@ -206,8 +206,8 @@ def _refined_beside(
 
 def rough_workspace(problem: Problem) -> Workspace:
     """Return an empty workspace in which increments at finite strain end at the residual `ROUGH`."""
-    workspace = formulation_of(problem.model).workspace()
-    return replace(workspace, target=ROUGH) if problem.model.finite_strain else workspace
+    workspace: Workspace = formulation_of(problem.model).workspace()
+    return replace(workspace, **{"target": ROUGH} if problem.model.finite_strain else {})
 
 
 def _refined(
