@@ -137,7 +137,7 @@ def test_as_dict_is_json_with_every_default() -> None:
     assert tree["object"] == {"shape": "plane", "x_mm": 0.0, "z_mm": 0.0, "tilt_deg": 0.0, **turns}
     assert tree["press"]["steps"] == "auto"
     assert tree["mesh"]["mesher"] == "ftetwild"
-    assert tree["effects"] == {}
+    assert tree["effects"] == {"auto": False}
 
 
 def test_scenes_that_differ_are_not_equal() -> None:

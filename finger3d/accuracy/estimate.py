@@ -224,10 +224,10 @@ def _of_increments(
     if has_exact_path(own.model):
         return dict.fromkeys(numbers(own, steps[-1]), 0.0), "exact"
     if chosen:
-        judged, where = chosen.beside or own, " on a coarser mesh" if chosen.beside else ""
-        errors = errors_of_runs([(count, numbers(judged, results[-1])) for count, results in chosen.runs])
-        counts = [str(count) for count, _ in chosen.runs]
-        return errors, f"{', '.join(counts[:-1])} and {counts[-1]}{where}, order 1"
+        runs = [(count, numbers(chosen.beside or own, results[-1])) for count, results in chosen.runs]
+        *fewer, most = (str(count) for count, _ in runs)
+        on = " on a coarser mesh" if chosen.beside else ""
+        return errors_of_runs(runs), f"{', '.join(fewer)} and {most}{on}, order 1"
     beside, where, known = mesh
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None

@@ -100,9 +100,9 @@ class Scene:
         if self.auto is False:
             return ()
         named = tuple(self.effects)
-        if self.auto:
-            return named if LARGE_DEFORMATION in named else (*named, LARGE_DEFORMATION)
-        return () if LARGE_DEFORMATION in named else (LARGE_DEFORMATION,)
+        is_off = self.given.get("effects", {}).get(LARGE_DEFORMATION) is False
+        judged = () if LARGE_DEFORMATION in named or is_off else (LARGE_DEFORMATION,)
+        return (*named, *judged) if self.auto else judged
 
     @property
     def fixed_effects(self) -> tuple[str, ...]:

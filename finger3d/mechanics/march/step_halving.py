@@ -206,8 +206,12 @@ def _refined_beside(
 
 def rough_workspace(problem: Problem) -> Workspace:
     """Return an empty workspace in which increments at finite strain end at the residual `ROUGH`."""
+    if problem.model.finite_strain:
+        from finger3d.mechanics.finite_strain.state import FiniteStrainWorkspace  # a press imports what its scene names
+
+        return FiniteStrainWorkspace(target=ROUGH)
     workspace: Workspace = formulation_of(problem.model).workspace()
-    return replace(workspace, **{"target": ROUGH} if problem.model.finite_strain else {})
+    return workspace
 
 
 def _refined(
