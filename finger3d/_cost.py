@@ -121,6 +121,16 @@ class PressSize:
         return self.condensation_s + increments * self.contact_s
 
 
+    def press_gb(self, readings: int = 0) -> float:
+        """Return the memory of a press in small strain, GB, without its states."""
+        return 1e-3 * (self.factor_mb + BASE_MB) + rows_gb(self.dim * self.contact_points + readings)
+
+
+def duration(seconds: float) -> str:
+    """Return seconds in words, in minutes from 90 s on."""
+    return f"{seconds:.2g} s" if seconds < 90.0 else f"{seconds / 60.0:.2g} min"
+
+
 def meshing_s(cells: float) -> float:
     """Return the seconds in which fTetWild meshes a body, and CAD prepares it."""
     return 3.0 + 3.5e-4 * cells

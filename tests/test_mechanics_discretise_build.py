@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from finger3d.fem.solids.material import Isotropic
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.results.history import measure
+from tests.logs import Log
 from tests.models import block, fig9, last, run
 
 
@@ -39,3 +41,14 @@ def test_solvers_behind_the_same_interface_agree(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
     b = last(block())
     assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-11)
+
+
+def test_a_long_press_is_announced_before_it_is_condensed(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = fig9(domain="plane-strain")
+    said = {}
+    for seconds in (0.0, 1e3):
+        monkeypatch.setattr("finger3d.mechanics.discretise.build._LONG_S", seconds)
+        build(model, log := Log())
+        said[seconds] = [line for line in log.lines if line.startswith("warning: mesh.size_mm = 2 takes about ")]
+    assert len(said[0.0]) == 1
+    assert not said[1e3]

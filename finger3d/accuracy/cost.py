@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._cost import (
-    BASE_MB,
     CAD_MB,
     FIGURES_S,
     GAUGE_CELL_S,
@@ -22,7 +21,6 @@ from finger3d._cost import (
     START_S,
     PressSize,
     meshing_s,
-    rows_gb,
     tet_unknowns,
     tets_of_ftetwild,
 )
@@ -143,7 +141,7 @@ def forecast(model: Model, bars: bool = False) -> Tree:
     size, seconds = press.size, press.seconds
     if bars:
         seconds = seconds | {"error_bars": _error_bars_s(model, seconds)}
-    memory = size.factor_mb + 1e3 * rows_gb(size.dim * size.contact_points + len(model.gauges)) + BASE_MB
+    memory = 1e3 * size.press_gb(len(model.gauges))
     memory += CAD_MB * _is_meshed_by_tetwild(model) + _states_mb(model, press, axes)
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")

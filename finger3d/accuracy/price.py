@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from finger3d._cost import BASE_MB, FIGURES_S, START_S, PressSize, meshing_s, rows_gb
+from finger3d._cost import FIGURES_S, START_S, PressSize, duration, meshing_s
 from finger3d.accuracy.richardson import ORDER
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
@@ -38,7 +38,7 @@ def price_of_a_third(problem: Problem, increments: int, seconds: float) -> str:
     if own.dim == 3 and model.mesh.mesher == "ftetwild":
         meshing = meshing_s(problem.body.report.cells * _FACTOR**-own.dim)
     needed = seconds * solving(finer) / solving(own) + START_S + meshing + FIGURES_S[own.dim]
-    memory = 1e-3 * (finer.factor_mb + BASE_MB) + rows_gb(own.dim * finer.contact_points)
+    memory = finer.press_gb()
     size, base = (_FACTOR * length for length in (model.mesh.size_mm, model.mesh.base_size_mm))
     where = f"mesh.size_mm = {size:.3g}, mesh.base_size_mm = {base:.3g}"
     if model.mesh.stick_refinement > 1.0:  # by default a mesh with sizes has none
@@ -47,5 +47,4 @@ def price_of_a_third(problem: Problem, increments: int, seconds: float) -> str:
         check_memory(memory, "a third of the error bars")
     except Finger3dError:
         return f"{memory:.2g} GB, more than this machine has ({where})"
-    time = f"{needed:.2g} s" if needed < 90.0 else f"{needed / 60.0:.2g} min"
-    return f"about {time} and {memory:.2g} GB ({where})"
+    return f"about {duration(needed)} and {memory:.2g} GB ({where})"

@@ -24,7 +24,7 @@ class Plan:
     moduli : Young's modulus of the finger and of its parts in words, with spread and origin
     effects : settings by name of the effects that are on
     forecast : printable values by name: model, size, seconds of each stage, memory
-    warnings : what the mesh will not resolve
+    warnings : unusual values of the scene, and what the mesh will not resolve
     """
 
     title: str
@@ -79,7 +79,8 @@ def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
     """
     scene = scene_of(scene, overrides)
     model = scene.with_effects([*scene.fixed_effects, *scene.open_effects]).model()  # at the most
-    expected, warnings = forecast(model, bars=True), warnings_before_meshing(model, symmetry(model))
+    expected = forecast(model, bars=True)
+    warnings = [*model.warnings, *warnings_before_meshing(model, symmetry(model))]
     expected = {"finger": extent(model.design)} | expected
     tolerance = scene.tables.mesh.tolerance
     if tolerance is not None:

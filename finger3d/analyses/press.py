@@ -115,8 +115,10 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     if refinement:
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
-    report.stage("meshing")
     model = scene.model()
+    for warning in model.warnings:
+        report.say(f"warning: {warning}")
+    report.stage("meshing")
     known = refinement.problem if refinement else None
     body = PressedBody(model, report, known) if known else PressedBody.with_refined_borders(model, report)
 
@@ -151,7 +153,7 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Solve the increments of a record, and write what there is after each and after an interruption."""
     from finger3d.mechanics.march.step_halving import automatic
 
-    for warning in record.warnings:
+    for warning in record.warnings[len(record.problem.model.warnings) :]:  # those of the model are said before
         report.say(f"warning: {warning}")
     writer.progress(record, "incomplete: no increment was finished")
     try:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
-from finger3d._types import Float, Tree
+from finger3d._types import Float, Tree, TreeView
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.mechanics.readings.columns import (
     AREAS,
@@ -27,6 +27,12 @@ from finger3d.scene.messages import Place, dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable
 
 _MOST_MARKERS = 20_000
+
+_ELASTOMERS_MPA = 1e-3, 100.0
+"""Young's moduli from the softest gels to hard rubber."""
+
+_FINGERS_MM = 0.1, 1000.0
+"""Heights of fingers."""
 
 
 def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> list[str]:
@@ -54,6 +60,20 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     for i, taxel in enumerate(tables.taxel):
         lines += _taxel(i, taxel, design, solid)
     return lines
+
+
+def unusual(given: TreeView, E_MPa: float, height_mm: float) -> tuple[str, ...]:
+    """Return a warning about each value that is allowed but seldom meant: of another unit, or left out."""
+    lines = []
+    for name, value, (low, high), unit in (
+        ("material: Young's modulus", E_MPa, _ELASTOMERS_MPA, "MPa, and 1 MPa = 1000 kPa"),
+        ("finger: height", height_mm, _FINGERS_MM, "mm"),
+    ):
+        if not low <= value <= high:
+            lines.append(f"{name} {value:g}, not from {low:g} to {high:g} as usual; it is in {unit}")
+    if "friction" not in given:
+        lines.append("friction: the scene has no [friction], so that mu = 0")
+    return tuple(lines)
 
 
 def _goal(tables: SceneTable, legs: tuple[LegTable, ...], solid: bool) -> list[str]:

@@ -185,6 +185,7 @@ class Scene:
             domain=t.model.domain,
             rule=t.contact.rule,
             parts=parts_of(t),
+            warnings=checks.unusual(self.given, self.constants.E_MPa, self.design.height_mm),
         )
         for name in sorted(self.effects):
             model = self.effects[name].apply(model)

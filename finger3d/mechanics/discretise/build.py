@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from finger3d._cost import PressSize, duration
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
@@ -50,6 +51,9 @@ _STATIONS = 4, 20
 
 WHOLE_FACE = 0.95
 """Share of the contact face from which all its points are candidates: a few more rows cost less than the check."""
+
+_LONG_S = 60.0
+"""Forecast of a press from which it is said."""
 
 _MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
@@ -104,6 +108,10 @@ def _condensed(
     rows = sp.vstack([widened(part, matrix.upper.shape[0]) for part in (contact_part, *readings)], format="csr")
     assembly = time.perf_counter() - start
     report.say(f"condensing {matrix.upper.shape[0]} unknowns to {len(candidates.nodes)} contact points")
+    size = PressSize(mesh.dim, matrix.upper.shape[0], len(candidates.nodes))
+    if (seconds := size.press_s(len(targets(model.legs)))) > _LONG_S:
+        expected = f"about {duration(seconds)} and {size.press_gb(count):.2g} GB, without error bars"
+        report.say(f"warning: mesh.size_mm = {model.mesh.size_mm:g} takes {expected}")
     fixed = held_dofs(mesh, axes, model.held_ends)
     condensed = condense(matrix, fixed, rows)
     delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
