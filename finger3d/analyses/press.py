@@ -111,14 +111,14 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
     """Build the problem and march through its increments, again with all points of the free faces if contact reaches
     beyond the candidate points.
     """
+    for warning in scene.model().warnings:
+        report.say(f"warning: {warning}")
     refinement = _refine_mesh(scene, report)
     if refinement:
         scene = scene.with_mesh(refinement.mesh)
     writer.scene(scene.to_toml())
-    model = scene.model()
-    for warning in model.warnings:
-        report.say(f"warning: {warning}")
     report.stage("meshing")
+    model = scene.model()
     known = refinement.problem if refinement else None
     body = PressedBody(model, report, known) if known else PressedBody.with_refined_borders(model, report)
 
