@@ -22,6 +22,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.columns import RESULTANTS
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane
+from finger3d.scene.scene import parse
 from tests.models import half_cylinder, run
 
 
@@ -120,3 +121,30 @@ def test_the_dissipation_of_a_solid_of_which_little_slips_lies_within_two_bars()
         problem, frames = pressed(size)
         told = press_numbers(problem, frames[-1])[name]
         assert abs(told - exact) <= 2.0 * adjoint_bars(problem, frames).bars[name] < 2.0 * told
+
+
+@pytest.mark.parametrize(("x_mm", "length_mm"), [(-2.18, 2.82), (-2.45, 1.34)])
+def test_the_bar_of_a_taxel_at_the_foot_of_a_core_holds_its_error(x_mm: float, length_mm: float) -> None:
+    """The stress at the base is singular there. Against a mesh four times as fine."""
+    scene = {
+        "finger": {
+            "geometry": "fingertip", "radius_mm": 25.75, "half_length_mm": 10.32, "edge_height_mm": 11.94,
+            "width_mm": 17.32, "skin_mm": 1.93, "core_half_length_mm": 4.295, "core_height_mm": 6.832,
+        },
+        "material": {"E_MPa": 1.0, "nu": 0.4},
+        "parts": {"core": {"rigid": True}, "skin": {"E_MPa": 0.944, "nu": 0.426}},
+        "object": {"shape": "sphere", "radius_mm": 12.33, "x_mm": 1.48},
+        "friction": {"mu": 1.39},
+        "press": {"depth_mm": 0.727, "steps": 10},
+        "model": {"domain": "plane-strain"},
+        "taxel": [{"name": "t", "x_mm": x_mm, "length_mm": length_mm}],
+    }  # fmt: skip
+
+    def pressed(finer: float) -> tuple[Problem, list[StepResult]]:
+        sizes = {"size_mm": 0.4378 / finer, "base_size_mm": 2.519 / finer}
+        return run(parse(scene | {"mesh": sizes}).model())
+
+    (problem, steps), (_, fine) = pressed(1.0), pressed(4.0)
+    bar, right = adjoint_bars(problem, steps).bars["taxel_t_MPa"], fine[-1].taxels["t"]
+    assert abs(steps[-1].taxels["t"] - right) <= 2.0 * bar
+    assert bar <= 0.15 * right

@@ -24,6 +24,7 @@ from finger3d.accuracy.richardson import UNRESOLVED_DISSIPATION, Kind, kinds_of,
 from finger3d.accuracy.weighted_residuals import BodyErrors, body_errors
 from finger3d.contact.acceleration import threads_for
 from finger3d.errors import Finger3dError
+from finger3d.fem.mesh.simplex import part_of_facets
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import Run
@@ -71,7 +72,8 @@ _UNDER_CURVED = {Kind.FRICTION_SUM: 3.0, Kind.DISSIPATION: 5.0}
 normals of this one, and do not see how few points follow the object's surface."""
 
 _BASE_SHARE = 0.035
-"""Relative error of the pressure on a taxel of a solid over the edge length of the base divided by its shorter side."""
+"""Relative error of the pressure on a taxel over the edge length of the base divided by its shorter side: of a solid,
+and where parts of other stiffness stand on the base, at whose foot the stress is singular."""
 
 _MOST_INCREMENTS = 10
 """Largest number of increments in a leg for the errors of mesh and contact, which hardly depend on this number."""
@@ -219,11 +221,11 @@ def _unused_friction(model: Model, numbers: Mapping[str, float]) -> float:
 
 
 def _unresolved_by_base(problem: Problem) -> list[tuple[str, float]]:
-    """Return the name of every taxel of a solid and the relative error that the edges of the base leave in it."""
-    mesh = problem.mesh
-    if mesh.dim == 2:
+    """Return the name of every taxel and the relative error that the edges of the base leave in it."""
+    mesh, facets = problem.mesh, problem.mesh.facets["base"]
+    if mesh.dim == 2 and not part_of_facets(mesh, facets).any():
         return []
-    corners = mesh.points[mesh.facets["base"][:, :3]]
+    corners = mesh.points[facets[:, : mesh.dim]]
     edge = float(np.median(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)))
     sides = {t.name: min(t.length_mm, t.width_mm or t.length_mm) for t in problem.model.taxels}
     return [(pressure_column(name).key, _BASE_SHARE * edge / side) for name, side in sides.items()]
