@@ -152,6 +152,15 @@ def test_the_curves_of_a_press_that_slides_give_its_friction_back(tmp_path: Path
         finger3d.identify(path, tmp_path / "far.csv", {"friction.mu": (0.1, 1.0)}, tmp_path / "far")
 
 
+def test_the_history_of_a_press_gives_its_modulus_back(tmp_path: Path, scene_file: Path) -> None:
+    history = finger3d.press(scene_file).to_dataframe()
+    history["force_x_N"] += [1e-16, -1e-16] * 4  # of a symmetrical press, which other sums have as round-off
+    history.to_csv(tmp_path / "history.csv", index=False)
+    found = finger3d.identify(scene_file, tmp_path / "history.csv", {"material.E_MPa": (0.1, 5.0)}, tmp_path / "out")
+    assert found.measured.index == "step"
+    assert found.fitted.values[0] == pytest.approx(1.0, rel=1e-6)
+
+
 def test_what_the_data_cannot_tell_is_said(tmp_path: Path, scene_file: Path) -> None:
     """A force at one small depth tells E nu together, and nothing of friction."""
     rows = list(csv.DictReader(bench(tmp_path / "all.csv").open()))

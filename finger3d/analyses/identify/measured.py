@@ -36,6 +36,9 @@ _OPPOSITE = -0.5
 _LEAST_STD, _LARGEST_STD = 1e-12, 1e12
 """Standard deviations, in the unit of their column: squares of the residuals over them neither overflow nor vanish."""
 
+SHARPEST = 1e-9
+"""Least standard deviation that a column without one is given, in its unit; numbers below it are round-off of zero."""
+
 _UNIT_RATIO = 30.0
 """Ratio of a measured column to the simulated one beyond which its unit is in doubt; 100 is a percentage."""
 
@@ -74,7 +77,7 @@ class MeasuredPress:
     def check_signs(self, simulated: Sequence[Mapping[str, Float]]) -> None:
         """Raise an error for a column that has the opposite sign of all simulated ones (n,), by name."""
         for name, values in self.columns.items():
-            if all(
+            if np.abs(values).max() > SHARPEST and all(
                 values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
             ):
                 row = int(np.argmax(np.abs(values)))
@@ -94,7 +97,8 @@ class MeasuredPress:
         for name, values in self.columns.items():
             row = int(np.argmax(np.abs(values)))
             found = abs(float(values[row]))
-            if not smallest[name] / _UNIT_RATIO <= found <= largest[name] * _UNIT_RATIO:
+            low, high = smallest[name] / _UNIT_RATIO, largest[name] * _UNIT_RATIO
+            if not low - SHARPEST <= found <= high + SHARPEST:
                 raise Finger3dError(
                     f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
                     f"{smallest[name]:.2g} to {largest[name]:.2g}; is the unit that of the name (strain is a plain "

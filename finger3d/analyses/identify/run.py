@@ -24,7 +24,7 @@ from finger3d.analyses.identify.fit import (
     uncertainty,
     values_at,
 )
-from finger3d.analyses.identify.measured import MeasuredPress, read_measured
+from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
 from finger3d.analyses.identify.simulated import (
     MODULI,
     OFFSET,
@@ -56,7 +56,6 @@ _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residua
 _TRIED_MODULI = 41  # values of Young's modulus that are tried at the start
 _FRICTION = 0.2, 0.45, 0.7  # shares tried at the start: a fit does not leave values at which all of the contact sticks
 _FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
-_SHARPEST = 1e-9  # standard deviation of a column of zeros
 
 
 @dataclass(frozen=True)
@@ -206,7 +205,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     curves = [[simulation.at(values_at(scales, shares), data) for shares in trials] for trials in tried]
     _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
     stds = {
-        n: data.stds.get(n, np.full(len(data.at), _SHARE * float(np.abs(v).max()) or _SHARPEST))
+        n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
         for n, v in data.columns.items()
     }
 
@@ -301,7 +300,7 @@ def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int
     found = {}
     for name, values in data.columns.items():
         if name not in data.stds:
-            least = _LEAST_SHARE * float(np.abs(values).max()) or _SHARPEST
+            least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
             found[name] = np.full(len(values), max(_rms(values - simulated[name]) / math.sqrt(left), least))
     return found
 
