@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,10 @@ import pytest
 import finger3d
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.richardson import kinds_of, relative_error
-from finger3d.analyses.cost import ERRORS, Forecasts, _scaled
+from finger3d.analyses.cost import ERRORS, CostRow, Forecasts, _scaled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
+from finger3d.scene import scene_of
 from tests.sensor_cases import scene
 
 BASE = {
@@ -65,6 +67,16 @@ def test_increments_shrink_with_the_error_that_they_leave() -> None:
     assert few.increments == 3
     assert many.increments > 3
     assert f"press.steps={many.increments}" in many.keys
+
+
+@pytest.mark.parametrize("legs", [1, 2])
+def test_a_scene_takes_the_keys_of_a_row(legs: int) -> None:
+    leg = [{"depth_mm": 3.0 * (k + 1), "steps": 3} for k in range(legs)]
+    given = scene(**BASE | {"mesh": {"tolerance": 0.1}}, press={"leg": leg})
+    path = tuple(replace(own, steps=9) for own in given.legs)
+    row = CostRow(error=0.01, mesh=given.mesh, increments=9 * legs, legs=path, has_legs=True)
+    pressed = scene_of(given, row.keys)
+    assert (pressed.legs, pressed.mesh.size_mm) == (path, given.mesh.size_mm)
 
 
 def test_edges_of_all_meshes_are_in_proportion() -> None:

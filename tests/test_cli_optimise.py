@@ -68,6 +68,7 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) ->
     assert main([*arguments, "--objective", str(judge), "--budget", "40", "--mu", "0.1,0.5"]) == 0
     told = capsys.readouterr().out
     assert "best.toml" in told
+    assert "objective (judge.py)" in told
     judged = (out / "evaluations.csv").read_text().splitlines()[1:]
     assert f" {len(judged)} designs, " in told
     assert load(out / "best.toml").tables.gauge[0].angle_deg == pytest.approx(40.0, abs=2.0)

@@ -9,7 +9,7 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Leg
-from finger3d.scene import load, parse
+from finger3d.scene import load, parse, scene_of
 from tests.scene_tables import SMALL
 from tests.scenes import written
 
@@ -68,6 +68,23 @@ def test_an_override_of_no_reading_is_refused(tmp_path, text: str, said: str) ->
     path = written(tmp_path, parse({**SMALL, **READINGS}).to_toml())
     with pytest.raises(Finger3dError, match=re.escape(said)):
         load(path, [text])
+
+
+@pytest.mark.parametrize(
+    ("table", "given", "text", "left"),
+    [
+        ("mesh", {"tolerance": 0.1, "goal": "normal_force_N"}, "mesh.size_mm=2.0", {"size_mm"}),
+        ("mesh", {"size_mm": 2.0, "base_size_mm": 4.0}, "mesh.tolerance=0.1", {"tolerance"}),
+        ("mesh", {"size_mm": 2.0, "mesher": "swept"}, "mesh.base_size_mm=4.0", {"size_mm", "base_size_mm", "mesher"}),
+        ("press", {"depth_mm": 1.0, "steps": 2}, "press.force_N=3.0", {"force_N", "steps"}),
+        ("press", {"force_N": 1.0}, "press.depth_mm=3.0", {"depth_mm"}),
+    ],
+)
+def test_a_key_that_is_set_takes_the_place_of_those_that_it_excludes(table, given, text, left) -> None:
+    scene = scene_of({**SMALL, table: given}, [text])
+    assert set(scene.given[table]) == left
+    with pytest.raises(Finger3dError, match="beside|either"):
+        scene_of({**SMALL, "mesh": {}}, ["mesh.size_mm=2.0", "mesh.tolerance=0.1"])
 
 
 def test_true_and_false_switch_effects(tmp_path) -> None:

@@ -75,6 +75,7 @@ class CostRow:
     errors : expected relative error of each number by name, of mesh and increments
     limit : why the error cannot be reached, or is smaller than was asked for; empty otherwise
     legs : of the path with another number of increments than the scene's; empty if that is kept
+    has_legs : whether the scene names them, ``[[press.leg]]``
     """
 
     error: float | None
@@ -87,6 +88,7 @@ class CostRow:
     errors: Mapping[str, float] = field(default_factory=dict)
     limit: str = ""
     legs: tuple[Leg, ...] = ()
+    has_legs: bool = False
 
     @property
     def keys(self) -> list[str]:
@@ -94,7 +96,7 @@ class CostRow:
         own, factors = self.mesh, ("gauge_refinement", "stick_refinement")
         sizes = [f"mesh.size_mm={own.size_mm:g}", f"mesh.base_size_mm={own.base_size_mm:g}"]
         sizes += [f"mesh.{name}={value:g}" for name in factors if (value := getattr(own, name)) > 1.0]
-        return sizes + [f"press.steps={leg.steps}" for leg in self.legs if len(self.legs) == 1]
+        return sizes + [f"press.{f'leg.{k}.' * self.has_legs}steps={leg.steps}" for k, leg in enumerate(self.legs)]
 
     def as_dict(self) -> Tree:
         """Return the entry of the JSON output."""
@@ -185,6 +187,7 @@ def cost(
     forecasts = Forecasts.of(model, report)
     chosen = forecasts.numbers(goals)
     rows = (forecasts.row(1.0), *(forecasts.wanted(error, chosen) for error in ERRORS))
+    rows = tuple(replace(row, has_legs="leg" in scene.given["press"]) for row in rows)
     tabled = tuple(of) if of and ALL not in of else forecasts.main[:_MOST_COLUMNS]
     found = Costs(scene.title, chosen, rows, tabled, time.perf_counter() - start)
     if png is not None:

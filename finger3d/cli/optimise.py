@@ -84,14 +84,15 @@ def _print_design(result: OptimisationResult, out: Path, json_: bool) -> None:
     """Print the best design."""
     from finger3d.results.summary import read_json
 
+    design = read_json(out / "design.json")
     if json_:
-        print_json(read_json(out / "design.json"))
+        print_json(design)
         return
-    chosen = zip(result.keys, result.best.values, strict=True)
+    name, chosen = Path(design["objective"]).name, zip(result.keys, result.best.values, strict=True)
     print_rows(
         result.scene.title,
         [
-            ("objective", f"{result.best.value:.5g}, at the start {result.start.value:.5g}"),
+            (f"objective ({name})", f"{result.best.value:.5g}, at the start {result.start.value:.5g}"),
             *((key, f"{value:.5g}") for key, value in chosen),
             ("evaluated", f"{result.distinct_designs} designs, {result.bodies} bodies condensed"),
             ("results", str(out / "best.toml")),

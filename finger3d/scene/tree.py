@@ -13,6 +13,12 @@ from finger3d.errors import Finger3dError
 from finger3d.scene.material import replace_modulus
 from finger3d.scene.messages import listed, nearest, shown
 
+_ALTERNATIVES = (
+    ("mesh", ("size_mm", "base_size_mm"), ("tolerance", "goal", "max_seconds")),
+    ("press", ("depth_mm",), ("force_N",)),
+)
+"""Keys of a table that exclude each other; those that are set take the place of the others."""
+
 
 def read(path: Path) -> Tree:
     """Read a TOML file; lists become tuples, which the strict tables ask for."""
@@ -83,6 +89,11 @@ def overridden(tree: TreeView, overrides: Iterable[str], option: str = "--set") 
         keys.append(numbered(".".join(parts), changed, option))
         _set(changed, keys[-1].split("."), parsed(value.strip()), f"{option} {key.strip()}")
     replace_modulus(changed, keys)
+    for table, *groups in _ALTERNATIVES:
+        for one, other in (groups, reversed(groups)):
+            mine, others = ({f"{table}.{name}" for name in names} & {*keys} for names in (one, other))
+            for name in other if mine and not others else ():
+                changed[table].pop(name, None)
     return frozen(changed), keys
 
 
