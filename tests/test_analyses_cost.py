@@ -20,6 +20,7 @@ BASE = {
     "model": {"domain": "plane-strain"},
     "mesh": {"size_mm": 1.0, "base_size_mm": 4.0},
     "friction": {"mu": 0.4},
+    "effects": {"auto": False},
 }
 
 
