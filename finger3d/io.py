@@ -5,15 +5,17 @@ from __future__ import annotations
 import codecs
 import csv
 import errno
+import glob
 import hashlib
 import json
 import math
 import os
 import secrets
+import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
@@ -38,7 +40,8 @@ def atomic(path: str | Path) -> Iterator[Path]:
     """Give the name of a temporary file beside `path`; it takes the place of `path` when the block ends well.
 
     The temporary name keeps the ending of `path`, for writers that go by it. An error in the block removes the
-    temporary file and leaves an older `path` as it was. Missing folders are made.
+    temporary file and leaves an older `path` as it was. Missing folders are made. A temporary file that a killed
+    process has left is removed after `_STALE_S`, or when its folder is next `claimed`.
 
     Raises
     ------
@@ -48,9 +51,10 @@ def atomic(path: str | Path) -> Iterator[Path]:
         If the disk is full.
     """
     target = Path(path)
-    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    temporary = target.with_name(f".{target.stem}{_TEMPORARY}{secrets.token_hex(4)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        _remove_temporaries(target.parent, f".{target.stem}", _STALE_S)
         yield temporary
         os.replace(temporary, target)
     except OSError as error:
@@ -59,6 +63,26 @@ def atomic(path: str | Path) -> Iterator[Path]:
         # Usually it is gone by now, or was never made; and a folder that refuses has been reported above.
         with suppress(OSError):
             temporary.unlink()
+
+
+def holds(folder: str | Path, names: Iterable[str], file: str | Path) -> bool:
+    """Return whether a file is one of these in a folder, whatever links lead to it."""
+    return os.path.realpath(file) in [os.path.realpath(Path(folder) / name) for name in names]
+
+
+_TEMPORARY = ".finger3d-"
+"""Part of the names of temporary files, before eight digits and the ending."""
+
+_STALE_S = 3600.0
+"""Age above which nobody writes a temporary file any more."""
+
+
+def _remove_temporaries(folder: Path, start: str = "", age_s: float = -math.inf) -> None:
+    """Remove the temporary files of a folder whose names start so, and which are older than an age in seconds."""
+    for path in folder.glob(f"{glob.escape(start)}{_TEMPORARY}*" if start else f".*{_TEMPORARY}*"):
+        with suppress(OSError):  # another process has removed it in the meantime
+            if time.time() - path.lstat().st_mtime > age_s:
+                path.unlink()
 
 
 _LOCK = ".finger3d.lock"
@@ -109,6 +133,7 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
         ) from None
     except OSError as error:
         raise Finger3dError(f"--out {path}: cannot be written: {error.strerror or error}") from None
+    _remove_temporaries(path)
     try:
         yield path
     finally:

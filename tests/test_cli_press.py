@@ -79,12 +79,16 @@ def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, cap
 
 @pytest.mark.parametrize(
     ("out", "expected"),
-    [("scene.toml", "is a file"), ("scene.toml/deeper", "deeper"), (".", "scene.toml")],
-)
+    [
+        ("scene.toml", "is a file"), ("scene.toml/deeper", "deeper"), (".", "scene.toml"),
+        ("circle", "circle is a link that leads nowhere"), ("circle/deeper", "circle is a link that leads nowhere"),
+    ],
+)  # fmt: skip
 def test_press_refuses_a_folder_it_cannot_use_before_any_work(
     out, expected, scene, tmp_path, fake_press, capsys
 ) -> None:
     before = scene.read_bytes()
+    (tmp_path / "circle").symlink_to("circle")
     assert run("press", scene, "--out", tmp_path / out) == 2
     printed, err = capsys.readouterr()
     assert len(err.splitlines()) == 1

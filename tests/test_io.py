@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import atomic, claimed, holds, write_csv, write_json
 
 
 def test_csv_keeps_every_digit(tmp_path: Path) -> None:
@@ -64,6 +66,37 @@ def test_atomic_replaces_and_keeps_usual_permissions(tmp_path: Path) -> None:
     assert target.read_text() == "two"
     assert list(target.parent.iterdir()) == [target]
     assert os.stat(target).st_mode == os.stat(plain).st_mode
+
+
+def test_what_a_killed_process_has_left_is_removed_by_the_next_run(tmp_path: Path) -> None:
+    """A process that is killed while it writes, as by kill -9, cannot tidy up."""
+    program = (
+        "import os, signal, sys; from finger3d.io import atomic\n"
+        "blocks = [atomic(name) for name in sys.argv[1:]]\n"
+        "for block in blocks: block.__enter__().write_text('half')\n"
+        "os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    mine = [tmp_path / "out" / name for name in ("report[1].html", "fields.vtu")]
+    subprocess.run([sys.executable, "-c", program, *mine], check=False, cwd=Path(__file__).parent.parent)
+    (tmp_path / "out" / ".vimrc").write_text("")
+    assert len(list((tmp_path / "out").iterdir())) == 3
+    # another process may be writing the same file now: only what is old goes
+    write_json(mine[0], {})
+    (half,) = (tmp_path / "out").glob(".report*")
+    os.utime(half, (0, 0))
+    write_json(mine[0], {})
+    assert not list((tmp_path / "out").glob(".report*"))
+    with claimed(tmp_path / "out"):
+        assert {p.name for p in (tmp_path / "out").iterdir()} == {".finger3d.lock", ".vimrc", "report[1].html"}
+
+
+def test_links_that_lead_in_a_circle_hold_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    (tmp_path / "scene.toml").write_text("")
+    (tmp_path / "link.toml").symlink_to("scene.toml")
+    assert holds(tmp_path, ["x", "scene.toml"], tmp_path / "link.toml")
+    assert not holds(tmp_path / "a", ["scene.toml"], tmp_path / "scene.toml")
 
 
 def test_a_folder_that_cannot_be_written_is_a_users_mistake(tmp_path: Path) -> None:

@@ -101,3 +101,11 @@ def test_the_contents_of_all_files_of_bodies_are_told_apart(tmp_path: Path) -> N
     assert [*first] == [*second] == [str(tmp_path / "finger.step"), str(tmp_path / "coin.stl")]
     assert [name for name in first if first[name] != second[name]] == [str(tmp_path / "coin.stl")]
     assert contents({"finger": {"geometry": "block"}}) == {}
+
+
+def test_a_file_that_is_a_circle_of_links_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.step").symlink_to("a.step")
+    for table in ({"geometry": "a.step"}, None):
+        scene = scene_with_object(tmp_path / "a.step")
+        with pytest.raises(Finger3dError, match=r"a\.step"):
+            parse(scene | ({"finger": table} if table else {}), tmp_path / "scene.toml")

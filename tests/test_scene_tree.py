@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
+from collections.abc import Iterator
 
 import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Leg
-from finger3d.scene import load, parse, scene_of
+from finger3d.scene import load, parse, scene_of, tree
 from tests.scene_tables import SMALL
 from tests.scenes import written
 
@@ -112,3 +114,36 @@ def test_byte_order_mark_and_windows_lines_are_taken(tmp_path) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(b"\xef\xbb\xbf" + parse(SMALL).to_toml().replace("\n", "\r\n").encode())
     assert load(path) == parse(SMALL)
+
+
+@pytest.fixture
+def memory() -> Iterator[None]:
+    """No more than 20 MB, about 30 times what these scenes need, may be taken."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 20e6
+
+
+LONG = ".".join("a" * 20_000)
+
+
+@pytest.mark.usefixtures("memory")
+@pytest.mark.parametrize(
+    "text",
+    [f"{LONG}=1", f"friction.mu=1\n{LONG}=1", f"friction={{{LONG}=1}}", f"press.leg.{'9' * 20_000}=1", "." * 40_000,
+     f"friction={'{a=' * 60}1{'}' * 60}"],
+    ids=["key", "second line", "value", "number", "dots", "tables"],
+)  # fmt: skip
+def test_a_key_of_many_parts_is_refused_in_little_memory(text: str) -> None:
+    with pytest.raises(Finger3dError) as told:
+        parse(tree.override({**SMALL, "press": {"leg": [{"depth_mm": 0.1}]}}, [text]))
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.usefixtures("memory")
+@pytest.mark.parametrize("line", [f"{LONG} = 1", f"[{LONG}]", f"friction = {{{LONG} = 1}}"])
+def test_a_file_with_a_key_of_many_parts_is_refused_in_little_memory(line: str, tmp_path) -> None:
+    with pytest.raises(Finger3dError, match="a key is too long"):
+        load(written(tmp_path, f"{line}\n"))

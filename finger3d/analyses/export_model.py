@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed
+from finger3d.io import atomic, claimed, holds
 from finger3d.progress import Progress
 from finger3d.scene import Source, scene_of
 
@@ -62,8 +62,8 @@ def export_mesh(
     model = scene.model()
     if model.domain != "solid":
         raise Finger3dError(f'--mesh: a section has no tetrahedra; set model.domain = "solid", not "{model.domain}"')
-    own = Path(getattr(scene.design, "path", "")).resolve()
-    if own in [(out / name).resolve() for name in MESH_FILES]:
+    own = Path(getattr(scene.design, "path", ""))
+    if holds(out, MESH_FILES, own):
         raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
     report.stage("meshing")
     axes = symmetry(model)

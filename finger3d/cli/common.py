@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,6 +17,7 @@ import finger3d
 from finger3d._machine import reserve_for_linear_algebra
 from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
+from finger3d.io import holds
 from finger3d.progress import Progress, reporter
 
 if TYPE_CHECKING:
@@ -44,6 +46,9 @@ app = App(
     suppress_keyboard_interrupt=False,
     result_action="return_value",
 )
+
+_LONGEST = 4000
+"""Most characters of a message, which may quote what a user has typed."""
 
 Set = Annotated[
     list[str] | None,
@@ -115,7 +120,7 @@ def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Sc
 
 def check_writable(out: Path, scene: Path) -> None:
     """Raise Finger3dError if the output folder cannot be written, or holds the scene file itself."""
-    if (out / "scene.toml").resolve() == scene.resolve():
+    if holds(out, ["scene.toml"], scene):
         raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
     check_folder(out)
 
@@ -123,7 +128,10 @@ def check_writable(out: Path, scene: Path) -> None:
 def check_folder(out: Path) -> None:
     """Raise Finger3dError if a folder cannot be written, or cannot be created where it does not exist."""
     try:
-        there = next(p for p in (out, *out.parents, Path()) if p.exists())
+        # a link that leads nowhere, or in a circle, is there without existing
+        there = next(p for p in (out, *out.parents, Path()) if os.path.lexists(p))
+        if not there.exists():
+            raise Finger3dError(f"--out {out}: {there} is a link that leads nowhere; name another folder")
         if there == out and not out.is_dir():
             raise Finger3dError(f"--out {out}: is a file; name a folder")
         with tempfile.TemporaryFile(dir=there):
@@ -134,7 +142,10 @@ def check_folder(out: Path) -> None:
 
 def complain(text: str) -> None:
     """Print one line on standard error."""
-    print(f"finger3d: {printable(' '.join(text.split()))}", file=sys.stderr)
+    line = printable(" ".join(text.split()))
+    if len(line) > _LONGEST:
+        line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
+    print(f"finger3d: {line}", file=sys.stderr)
 
 
 def print_rows(title: str, rows: Iterable[tuple[str, object]]) -> None:

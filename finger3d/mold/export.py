@@ -11,6 +11,7 @@ from finger3d._extras import require
 from finger3d.errors import Finger3dError
 from finger3d.geometry.imported import Imported
 from finger3d.geometry.surface import Triangles
+from finger3d.io import claimed, holds
 from finger3d.materials.silicones import silicone_named
 from finger3d.mold.options import MoldOptions
 from finger3d.progress import Progress
@@ -91,7 +92,6 @@ def export(
     >>> [file.name for file in done.files], round(done.stl_volume_mm3, 6)
     (['finger.step', 'finger.stl'], 960.0)
     """
-    from finger3d.io import claimed
     from finger3d.mold.body import Shell, shell, write_step, write_stl
     from finger3d.mold.output import write_mold
 
@@ -145,9 +145,8 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
             f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
             "a fifth of the finger's height"
         )
-    source = Path(design.path).resolve() if isinstance(design, Imported) else None
-    if source is not None and source in ((out / "finger.step").resolve(), (out / "finger.stl").resolve()):
-        raise Finger3dError(f"--out {out}: holds {source.name}, the finger's own file; name another folder")
+    if isinstance(design, Imported) and holds(out, ("finger.step", "finger.stl"), design.path):
+        raise Finger3dError(f"--out {out}: holds {Path(design.path).name}, the finger's own file; name another folder")
 
 
 def _clear(out: Path) -> None:

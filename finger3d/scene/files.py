@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -38,7 +39,7 @@ def absolute(document: TreeView, scene: Path | None) -> Tree:
     folder = scene.parent if scene else Path()
     tree = dict(document)
     for table, key, value in _named(document):
-        tree[table] = {**document[table], key: str((folder / value).resolve())}
+        tree[table] = {**document[table], key: os.path.realpath(folder / value)}
     return tree
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,9 @@ _ALTERNATIVES = (
     ("press", ("depth_mm",), ("force_N",)),
 )
 """Keys of a table that exclude each other; those that are set take the place of the others."""
+
+_DEEPEST = 50
+"""Most parts of a dotted key, and most levels of tables and lists: far above any scene."""
 
 
 def read(path: Path) -> Tree:
@@ -34,11 +37,21 @@ def read(path: Path) -> Tree:
     except OSError as error:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     try:
-        return frozen(tomllib.loads(text.replace("\r\n", "\n")))
+        return frozen(_loads(text.replace("\r\n", "\n")))
     except tomllib.TOMLDecodeError as error:
         raise Finger3dError(f"{path}: not TOML: {_located(str(error), text)}") from None
-    except (ValueError, RecursionError):
-        raise Finger3dError(f"{path}: not TOML: a number is too long, or brackets are nested too deep") from None
+    except (ValueError, RecursionError, Finger3dError):
+        raise Finger3dError(
+            f"{path}: not TOML: a number or a key is too long, or brackets are nested too deep"
+        ) from None
+
+
+def _loads(text: str) -> Tree:
+    """Parse TOML; a dotted key would take memory that grows with the square of the number of its parts."""
+    keys = (line.partition("=")[0] for line in text.splitlines() if not line.lstrip().startswith("#"))
+    if any(key.count(".") > _DEEPEST for key in keys):
+        raise ValueError("a dotted key has too many parts")
+    return tomllib.loads(text)
 
 
 def _located(message: str, text: str) -> str:
@@ -49,13 +62,15 @@ def _located(message: str, text: str) -> str:
 
 def frozen(tree: Mapping[str, object]) -> Tree:
     """Return a copy with tuples in place of lists, which the strict tables require."""
-    return {key: _with_tuples(value) for key, value in tree.items()}
+    return {key: _with_tuples(value, _DEEPEST) for key, value in tree.items()}
 
 
-def _with_tuples(value: object) -> object:
+def _with_tuples(value: object, levels: int) -> object:
+    if not levels:
+        raise Finger3dError(f"tables or lists are nested more than {_DEEPEST} levels deep; no key of a scene is")
     if isinstance(value, Mapping):
-        return frozen(value)
-    return tuple(_with_tuples(v) for v in value) if isinstance(value, list | tuple) else value
+        return {key: _with_tuples(v, levels - 1) for key, v in value.items()}
+    return tuple(_with_tuples(v, levels - 1) for v in value) if isinstance(value, list | tuple) else value
 
 
 def plain(tree: Mapping[str, object]) -> Tree:
@@ -84,7 +99,7 @@ def overridden(tree: TreeView, overrides: Iterable[str], option: str = "--set") 
     for text in overrides:
         key, equals, value = text.partition("=")
         parts = [p.strip() for p in key.split(".")]
-        if not equals or not all(parts):
+        if not equals or not all(parts) or len(parts) > _DEEPEST:
             raise Finger3dError(f"{option} {shown(text)}: must be KEY=VALUE, for instance {option} friction.mu=0.5")
         keys.append(numbered(".".join(parts), changed, option))
         _set(changed, keys[-1].split("."), parsed(value.strip()), f"{option} {key.strip()}")
@@ -117,16 +132,20 @@ def value_at(tree: TreeView, key: str) -> object:
     value: object = tree
     for part in key.split("."):
         if isinstance(value, tuple | list):
-            value = value[int(part)] if part.isdecimal() and int(part) < len(value) else None
+            value = value[int(part)] if _is_index(part, value) else None
         else:
             value = value.get(part) if isinstance(value, Mapping) else None
     return value
 
 
+def _is_index(part: str, items: Sequence[object]) -> bool:
+    return part.isdecimal() and len(part) <= len(str(len(items))) and int(part) < len(items)
+
+
 def parsed(text: str) -> Any:
     """Return the TOML value of a text, or the text itself if it is no TOML."""
     try:
-        tables = tomllib.loads(f"value = {text}")
+        tables = _loads(f"value = {text}")
     except (ValueError, RecursionError):
         return text
     return tables["value"] if tables.keys() == {"value"} else text
@@ -136,7 +155,7 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
     for depth, part in enumerate(parts):
         last = depth == len(parts) - 1
         if isinstance(node, list):
-            if not part.isdecimal() or int(part) >= len(node):
+            if not _is_index(part, node):
                 allowed = f"0 to {len(node) - 1}" if node else "none, the list is empty"
                 raise Finger3dError(f"{key}: no item {shown(part)} in {'.'.join(parts[:depth])} ({allowed})")
             index: Any = int(part)
