@@ -85,7 +85,7 @@ def test_traction_obeys_coulomb_along_the_middle_line(body: LiveBody) -> None:
 @pytest.mark.parametrize("steps", [7, "auto"])
 def test_the_page_opens_with_the_numbers_of_the_press(steps: int | str) -> None:
     scene = parse(SCENE | {"press": {"depth_mm": 0.6, "steps": steps}, "gauge": (GAUGE,)})
-    own = finger3d.press(scene, error=False)
+    own = finger3d.press(scene.with_effects(()), error=False)  # the page is in small strain
     body = LiveBody.of(scene)
     assert body.steps == len(own.steps)
     assert body.largest_depth_mm == own.last.depth_mm

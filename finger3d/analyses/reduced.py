@@ -71,7 +71,7 @@ class ReducedModel:
             name = slots.get("hyperelastic_law") or slots.get("relaxation", "its formulation")
             raise Finger3dError(
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
-                "take the effect out, or press the scene itself"
+                "condense the scene with effects.auto = false and without the effect, or press the scene itself"
             )
         others = beyond_candidates(problem)
         about = {

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
+from finger3d.accuracy.changes import changing_numbers, two_digits
+from finger3d.accuracy.model_error import LARGE_DEFORMATION, Judgement, at_large_deformation
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
@@ -18,8 +20,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.readings.columns import of_kind
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import contact_table, measure
+from finger3d.mechanics.results.history import StepResult, contact_table, measure
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
 from finger3d.sensor.curve import ReadingCurve
@@ -93,12 +96,14 @@ class LiveBody:
     problem : condensed for the largest depth
     largest_depth_mm : depth that the scene's own press ends at
     steps : increments of every press
+    remark : that presses are in small strain, and what large deformation would change at the largest depth
     """
 
     title: str
     problem: Problem
     largest_depth_mm: float
     steps: int
+    remark: str = ""
 
     @classmethod
     def of(cls, scene: Scene, report: Progress = QUIET) -> LiveBody:
@@ -109,7 +114,7 @@ class LiveBody:
         Finger3dError
             If an effect makes the compliance depend on the state or on time.
         """
-        model = scene.model()
+        model = scene.with_effects(scene.fixed_effects).model()
         if not model.is_linear_elastic or model.inclusions is not None:
             slots = dict(model.filled)
             name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
@@ -119,7 +124,8 @@ class LiveBody:
         body = PressedBody(model, report)
         steps = body.steps()
         steps[-1].check(f"app: mu = {scene.tables.friction.mu:g}")
-        return cls(scene.title, body.problem, steps[-1].target.depth_mm, len(steps))
+        remark = _remark(body.problem, steps[-1])
+        return cls(scene.title, body.problem, steps[-1].target.depth_mm, len(steps), remark)
 
     def press(self, mu: float, depth_mm: float) -> LivePress:
         """Press with a coefficient of friction to a depth; the last presses are kept.
@@ -181,3 +187,17 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
         displacement=displacement(problem.mesh, unknowns),
         **{name: np.asarray(table[name])[on] for name in _ALONG},
     )
+
+
+def _remark(problem: Problem, step: StepResult) -> str:
+    """Return that presses are in small strain, and what large deformation would change at the end of one."""
+    (found,) = Judgement(problem.model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
+    changes = found.estimate.of_press(changing_numbers(problem, step)).changes
+    names = [name for name in ("normal_force_N", "friction_sum_N", "stick_area_mm2") if name in changes]
+    said = [
+        f"{name} by {two_digits(changes[name].change)} ({two_digits(changes[name].low)} to "
+        f"{two_digits(changes[name].high)})"
+        for name in names + [column.key for column in of_kind(step.readings, "gauge")]
+    ]
+    told = ", ".join(said) or "every number by an unknown amount"
+    return f"Presses are in small strain; at {step.target.depth_mm:.4g} mm large deformation would change {told}."

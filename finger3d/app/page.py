@@ -64,6 +64,7 @@ def page(body: LiveBody, mu: float) -> Dash:
             html.Div([slider.drawn(name) for name, slider in sliders.items()], style={"maxWidth": "50rem"}),
             html.P(id="numbers"),
             html.P(id="reading"),
+            html.P(body.remark, id="remark"),
             html.P(id="mistake", style={"color": "#a00"}),
             dcc.Graph(id="traction"),
             dcc.Graph(id="section"),

@@ -23,8 +23,9 @@ def app_(
 ) -> None:
     """Open a local page with sliders for friction, depth and a gauge, which shows presses of the condensed finger.
 
-    The page opens with the numbers that `finger3d press` gives for the scene, and with the scene's first gauge. The
-    finger is pressed straight down, to at most the depth of the scene. Ctrl-C ends the page.
+    The page opens with the numbers that `finger3d press` gives for the scene in small strain, and with the scene's
+    first gauge, and says what large deformation would change. The finger is pressed straight down, to at most the depth
+    of the scene. Ctrl-C ends the page.
 
     Example: finger3d app scene.toml --set model.domain=plane-strain
 
@@ -42,6 +43,7 @@ def app_(
         report.stage("condensing")
         body = LiveBody.of(loaded, report)
     server = local_server(page(body, loaded.tables.friction.mu), port)
+    print(body.remark)
     print(f"open {server.url}", flush=True)
     if browser:
         webbrowser.open(server.url)
