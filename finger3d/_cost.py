@@ -120,7 +120,6 @@ class PressSize:
         """Return the seconds of a press in small strain, without meshing and output."""
         return self.condensation_s + increments * self.contact_s
 
-
     def press_gb(self, readings: int = 0) -> float:
         """Return the memory of a press in small strain, GB, without its states."""
         return 1e-3 * (self.factor_mb + BASE_MB) + rows_gb(self.dim * self.contact_points + readings)
