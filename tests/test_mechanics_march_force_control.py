@@ -12,12 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from finger3d.analyses.pressed_body import PressedBody
 from finger3d.cli import main
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
+from finger3d.fem.solids.material import Isotropic
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement
 from finger3d.mechanics.formulations import formulation_of
@@ -30,9 +34,9 @@ from finger3d.mechanics.march.force_control import (
 from finger3d.mechanics.march.parts import solved_in_turn
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.to_force import normal_force
-from finger3d.mechanics.model import Domain, Leg, Model
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.objects import Move, Plane
+from finger3d.objects import Cylinder, Move, Plane
 from finger3d.scene import load
 from tests.logs import Log
 from tests.models import block, fig9
@@ -214,6 +218,33 @@ def test_a_forecast_is_good_to_a_factor_of_two() -> None:
     assert 2.5 < forecast < 10.0
 
 
+@pytest.mark.parametrize("x_mm", [0.0, 1.3, 3.0])
+@pytest.mark.parametrize("depth", [0.003, 0.3])
+def test_the_forecast_of_a_line_contact_is_good_wherever_it_is(x_mm: float, depth: float) -> None:
+    block = designs()["block"](half_length_mm=60.0, height_mm=60.0, width_mm=1.0)
+    material, radius = Isotropic(1.0, 0.5), 50.0
+    # Johnson 1985, eq. (5.56): the centre of the loaded face relative to a depth of 60 mm, plane strain
+    modulus = material.E_MPa / (1.0 - material.nu**2)
+
+    def depth_of(force: float) -> float:
+        a = math.sqrt(4.0 * force * radius / (math.pi * modulus))
+        return force / (math.pi * modulus) * (2.0 * math.log(2.0 * 60.0 / a) - material.nu / (1.0 - material.nu))
+
+    force = brentq(lambda force: depth_of(force) - depth, 1e-9, 10.0)
+    way = contact_path(block, Cylinder(x_mm, radius_mm=radius), (), "plane-strain")
+    assert forecast_depth(way, material, force, 60.0, 1.0) == pytest.approx(depth, rel=0.25)
+
+
+def test_an_object_that_rolls_under_a_light_force_stays_on_the_finger() -> None:
+    # the roll lifts the axis's foot by 100 (1 - cos 1.5 degrees) = 0.034 mm, more than the depth of 0.0028 mm
+    obj, force = Cylinder(3.0, radius_mm=100.0), 1e-3
+    legs = (Leg(1e-3, steps=2, force_N=force), Leg(1e-3, steps=2, force_N=force, turn_z=math.radians(1.5)))
+    model = block(object=obj, legs=legs, domain="plane-strain", mesh=MeshOptions(0.2, 1.5, "swept"))
+    body = PressedBody(model)
+    (*_, rolled) = body.steps()
+    assert measure(body.problem.points, rolled)["normal_force_N"] == pytest.approx(force, rel=1e-6)
+
+
 def test_a_forecast_that_was_too_small_is_replaced() -> None:
     legs = (Leg(1.0, force_N=2.0), Leg(0.0))
     assert at_depth_reached(legs, 1.05) is None
@@ -246,7 +277,7 @@ def test_a_scene_gives_either_a_depth_or_a_force(tmp_path: Path) -> None:
     assert scene.legs[0].force_N == 0.5
     assert load_again(scene.to_toml(), tmp_path) == scene
     with pytest.raises(Finger3dError, match="force_N"):
-        load(path, ["press.depth_mm=0.1"])
+        load(path, ["press.depth_mm=0.1", "press.force_N=0.5"])
     path.write_text(SCENE.replace("force_N = 0.5\n", ""))
     with pytest.raises(Finger3dError, match="press.depth_mm .*force_N"):
         load(path)

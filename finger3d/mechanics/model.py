@@ -306,10 +306,12 @@ def contact_path(
 
     An elastic object, which is not `rigid`, touches the contact face only.
     """
-    pose, poses = ObjectPose(0.0), list[ObjectPose]()
+    pose, poses, by_force = ObjectPose(0.0), list[ObjectPose](), list[ObjectPose]()
     for leg in legs:
         end = leg.end(pose)
-        poses += [Move(pose, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
+        on_leg = [Move(pose, end).at(share) for share in (0.25, 0.5, 0.75, 1.0)]
+        poses += on_leg
+        by_force += on_leg if leg.force_N is not None else []
         pose = end
     return ContactPath(
         top=design.top,
@@ -317,6 +319,7 @@ def contact_path(
         half_length_mm=design.half_length_mm,
         half_width_mm=design.width_mm / 2.0 if domain == "solid" else 0.0,
         poses=tuple(poses),
+        by_force=tuple(by_force),
         landmarks=design.landmarks(),
         walls_touch=rigid,
     )

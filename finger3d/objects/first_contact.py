@@ -38,6 +38,7 @@ class ContactPath:
     half_length_mm, half_width_mm : half extents of the finger; a section has half width 0
     poses : of the object on its path
     landmarks : (k, 2) mm, corners of the finger that a search on a grid could miss
+    by_force : those of the poses whose depth is a forecast for a force, under which the object touches
     walls_touch : whether the finger's walls and ends may touch the object too
     """
 
@@ -47,6 +48,7 @@ class ContactPath:
     half_width_mm: float
     poses: tuple[ObjectPose, ...] = ()
     landmarks: Float | None = None
+    by_force: tuple[ObjectPose, ...] = ()
     walls_touch: bool = True
 
     def __post_init__(self) -> None:
@@ -201,7 +203,7 @@ def _stays_on_finger(way: ContactPath, first_contact_mm: float) -> None:
     """Raise an error if a turn takes the object off the finger."""
     points = _grid(way.half_length_mm, way.half_width_mm, _COARSE)
     for pose in way.poses:
-        turned = pose.is_turned and pose.depth_mm > 0.0
+        turned = pose.is_turned and pose.depth_mm > 0.0 and pose not in way.by_force
         if turned and not (_overlap(way.top, way.object, points, first_contact_mm, pose) > 0.0).any():
             x, y, z = np.degrees(pose.turns)
             raise Finger3dError(

@@ -44,7 +44,8 @@ _NEARER = (0.5, 0.25, 0.125)
 _SIMILAR = 0.5
 """Relative change of the depth up to which increments are similar."""
 
-_GRID = (81, 21)
+_GRADED = np.concatenate([[0.0], np.geomspace(1e-5, 1.0, 100)])
+"""Distances from the place of first touch at which the overlap is found for a forecast, over the finger's extent."""
 
 _BEYOND = 1.1
 """Depth reached, over its forecast, from which the contact may lie beyond the fine part of the mesh."""
@@ -275,29 +276,35 @@ def _passed_through(trial: Trial) -> Trial:
 def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: float, width: float) -> float:
     """Return a rough depth (mm) for a force (N): an elastic foundation under the overlap of object and finger.
 
-    Its modulus is E / (1 - nu^2), its thickness the finger's height or half the length of the overlap, if that is less.
+    Its modulus is E / (1 - nu^2).  Its thickness is 1.2 times the finger's height, or b max(1.2, log(2.8 l / b) - 0.5)
+    if that is less, with the half width b of the overlap and the finger's height l, or half the length of the overlap
+    if that is less and ends on the finger.  These are 1.2 times those that give the depth of a layer, and that of a
+    line contact (Johnson 1985, eq. 5.56).  In 13 presses of sections and solids the forecast was 0.75 to 2.3 times the
+    depth, in sections under round objects 0.9 to 1.1 times.
     It serves to mesh the contact and to choose candidate points; the press finds the depth.
     """
-    half_width = way.half_width_mm or 0.5 * width
-    x, z = np.meshgrid(
-        np.linspace(-way.half_length_mm, way.half_length_mm, _GRID[0]),
-        np.linspace(-half_width, half_width, _GRID[1]),
-        indexing="ij",
-    )
-    plan = 4.0 * way.half_length_mm * half_width / x.size
-    first_contact_mm = first_touch(way).height_mm
-    level = np.zeros_like(z) if way.half_width_mm == 0.0 else z
-    gap = PlacedObject.of(way.object, first_contact_mm, ObjectPose(0.0)).height(x, level) - way.top(x, level)
+    touch = first_touch(way)
+    lines = [
+        np.unique(np.clip(middle + np.outer([-1.0, 1.0], 2.0 * half * _GRADED), -half, half))
+        for half, middle in zip((way.half_length_mm, way.half_width_mm), touch.place, strict=True)
+    ]
+    x, z = np.meshgrid(*lines, indexing="ij")
+    weight = [0.5 * (np.diff(line, append=line[-1]) + np.diff(line, prepend=line[0])) for line in lines]
+    plan = np.outer(weight[0], weight[1] if way.half_width_mm else [width])
+    gap = PlacedObject.of(way.object, touch.height_mm, ObjectPose(0.0)).height(x, z) - way.top(x, z)
     gap = np.where(np.isfinite(gap), gap, np.inf)
     modulus = material.E_MPa / (1.0 - material.nu**2)
 
     def pressed(depth: float) -> float:
         overlap = np.maximum(depth - gap, 0.0)
-        inside = x[overlap > 0.0]
-        half = 0.5 * float(np.ptp(inside)) if len(inside) else 0.0
-        return modulus * float(overlap.sum()) * plan / max(min(height, half), 1e-3 * height)
+        inside = overlap > 0.0
+        halves = [0.5 * float(np.ptp(side[inside])) + 1e-6 * height if inside.any() else height for side in (x, z)]
+        ends = [half for half, most in zip(halves, (way.half_length_mm, way.half_width_mm), strict=True) if half < most]
+        b, length = min(ends, default=height), min(max(ends), height) if len(ends) == 2 else height
+        thickness = min(b * max(1.2, math.log(2.8 * length / b) - 0.5), 1.2 * height)
+        return modulus * float((overlap * plan).sum()) / thickness
 
-    most = deepest(way.object, first_contact_mm, height)
+    most = deepest(way.object, touch.height_mm, height)
     depth = brentq(lambda depth: pressed(depth) - force, 0.0, most) if pressed(most) > force else most
     return float(f"{depth:.4g}")
 
