@@ -7,12 +7,17 @@ import os
 import signal
 import sys
 import threading
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 _AGAIN_S = 0.02
-"""Time after which an interruption that fell into a callback is repeated."""
+"""Time after which an interruption that something has caught, or dropped, is repeated."""
+
+
+class Interruption(KeyboardInterrupt):
+    """An interruption, to which weak references can be made."""
 
 
 def _termination_signals() -> list[signal.Signals]:
@@ -22,32 +27,46 @@ def _termination_signals() -> list[signal.Signals]:
 
 @contextmanager
 def termination_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGTERM and SIGHUP within the block, unless they are ignored (``nohup``).
+    """Raise KeyboardInterrupt on Ctrl-C, SIGTERM and SIGHUP within the block, unless they are ignored (``nohup``).
 
-    Python prints and drops exceptions of callbacks of weak references and of ``__del__``. A KeyboardInterrupt among
-    them is raised again shortly afterwards.
+    A package may catch the exception and go on, as by a bare ``except`` or in C, and Python prints and drops those of
+    callbacks of weak references and of ``__del__``. An exception that has gone while the block still runs is raised
+    again shortly afterwards.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    names = [s for s in _termination_signals() if signal.getsignal(s) is signal.SIG_DFL]
-    before = sys.unraisablehook
+    signals = [signal.SIGINT, *_termination_signals()]
+    before = {s: old for s in signals if (old := signal.getsignal(s)) in (signal.SIG_DFL, signal.default_int_handler)}
+    hook, running = sys.unraisablehook, threading.Event()
+    raised: list[weakref.ref[Interruption]] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise new()  # a local variable would keep it alive by its traceback
+
+    def new() -> Interruption:
+        error = Interruption()
+        raised.append(weakref.ref(error, gone))
+        return error
+
+    def gone(reference: object) -> None:
+        threading.Timer(_AGAIN_S, lambda: _thread.interrupt_main() if running.is_set() else None).start()
 
     def unraisable(dropped: sys.UnraisableHookArgs) -> None:
-        if issubclass(dropped.exc_type, KeyboardInterrupt):
-            threading.Timer(_AGAIN_S, _thread.interrupt_main).start()
-        else:
-            before(dropped)
+        if not issubclass(dropped.exc_type, KeyboardInterrupt):
+            hook(dropped)
 
     sys.unraisablehook = unraisable
-    for name in names:
-        signal.signal(name, signal.default_int_handler)
+    running.set()
+    for name in before:
+        signal.signal(name, interrupt)
     try:
         yield
     finally:
-        for name in names:
-            signal.signal(name, signal.SIG_DFL)
-        sys.unraisablehook = before
+        running.clear()
+        for name, old in before.items():
+            signal.signal(name, old)
+        sys.unraisablehook = hook
 
 
 def interruption_ends_process() -> None:

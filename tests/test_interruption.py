@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import weakref
+from contextlib import suppress
 
 import pytest
 
@@ -48,6 +49,46 @@ def test_commands_run_outside_the_main_thread() -> None:
     assert done
 
 
+def wait() -> None:
+    end = time.monotonic() + 10.0
+    while time.monotonic() < end:
+        pass
+
+
+@pytest.mark.parametrize("converted", [False, True], ids=["caught", "turned into an ImportError"])
+def test_an_interruption_that_a_package_catches_is_raised_again(converted: bool) -> None:
+    def package() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException as error:
+            if converted:
+                raise ImportError from error
+
+    def work() -> None:
+        with suppress(ImportError):  # as where an extra is looked for
+            package()
+        wait()
+
+    with pytest.raises(KeyboardInterrupt), termination_interrupts():
+        work()
+
+
+def test_one_interruption_is_one_exception_while_what_is_done_is_kept() -> None:
+    """The exception lives while blocks end, however long that takes, and when the command has answered it is over."""
+    kept = False
+    with termination_interrupts():
+        try:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            finally:
+                time.sleep(0.1)
+                kept = True
+        except KeyboardInterrupt:
+            pass
+    time.sleep(0.1)
+    assert kept
+
+
 class Referent:
     """An object that can be referred to weakly."""
 
@@ -56,13 +97,11 @@ def test_an_interruption_in_a_callback_of_a_weak_reference_is_raised_again(capfd
     """As while a module is imported, whose lock is such a reference: Python prints the exception and drops it."""
 
     def interrupted(reference: object) -> None:
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
 
     def work() -> None:
         referents.clear()
-        end = time.monotonic() + 10.0
-        while time.monotonic() < end:
-            pass
+        wait()
 
     referents = [Referent()]
     reference = weakref.ref(referents[0], interrupted)
