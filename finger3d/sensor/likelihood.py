@@ -5,9 +5,10 @@ residual ``d = r - e(mu) - S z - C z^2 / 2`` of the forward model, the likelihoo
 H)``, where ``chi^2 = d^T D^-1 d + z^T z`` is the least over z, and ``H = 1 + J^T D^-1 J`` with ``J = S + C z`` is its
 Hessian by Gauss and Newton.  Without curvatures C this is the normal distribution with the covariance ``D + S S^T``.
 
-Normalised over the calibrated range the likelihood gives the mean of mu, its standard deviation, and the smallest set
-that holds 90 % (a credible set for a mu that may lie anywhere in the range).  Where the likelihood has several peaks,
-that set is several intervals, all of which are reported.
+The estimate is the mu with the least chi-square, so that a reading of the calibration curve gives the mu it is of.
+Normalised over the calibrated range the likelihood gives the standard deviation, the root mean square distance of mu
+from the estimate, and the smallest set that holds 90 % (a credible set for a mu that may lie anywhere in the range).
+Where the likelihood has several peaks, that set is several intervals, all of which are reported.
 
 The smallest chi-square of several readings of one press follows a chi-square distribution with one degree of freedom
 less than there are readings; that of a single reading is at most as large as with one degree of freedom. Readings with
@@ -56,7 +57,8 @@ class Estimate:
     Attributes
     ----------
     readings, stds : by name; the standard deviations of their noise
-    mu, std : mean and standard deviation; nan unless the status is "ok" or "coarse"
+    mu, std : with the least chi-square, and the root mean square distance of mu from it; nan unless the status is "ok"
+        or "coarse"
     low, high : ends of the 90 % set; 0 or infinite where it reaches an end of the calibrated range
     intervals : of the 90 % set, ascending
     status : ok; coarse: worse than the calibration's limit; ambiguous: several intervals; above, below: beyond the end
@@ -107,13 +109,20 @@ class _Likelihood:
         weight = self.density * width
         return np.asarray(weight / weight.sum())
 
-    @property
-    def mean(self) -> float:
-        return float(self.weight @ self.mu)
+    @cached_property
+    def best(self) -> float:
+        """Mu with the least chi-square, by a parabola through three values."""
+        i = int(np.argmin(self.chi_square))
+        if i in (0, len(self.mu) - 1):
+            return float(self.mu[i])
+        near = self.mu[i - 1 : i + 2] - self.mu[i]
+        c2, c1, _ = np.polyfit(near, self.chi_square[i - 1 : i + 2], 2)
+        return float(self.mu[i] + (np.clip(-0.5 * c1 / c2, near[0], near[2]) if c2 > 0.0 else 0.0))
 
     @property
     def std(self) -> float:
-        return math.sqrt(max(float(self.weight @ (self.mu - self.mean) ** 2), 0.0))
+        """Root mean square distance of mu from the best."""
+        return math.sqrt(float(self.weight @ (self.mu - self.best) ** 2))
 
     def reaches_ends(self, mu: Float) -> tuple[bool, bool]:
         """Return whether the first and the last calibrated mu are plausible: beyond them mu may lie as well."""
@@ -199,7 +208,7 @@ class Estimator:
         return Estimate(
             readings=dict(zip(c.names, map(float, reading), strict=True)),
             stds=dict(zip(c.names, map(float, self.noise), strict=True)),
-            mu=likelihood.mean if determined else math.nan,
+            mu=likelihood.best if determined else math.nan,
             std=likelihood.std if determined else math.nan,
             low=math.nan if none else 0.0 if below else intervals[0][0],
             high=math.nan if none else math.inf if above else intervals[-1][1],
@@ -229,8 +238,7 @@ class Estimator:
     def _status(self, likelihood: _Likelihood, p_value: float, intervals: int) -> Status:
         mu = self.model.mu
         if p_value < LEAST_P:
-            nearest = likelihood.mu[np.argmin(likelihood.chi_square)]
-            return "outside" if nearest in (mu[0], mu[-1]) or len(self.noise) == 1 else "contradiction"
+            return "outside" if likelihood.best in (mu[0], mu[-1]) or len(self.noise) == 1 else "contradiction"
         below, above = likelihood.reaches_ends(mu)
         if intervals > 1:
             return "ambiguous"
@@ -257,16 +265,15 @@ class Estimator:
             return self._contradiction(likelihood, reading, p_value)
         if status == "outside":
             or_else = "" if len(reading) == 1 else ", or they contradict each other"
-            nearest = int(np.argmin(likelihood.chi_square))
             return (
                 f"out of range: no mu from {first:g} to {last:g} has {these}{or_else}; the nearest, mu = "
-                f"{likelihood.mu[nearest]:.3g}, is {math.sqrt(likelihood.chi_square[nearest]):.2g} standard deviations "
-                f"away (p = {p_value:.1g})"
+                f"{likelihood.best:.3g}, is {math.sqrt(likelihood.chi_square.min()):.2g} standard deviations away "
+                f"(p = {p_value:.1g})"
             )
         if status == "ambiguous":
             return f"ambiguous: {ranges_text(intervals)} hold {100.0 * CREDIBLE:.0f} % of the likelihood"
         if status == "blind":
-            reductions = {name: float(values[0]) for name, values in self.model.reductions([likelihood.mean]).items()}
+            reductions = {name: float(values[0]) for name, values in self.model.reductions([likelihood.best]).items()}
             largest = max(reductions, key=lambda name: reductions[name])
             return (
                 f"out of range: every mu from {first:g} to {last:g} is plausible"
@@ -277,7 +284,7 @@ class Estimator:
             return f"out of range: mu > {low:.3g}, and the calibration ends at {last:g}"
         if status == "below":
             return f"out of range: mu < {high:.3g}, and the calibration begins at {first:g}"
-        text = f"mu = {likelihood.mean:.3g} +- {likelihood.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
+        text = f"mu = {likelihood.best:.3g} +- {likelihood.std:.2g} (90 % interval {low:.3g} to {high:.3g})"
         return text if status == "ok" else f"{text}: coarser than the limit of {self.limit:g}"
 
     def _contradiction(self, likelihood: _Likelihood, reading: Float, p_value: float) -> str:
