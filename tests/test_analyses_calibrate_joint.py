@@ -60,16 +60,16 @@ def test_a_place_is_a_tolerance_of_gauges_alone(joint: Calibration) -> None:
 
 
 def test_a_tilt_is_that_of_tilted_presses(joint: Calibration) -> None:
-    """The mirrored marker of one tilted body gives the reading of the other: its displacement along x turns around."""
-    model = scene(**SENSORS).model()
+    """By sqrt(3) deviations to both sides."""
+    model, tilt = scene(**SENSORS).model(), 0.5 * 3.0**0.5
     change = {}
     for sign in (1.0, -1.0):
-        tilted = replace(model, object=replace(model.object, tilt=sign * np.radians(0.5)), symmetry=())
+        tilted = replace(model, object=replace(model.object, tilt=sign * np.radians(tilt)), symmetry=())
         *_, last = march(build(replace(tilted, friction=tilted.friction.with_mu(0.6))))
         change[sign] = last.named_readings
     for one in joint.readings:
         expected = 0.5 * (change[1.0][one.name] - change[-1.0][one.name])
-        found = 0.5 * tolerance(one, "tilt_deg").slope[list(FEW).index(0.6)]
+        found = tilt * tolerance(one, "tilt_deg").slope[list(FEW).index(0.6)]
         # the meshes of the tilted bodies differ
         assert found == pytest.approx(expected, rel=0.3, abs=0.1 * abs(one.reading).max() * 0.05)
 

@@ -12,6 +12,7 @@ from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of, with_defaults
+from finger3d.analyses.press import press
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
@@ -19,6 +20,7 @@ from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
+from finger3d.sensor import estimate
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
 # --- calibration of a scene ------------------------------------------------------------------------------------------
@@ -27,7 +29,7 @@ from tests.sensor_cases import FEW, NONE, SCENE, scene
 def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     """Each slope against two presses of changed scenes, made from scratch."""
     found = calibrate(scene(), "g36", mus=FEW)
-    slopes = {t.name: t.slope for t in found.readings[0].tolerances}
+    slopes, node = {t.name: t.slope for t in found.readings[0].tolerances}, 3.0**0.5
     assert set(slopes) == set(TOLERANCES) - {"increments"}  # the path is exact
 
     def strain(mu: float, **changes: Any) -> float:
@@ -39,9 +41,9 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
 
     number, mu = 2, FEW[2]
     central = {
-        "nu": [(s, {"material": {"E_MPa": 1.0, "nu": 0.45 + s}}) for s in (0.0, -0.003)],
+        "nu": [(s, {"material": {"E_MPa": 1.0, "nu": 0.45 + s}}) for s in (0.003 * node, -0.003 * node)],
         "E_percent": [(s, {"material": {"E_MPa": 1.0 + 0.01 * s, "nu": 0.45}}) for s in (5.0, 0.0)],
-        "tilt_deg": [(s, {"object": {"shape": "plane", "tilt_deg": s}}) for s in (0.5, -0.5)],
+        "tilt_deg": [(s, {"object": {"shape": "plane", "tilt_deg": s}}) for s in (0.5 * node, -0.5 * node)],
         "gauge_x_mm": [(s, off("x_mm", s)) for s in (0.3, -0.3)],
         "gauge_y_mm": [(s, off("y_mm", s)) for s in (0.3, -0.3)],
         "gauge_angle_deg": [(s, off("angle_deg", s)) for s in (2.0, -2.0)],
@@ -53,6 +55,29 @@ def test_every_tolerance_is_the_difference_of_two_scenes() -> None:
     problem = build(scene().model())  # another depth by the same mesh: the zone that is meshed fine follows the depth
     deep = [ReducedModel.of(problem).press(mu, [Leg(10.0 + s, steps=4)]).steps[-1].gauges["g36"] for s in (0.1, -0.1)]
     assert slopes["depth_mm"][number] == pytest.approx((deep[0] - deep[1]) / 0.2, rel=1e-6)
+
+
+def test_readings_that_are_quadratic_in_the_tilt_do_not_contradict_each_other() -> None:
+    """Gauges near both edges of the contact: their strains change by opposite slopes and the same curvature."""
+    told: dict[str, Any] = {"mesh": {"size_mm": 1.0, "base_size_mm": 6.0, "mesher": "swept"}}
+    told["gauge"] = [
+        {**SCENE["gauge"][0], "name": n, "x_mm": s * 36.0, "angle_deg": s * 30.0}
+        for n, s in zip("ab", (1, -1), strict=True)
+    ]
+    made = calibrate(scene(**told), ["a", "b"], mus=np.linspace(0.05, 0.6, 8), tolerances=NONE | {"tilt_deg": 0.5})
+    tilts = [r.tolerances[0] for r in made.readings]
+    assert tilts[0].slope == pytest.approx(-tilts[1].slope, rel=1e-6)
+    assert tilts[0].curvature == pytest.approx(tilts[1].curvature, rel=1e-6)
+    pressed = press(scene(**told, object={"shape": "plane", "tilt_deg": 0.5}, friction={"mu": 0.4}), error=False)
+    (found,) = estimate(made, pressed.steps[-1].gauges)
+    assert found.status == "ok"
+    assert found.mu == pytest.approx(0.4, abs=0.03)
+    straight = [
+        replace(r, tolerances=(replace(t, curvature=0.0 * t.curvature),))
+        for r, t in zip(made.readings, tilts, strict=True)
+    ]
+    (without,) = estimate(replace(made, readings=tuple(straight)), pressed.steps[-1].gauges)
+    assert without.status == "contradiction"
 
 
 @pytest.mark.parametrize(("x", "y", "steps"), [(0.0, 0.0, (2, 1, 2)), (50.0, 0.0, (1, 1, 2)), (0.0, 20.0, (2, 2, 2))])

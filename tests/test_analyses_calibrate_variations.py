@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_tilt
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.solids.material import MIXED_FROM, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
@@ -58,17 +58,24 @@ def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:
     assert deeper(legs, 0.1)[1].slide_x_mm == 1.0
 
 
-@pytest.mark.parametrize(("nu", "sd", "step"), [(0.45, 0.01, -0.01), (0.005, 0.01, 0.01), (0.5, 0.01, -0.01)])
-def test_poissons_ratio_stays_in_its_range(nu: float, sd: float, step: float) -> None:
-    assert poisson_step(nu, sd) == step
-    assert 0.0 <= nu + step <= 0.5
+@pytest.mark.parametrize(
+    ("nu", "steps"),
+    [
+        (0.45, (-0.008, 0.008)), (0.49, (-0.008, 0.008)), (0.005, (0.008, 0.016)), (0.5, (-0.008, -0.016)),
+        (MIXED_FROM, (0.008, 0.016)), (MIXED_FROM - 0.001, (-0.008, -0.016)), (0.487, (0.0065, 0.013)),
+    ],
+)  # fmt: skip
+def test_poissons_ratio_keeps_its_range_and_its_element(nu: float, steps: tuple[float, float]) -> None:
+    assert poisson_steps(nu, 0.008) == pytest.approx(steps, rel=1e-6)
 
 
-def test_poissons_ratio_keeps_its_element_if_it_can() -> None:
-    from finger3d.fem.solids.material import MIXED_FROM
-
-    assert poisson_step(MIXED_FROM, 0.002) == 0.002
-    assert poisson_step(MIXED_FROM - 0.001, 0.002) == -0.002
+@pytest.mark.parametrize("soft", [False, True], ids=["rigid plane", "elastic plane"])
+def test_a_body_under_a_plane_of_another_tilt_is_the_body_built_with_it(soft: bool) -> None:
+    model = replace(COARSE, domain="plane-strain", object=Plane(tilt=0.02))
+    model = ElasticObject(10.0, 0.3).apply(model) if soft else model
+    *_, kept = march(with_tilt(build(model, margin=np.inf), -0.02))
+    *_, wanted = march(build(replace(model, object=replace(model.object, tilt=-0.02)), margin=np.inf))
+    assert kept.named_readings == pytest.approx(wanted.named_readings, rel=1e-7)
 
 
 def test_a_tilted_body_has_a_coarser_swept_mesh() -> None:

@@ -217,7 +217,7 @@ def test_without_readings_mu_is_known_as_before() -> None:
 
 @pytest.mark.parametrize("curvature", [-0.4, 0.4, 1.0])
 def test_a_tolerance_of_second_order_is_marginalised(curvature: float) -> None:
-    """Laplace's method against quadrature over the depth: the deviation within a twentieth; and the least chi-square."""
+    """Laplace's method against quadrature over the depth: deviations within a twentieth, and the least chi-square."""
     depth = tolerance("depth_mm", 0.1, 0.02, curvature)
     joint = together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
     noise, z, mu = joint.noise, np.linspace(-6.0, 6.0, 6001), np.linspace(0.02, 1.2, 400)

@@ -12,6 +12,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.analyses.pressed_body import PressesByMu, presses
 from finger3d.mechanics.discretise.companions import built_like
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
@@ -58,9 +59,10 @@ class ReferenceBody:
         """Return the changes (k, m) of the readings in another body or path; `initial` has the initial guesses."""
         return np.asarray(read(problem, self.names, self.mu, initial or self.pressed) - self.readings)
 
-    def rebuilt(self, **changes: Any) -> Problem:
+    def rebuilt(self, margin: float = MARGIN, **changes: Any) -> Problem:
         """Build the body with a changed model; other readings are omitted, except gauges that stiffen the body."""
-        return built_like(self.problem, replace(reading_only(self.problem.model, self.names), **changes))
+        model = replace(reading_only(self.problem.model, self.names), **changes)
+        return built_like(self.problem, model, margin=margin)
 
 
 def reading_only(model: Model, names: Sequence[str]) -> Model:

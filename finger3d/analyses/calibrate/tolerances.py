@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -22,13 +22,14 @@ from scipy.interpolate import PchipInterpolator
 from finger3d._types import Float
 from finger3d.accuracy.estimate import reading_error
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
-from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read, reading_only
+from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_tilt
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.companions import companion
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
@@ -42,6 +43,11 @@ from finger3d.sensor.curve import LARGEST_SD, Tolerance
 _LEAST_POINTS = {2: 150, 3: 500}
 """Least number of contact points, by dimension, for which differences on the coarser mesh are accurate enough: within a
 fifth of the largest."""
+
+_NODE = math.sqrt(3.0)
+"""Step of a difference over the standard deviation: a node of Gauss-Hermite quadrature of three points, with which a
+parabola has the mean and variance of the reading to fourth order, and contact points that close one by one matter
+little."""
 
 _CLEAR_MM = 1e-6
 """Distance from the border at which a displaced gauge is certainly in the mesh."""
@@ -221,75 +227,51 @@ def _gauges(model: Model, readings: Sequence[CalibratedReading]) -> list[tuple[i
 
 
 def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Press deeper, and less deep by at most half the depth of the shallowest leg.
-
-    Between the nodes of Gauss-Hermite quadrature of three points the parabola has the mean and variance of the reading
-    to fourth order, and contact points that close one by one matter little.
-    """
+    """Press deeper, and less deep by at most half the depth of the shallowest leg."""
     problem, model = body.problem, body.problem.model
-    shallowest, node = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0), math.sqrt(3.0) * sd
+    shallowest, node = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0), _NODE * sd
     for step in (node, -min(node, 0.5 * shallowest)):
         legs = deeper(model.legs, step)
         yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Raise Young's modulus; where all forces are proportional to it, pressures alone depend on it."""
+    """Raise and lower Young's modulus; where all forces are proportional to it, pressures alone depend on it."""
     if body.problem.model.forces_scale_with_modulus:
         is_pressure = np.array([r.kind == "taxel" for r in readings])
         yield sd, 0.01 * sd * np.where(is_pressure[:, None], body.readings, 0.0)
     else:
-        yield sd, body.change(with_modulus(body.problem, 1.0 + 0.01 * sd))
+        for step in (_NODE * sd, -min(_NODE * sd, 50.0)):
+            yield step, body.change(with_modulus(body.problem, 1.0 + 0.01 * step))
 
 
 def _vary_poisson(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Lower Poisson's ratio, or raise it if lowering leaves its range or changes the element."""
+    """Lower and raise Poisson's ratio."""
     material = body.problem.model.material.isotropic("the tolerance of nu")
-    step = poisson_step(material.nu, sd)
-    yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
+    for step in poisson_steps(material.nu, _NODE * sd):
+        yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
 
 
 def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
-    """Tilt a plane by plus and minus `sd`; in a symmetric scene, mirrored sensors replace the second tilt.
+    """Tilt a plane to both sides.
 
-    Tilted bodies are compared with each other, because their mesh, without symmetry, is not that of the body.
+    Readings are compared on one mesh without symmetry, whose candidate points suffice for both tilts.
     """
-    problem, model = body.problem, body.problem.model
-    if not isinstance(model.object, Plane):
+    problem, plane = body.problem, body.problem.model.object
+    if not isinstance(plane, Plane):
         return
-    plane, step, mesh = model.object, math.radians(sd), tilted_mesh(problem)
-    if "x" in problem.axes and not model.inclusions:
-        images, names, signs = _mirrored(reading_only(model, body.names), body.names)
-        tilted = body.rebuilt(mesh=mesh, object=replace(plane, tilt=step), symmetry=None, **images)
-        both = read(tilted, (*body.names, *names), body.mu)
-        plus, minus = both[: len(names)], signs[:, None] * both[len(names) :]
-    else:
-        plus, minus = (
-            read(
-                body.rebuilt(mesh=mesh, object=replace(plane, tilt=plane.tilt + sign * step), symmetry=None),
-                body.names,
-                body.mu,
-            )
-            for sign in (1.0, -1.0)
-        )
-    half = 0.5 * (plus - minus)
-    yield sd, half
-    yield -sd, -half
-
-
-def _mirrored(model: Model, names: Sequence[str]) -> tuple[dict[str, tuple[Any, ...]], tuple[str, ...], Float]:
-    """Return the sensors of a model and their mirror images, the names of mirrored readings, and their signs."""
-    dim = 3 if model.domain == "solid" else 2
-    image_of: dict[str, tuple[str, float]] = {}
-    sensors: dict[str, tuple[Any, ...]] = {}
-    for kind in ("gauges", "markers", "taxels"):
-        own = getattr(model, kind)
-        images = [sensor.mirrored(f"{sensor.name} mirrored") for sensor in own]
-        sensors[kind] = (*own, *(image for image, _ in images))
-        for sensor, (image, signs) in zip(own, images, strict=True):
-            columns = zip(sensor.columns(dim), image.columns(dim), signs, strict=False)
-            image_of |= {column.name: (reflected.name, sign) for column, reflected, sign in columns}
-    return sensors, tuple(image_of[n][0] for n in names), np.array([image_of[n][1] for n in names])
+    node = math.copysign(_NODE * sd, plane.tilt)
+    step = math.radians(node)
+    lifted = 2.0 * abs(step) * float(np.abs(problem.points.points[:, 0]).max())
+    tilted = body.rebuilt(
+        margin=MARGIN + lifted / problem.model.largest_depth_mm,
+        mesh=tilted_mesh(problem),
+        object=replace(plane, tilt=plane.tilt + step),
+        symmetry=None,
+    )
+    away, own, back = (read(with_tilt(tilted, plane.tilt + turn), body.names, body.mu) for turn in (step, 0.0, -step))
+    yield node, away - own
+    yield -node, back - own
 
 
 def _vary_stiff_gauge(

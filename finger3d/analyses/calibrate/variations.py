@@ -23,10 +23,14 @@ def deeper(legs: tuple[Leg, ...], step: float) -> tuple[Leg, ...]:
     return tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in legs)
 
 
-def poisson_step(nu: float, sd: float) -> float:
-    """Return -sd, or sd if a lower Poisson's ratio leaves its range or changes the element."""
-    changes_element = nu - sd < MIXED_FROM <= nu
-    return sd if nu - sd < 0.0 or (changes_element and nu + sd <= 0.5) else -sd
+def poisson_steps(nu: float, step: float) -> tuple[float, float]:
+    """Return two steps of Poisson's ratio of the same element: to both sides, or one and two to the side with room."""
+    low, high = (MIXED_FROM, 0.5) if nu >= MIXED_FROM else (0.0, MIXED_FROM - 1e-9)
+    if low <= nu - step and nu + step <= high:
+        return -step, step
+    room = max(high - nu, low - nu, key=abs)
+    step = math.copysign(min(step, 0.5 * abs(room)), room)
+    return step, 2.0 * step
 
 
 def with_modulus(problem: Problem, factor: float) -> Problem:
@@ -58,6 +62,17 @@ def with_modulus(problem: Problem, factor: float) -> Problem:
 def _stiffer(material: Material, factor: float) -> Isotropic:
     isotropic = material.isotropic("the tolerance of E_MPa")
     return replace(isotropic, E_MPa=isotropic.E_MPa * factor)
+
+
+def with_tilt(problem: Problem, tilt: float) -> Problem:
+    """Return the problem under a plane of another tilt (rad); under a rigid one its body is kept."""
+    model, bare = problem.model, problem.without_inclusions
+    model = replace(model, object=replace(model.object, tilt=tilt))
+    if model.object_compliance is not None:
+        return build(model)
+    touch = model.first_contact
+    system = replace(problem.system, first_contact_mm=touch.first_contact_mm, place_mm=touch.place)
+    return replace(problem, model=model, system=system, without_inclusions=with_tilt(bare, tilt) if bare else None)
 
 
 def tilted_mesh(problem: Problem) -> MeshOptions:

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.accuracy.richardson import ORDERS, Kind, gain
-from finger3d.analyses.calibrate.variations import deeper, poisson_step, tilted_mesh, with_modulus
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.fem.recovery.recover import displacement
 from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
@@ -180,7 +180,7 @@ def _modulus(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect | 
 def _nu(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
     """Return the effect of raising Poisson's ratio."""
     material = nominal.problem.model.material.isotropic("the tolerance of nu")
-    step = poisson_step(material.nu, sd)
+    step, _ = poisson_steps(material.nu, sd)
     model = replace(nominal.problem.model, material=replace(material, nu=material.nu + step))
     other = StrainField.of(built_like(nominal.problem, model), mus)
     sign = math.copysign(1.0, step)

@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.fem.surface.traces import contact_face, surface
-from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.build import MARGIN, build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import MeshOptions, Model
@@ -184,11 +184,11 @@ def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], r
     return beside if enough(edge_ratio(problem, beside)) else None
 
 
-def built_like(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
+def built_like(problem: Problem, model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
     """Return another model condensed, onto its whole contact face if the problem keeps its whole contact face."""
     face = surface(problem.mesh, "contact", problem.body.thickness)
     everything = len(face.nodes) == len(contact_face(problem.surface).nodes)
-    return build(model, report, margin=math.inf) if everything else build(model, report)
+    return build(model, report, margin=math.inf if everything else margin)
 
 
 def edge_ratio(problem: Problem, beside: Problem) -> float:
