@@ -21,6 +21,7 @@ SCENE: dict[str, Any] = {
     "press": {"depth_mm": 10.0, "steps": 4},
     "model": {"domain": "plane-strain"},
     "mesh": {"size_mm": 3.0, "base_size_mm": 10.0, "mesher": "swept"},
+    "effects": {"auto": False},
     "gauge": [
         {"name": "g36", "x_mm": 36.0, "y_mm": 40.0, "angle_deg": 30.0},
         {"name": "long", "x_mm": 30.0, "y_mm": 38.0, "angle_deg": 10.0, "length_mm": 4.0},

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_tilt
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_plane
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -73,8 +73,8 @@ def test_poissons_ratio_keeps_its_range_and_its_element(nu: float, steps: tuple[
 def test_a_body_under_a_plane_of_another_tilt_is_the_body_built_with_it(soft: bool) -> None:
     model = replace(COARSE, domain="plane-strain", object=Plane(tilt=0.02))
     model = ElasticObject(10.0, 0.3).apply(model) if soft else model
-    *_, kept = march(with_tilt(build(model, margin=np.inf), -0.02))
-    *_, wanted = march(build(replace(model, object=replace(model.object, tilt=-0.02)), margin=np.inf))
+    *_, kept = march(with_plane(build(model, margin=np.inf), Plane(tilt=-0.02)))
+    *_, wanted = march(build(replace(model, object=Plane(tilt=-0.02)), margin=np.inf))
     assert kept.named_readings == pytest.approx(wanted.named_readings, rel=1e-7)
 
 

@@ -25,7 +25,7 @@ from finger3d.analyses.calibrate.increments import Increments, error_of_incremen
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_tilt
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_plane
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.companions import companion
@@ -269,7 +269,8 @@ def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: f
         object=replace(plane, tilt=plane.tilt + step),
         symmetry=None,
     )
-    away, own, back = (read(with_tilt(tilted, plane.tilt + turn), body.names, body.mu) for turn in (step, 0.0, -step))
+    planes = (replace(plane, tilt=plane.tilt + turn) for turn in (step, 0.0, -step))
+    away, own, back = (read(with_plane(tilted, one), body.names, body.mu) for one in planes)
     yield node, away - own
     yield -node, back - own
 

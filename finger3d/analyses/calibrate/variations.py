@@ -13,6 +13,7 @@ from finger3d.fem.solvers.condense import stiffened
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points, under_pressure
 from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.objects import Plane
 
 _TILTED_POINTS = {2: 100, 3: 500}
 """Contact points, by dimension, that the mesh of a tilted body has about."""
@@ -64,15 +65,14 @@ def _stiffer(material: Material, factor: float) -> Isotropic:
     return replace(isotropic, E_MPa=isotropic.E_MPa * factor)
 
 
-def with_tilt(problem: Problem, tilt: float) -> Problem:
-    """Return the problem under a plane of another tilt (rad); under a rigid one its body is kept."""
-    model, bare = problem.model, problem.without_inclusions
-    model = replace(model, object=replace(model.object, tilt=tilt))
+def with_plane(problem: Problem, plane: Plane) -> Problem:
+    """Return the problem under another plane; under a rigid one its body is kept."""
+    model, bare = replace(problem.model, object=plane), problem.without_inclusions
     if model.object_compliance is not None:
         return build(model)
     touch = model.first_contact
     system = replace(problem.system, first_contact_mm=touch.first_contact_mm, place_mm=touch.place)
-    return replace(problem, model=model, system=system, without_inclusions=with_tilt(bare, tilt) if bare else None)
+    return replace(problem, model=model, system=system, without_inclusions=with_plane(bare, plane) if bare else None)
 
 
 def tilted_mesh(problem: Problem) -> MeshOptions:
