@@ -32,7 +32,7 @@ NONE = dict.fromkeys(TOLERANCES, 0.0)
 
 
 def scene(**changes: Any) -> Any:
-    return parse({**SCENE, **changes})
+    return parse({**SCENE, **changes, "effects": SCENE["effects"] | changes.get("effects", {})})
 
 
 def curve(function: Any, **changes: Any) -> Calibration:
