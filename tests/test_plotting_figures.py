@@ -17,7 +17,6 @@ from finger3d.plotting.figures import (
     map_figure,
     marker_figure,
     middle_line,
-    path_figure,
     zones,
 )
 from tests.commands import loaded
@@ -110,16 +109,13 @@ def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
     assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
 
 
-def test_forces_are_drawn_against_depth_and_against_the_slides_that_there_are(tmp_path: Path) -> None:
-    table = {
-        "depth_mm": [0.5, 1.0, 1.0], "slide_x_mm": [0.0, 0.0, 0.4], "slide_z_mm": [0.0] * 3,
-        "normal_force_N": [1.0, 2.0, 2.1], "friction_sum_N": [0.2, 0.4, 0.6],
-        "tangential_force_x_N": [0.0, 0.0, 0.5], "tangential_force_z_N": [1e-12] * 3,
-    }  # fmt: skip
-    path_figure(tmp_path / "slid.png", table)
-    path_figure(tmp_path / "pressed.png", {**table, "slide_x_mm": [0.0] * 3})
-    assert pixels(tmp_path / "slid.png").shape[1] == 2 * pixels(tmp_path / "pressed.png").shape[1]
-    assert share(tmp_path / "slid.png", "#2c5f9e", within=0.05) > 1e-4
+def test_forces_are_drawn_against_the_slides_that_there_are(tmp_path: Path) -> None:
+    slid = [{**step, "slide_x_mm": 0.1 * k, "slide_z_mm": 0.0, "tangential_force_z_N": 1e-12 * k}
+            for k, step in enumerate(STEPS)]  # fmt: skip
+    force_figure(tmp_path / "slid.png", slid)
+    force_figure(tmp_path / "pressed.png", STEPS)
+    high, low = (pixels(tmp_path / name).shape[0] for name in ("slid.png", "pressed.png"))
+    assert high == 2 * low
     assert share(tmp_path / "slid.png", "#3c8d4f", within=0.05) == 0.0  # round-off along z
 
 

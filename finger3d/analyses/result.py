@@ -39,12 +39,7 @@ class Picture:
             temporary.write_bytes(self.png)
 
 
-_NEEDED = {
-    "history": ("depth_mm", "slide_x_mm", "slide_z_mm", "normal_force_N", "friction_sum_N"),
-    "contact": ("face", "x_mm", "z_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa", "status"),
-    "markers": ("step", "marker"),
-}
-"""Tables of a press, and the columns that must be in each."""
+_TABLES = ("history", "contact", "markers")
 
 
 def load(path: str | Path, overrides: Iterable[str] = ()) -> Any:
@@ -103,10 +98,7 @@ def result_in(
             f"{folder / 'summary.json'}: its steps are damaged, or of another version of finger3d ({error}); press "
             f"{folder}/scene.toml again"
         ) from None
-    tables = {name: read_columns(folder / f"{name}.csv") for name in _NEEDED}
-    for name, table in tables.items():
-        if table and (missing := [column for column in _NEEDED[name] if column not in table]):
-            raise Finger3dError(f"{folder / name}.csv: has no column {missing[0]}; press {folder}/scene.toml again")
+    tables = {name: read_columns(folder / f"{name}.csv") for name in _TABLES}
     return PressResult(folder, history, numbers, tables, temporary)
 
 
@@ -224,11 +216,11 @@ class PressResult:
         return _picture(contact_figure, table, mu, points.band_mm, points.half_width_mm if points.dim == 3 else None)
 
     def plot_forces(self) -> Picture:
-        """Draw normal force and friction against depth, and against the slides of the object."""
-        from finger3d.plotting.figures import path_figure
+        """Draw forces, and half the extents of contact and stick zone, against depth and slides of the object."""
+        from finger3d.plotting.figures import force_figure
 
         self._contact()
-        return _picture(path_figure, self._tables["history"])
+        return _picture(force_figure, [step for step in self._numbers["steps"] if step["outcome"] == "converged"])
 
     def plot_map(self) -> Picture:
         """Draw a flat map of the contact face in the last good increment: pressure, friction, and stick and slip.
@@ -293,5 +285,8 @@ class PressResult:
 def _picture(draw: Callable[..., None], *arguments: object) -> Picture:
     with TemporaryDirectory(prefix="finger3d-") as folder:
         path = Path(folder) / "picture.png"
-        draw(path, *arguments)
+        try:
+            draw(path, *arguments)
+        except KeyError as error:
+            raise Finger3dError(f"the results have no column {error} for a picture; press the scene again") from None
         return Picture(path.read_bytes())

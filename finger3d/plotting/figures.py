@@ -26,7 +26,6 @@ _MOST_MARKERS = 40  # increments that are marked on a curve
 _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
-_FORCE_COLOURS = ("#222222", "#c0392b", "#2c5f9e", "#3c8d4f")
 _NO_FORCE = 1e-6  # share of the normal force below which a force is not drawn: round-off
 
 _MAP_MARGINS, _MOST_ASPECT = (0.8, 1.1, 0.55, 0.45), 1.6  # of a flat map: inches; height over width, or the inverse
@@ -117,9 +116,7 @@ def contact_figure(
 
 
 def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> None:
-    """Draw forces (N) and half the extents (mm) of the contact and the stick zone against depth (mm).
-
-    If the object slides, the length of its path (mm) since first contact replaces the depth.
+    """Draw forces (N) and half extents (mm) of contact and stick zone against depth and, if there are any, slides (mm).
 
     Parameters
     ----------
@@ -128,55 +125,36 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> Non
     """
 
     def values(key: str) -> Float:
-        return np.array([step[key] for step in steps], dtype=np.float64)
+        return np.array([step.get(key, 0.0) for step in steps], dtype=np.float64)
 
-    depth = values("depth_mm")
-    at = np.array(
-        [[step["depth_mm"], step.get("slide_x_mm", 0.0), step.get("slide_z_mm", 0.0)] for step in steps],
-        dtype=np.float64,
-    )
-    slides = bool(np.any(at[:, 1:] != 0.0))
-    if slides:
-        depth = np.cumsum(np.linalg.norm(np.diff(at, axis=0, prepend=0.0), axis=1))
-    made = sheet(2, 2, (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
-    left, right = made.axes
-    marked = len(depth) <= _MOST_MARKERS
-    dot, square = ("o-", "s-") if marked else ("-", "-")
-    left.plot(depth, values("normal_force_N"), dot, color="#222222", ms=4, label="normal force")
-    left.plot(depth, values("friction_sum_N"), square, color="#c0392b", ms=4, label="sum of |friction|")
-    left.set_ylabel("force (N)")
-    right.plot(depth, values("contact_half_length_mm"), dot, color="#555555", ms=4, label="contact")
-    right.plot(depth, values("stick_half_length_mm"), square, color=COLOURS[STICK], ms=4, label="stick")
-    right.set_ylabel("half extent along x at z = 0 (mm)")
-    for axes in (left, right):
-        axes.set_xlabel("path length of the object (mm)" if slides else "depth (mm)")
-        axes.set_xlim(left=float(depth.min(initial=0.0)))
-        axes.set_ylim(bottom=0.0, top=1.15 * axes.get_ylim()[1])  # room for the legend
-        finish(axes, loc="upper left")
-    made.save(path)
-
-
-def path_figure(path: str | Path, table: Mapping[str, ArrayLike]) -> None:
-    """Draw normal force and friction (N) against depth and, if the object slides, against its slides (mm).
-
-    Parameters
-    ----------
-    path : PNG file to write
-    table : columns of history.csv
-    """
-    slides = {f"slide_{axis}_mm": f"slide of the object along {axis} (mm)" for axis in "xz"}
-    against = {"depth_mm": "depth (mm)", **{name: text for name, text in slides.items() if np.any(table[name])}}
-    normal = _column(table, "normal_force_N")
-    forces = {"normal force": normal, "sum of |friction|": _column(table, "friction_sum_N")}
-    forces |= {f"net friction along {axis}": _column(table, f"tangential_force_{axis}_N") for axis in "xz"}
-    made = sheet(len(against), len(against), (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
-    mark = "o" if len(normal) <= _MOST_MARKERS else ""
-    for axes, (name, text) in zip(made.axes, against.items(), strict=True):
-        for (label, values), colour in zip(forces.items(), _FORCE_COLOURS, strict=True):
-            if np.abs(values).max() > _NO_FORCE * np.abs(normal).max():
-                axes.plot(_column(table, name), values, f"{mark}-", color=colour, ms=4, label=label)
-        axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the legend
-        finish(axes, text, "force on the finger (N)", loc="upper left", ncols=2)
+    names = {"depth_mm": "depth (mm)"} | {
+        f"slide_{axis}_mm": f"slide of the object along {axis} (mm)"
+        for axis in "xz"
+        if values(f"slide_{axis}_mm").any()
+    }
+    normal = values("normal_force_N")
+    rows = {
+        "force on the finger (N)": [
+            ("normal force", "#222222", normal),
+            ("sum of |friction|", "#c0392b", values("friction_sum_N")),
+            ("net friction along x", "#2c5f9e", values("tangential_force_x_N")),
+            ("net friction along z", "#3c8d4f", values("tangential_force_z_N")),
+        ],
+        "half extent along x at z = 0 (mm)": [
+            ("contact", "#555555", values("contact_half_length_mm")),
+            ("stick", COLOURS[STICK], values("stick_half_length_mm")),
+        ],
+    }
+    made = sheet(2 * len(names), max(2, len(names)), (WIDEST, 4.4), (0.8, 0.15, 0.55, 0.15))
+    cells = [(name, unit) for unit in rows for name in names]
+    mark = "o-" if len(steps) <= _MOST_MARKERS else "-"
+    for axes, (name, unit) in zip(made.axes, cells, strict=True):
+        for label, colour, curve in rows[unit]:
+            if len(rows[unit]) == 2 or np.abs(curve).max() > _NO_FORCE * np.abs(normal).max():
+                axes.plot(values(name), curve, mark, color=colour, ms=4, label=label)
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, 0.0), 1.25 * high)  # room for the legend
+        finish(axes, names[name], unit, loc="upper left", ncols=2)
     made.save(path)
 
 

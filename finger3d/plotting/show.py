@@ -138,18 +138,10 @@ def show(
 
     states, title, gauges = found(folder)
     if png is not None:
-        save(frames(states, [_number(folder, states, step)], title, gauges)[0], png)
+        k = len(states.step) - 1 if step is None else states.index(step, folder)
+        save(frames(states, [k], title, gauges)[0], png)
     if gif is not None:
         write_gif(gif, frames(states, range(len(states.step)), title, gauges))
-
-
-def _number(folder: str | Path, states: States, step: int | None) -> int:
-    kept: Sequence[int] = states.step.tolist()
-    if step is None:
-        return len(kept) - 1
-    if step not in kept:
-        raise Finger3dError(f"{folder}: increment {step} is not among the kept ones: {', '.join(map(str, kept))}")
-    return kept.index(step)
 
 
 def show_window(folder: str | Path) -> None:

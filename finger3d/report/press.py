@@ -36,7 +36,7 @@ _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
     "contact.png": "Traction on the finger along x, with the friction limit and the stick and slip zones",
     "markers.png": "Displacements of the markers",
-    "force.png": "Forces, and half the extents of contact and stick zone along x, against depth",
+    "force.png": "Forces, and half the extents of contact and stick zone along x, against depth and slides",
 }
 
 _STEP_COLUMNS = {

@@ -89,6 +89,19 @@ class States:
         """Largest abs(z) of a solid, 0 of a section."""
         return float(np.abs(self.points[:, 2:]).max(initial=0.0))
 
+    def index(self, step: int, folder: str | Path) -> int:
+        """Return the place of a step, which is counted from 1, among those that are kept in a folder.
+
+        Raises
+        ------
+        Finger3dError
+            If it is not among them.
+        """
+        kept: list[int] = self.step.tolist()
+        if step not in kept:
+            raise Finger3dError(f"{folder}: increment {step} is not among the kept ones: {', '.join(map(str, kept))}")
+        return kept.index(step)
+
     @property
     def corners(self) -> Array:
         """Corners (t, d) of the boundary's facets, oriented outward."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
@@ -93,19 +93,9 @@ def grid(folder: str | Path, step: int | None = None) -> pyvista.UnstructuredGri
     if step is None:
         return found
     states = load_states(Path(folder) / "steps.npz")
-    kept = states.step.tolist()
-    if step not in kept:
-        raise Finger3dError(f"{folder}: increment {step} is not among the kept ones, {', '.join(map(str, kept))}")
+    k = states.index(step, folder)
     found.point_data.clear()
-    k, flat = kept.index(step), states.dim == 2
-    u = states.displacement[k]
-    found["displacement"] = u if not flat else _with_zeros(u)
+    found["displacement"] = np.pad(states.displacement[k], [(0, 0), (0, 3 - states.dim)])
     for name in ("pressure", "shear_x", "shear_z", "status"):
         found[name] = states.on_points(name, k)
     return found
-
-
-def _with_zeros(u: Any) -> Any:
-    import numpy as np
-
-    return np.pad(u, [(0, 0), (0, 1)])
