@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._extras import require
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import MissingError
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.readings.gauges import Gauge
