@@ -4,7 +4,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --constraint constraints.txt
 
-.PHONY: install install-dev demo docs bench validate test test-all test-browser test-wheel coverage lint clean
+.PHONY: install install-dev demo docs quoted bench validate test test-all test-browser test-wheel coverage lint clean
 
 # What a press needs, and what developers need besides. The stamps are younger than what they were made from, so nothing
 # is installed twice.
@@ -61,6 +61,10 @@ test-wheel: install-dev
 # Lines of the package that the quick tests run, child processes included.
 coverage: install-dev
 	$(PYTEST) -m "not slow and not browser" --cov --cov-report=term:skip-covered
+
+# Tables of README.md and docs/ that commands print.
+quoted: install-dev
+	$(BIN)/python docs/_quoted.py
 
 # Takes both cores and a quarter of an hour; every row says how busy the machine was.
 bench: install-dev

@@ -172,7 +172,7 @@ class MeshTable(TomlTable):
     size_mm : edge length at the contact
     base_size_mm : edge length far from it
     gauge_refinement : edge length at the contact over that around gauges and on the contact face close to them; 1:
-        gauges do not change the mesh
+        gauges do not change the mesh; absent: 2 in a solid without sizes, else 1
     stick_refinement : in a press, edge length at the contact over that at the border of stick, which a press on the
         coarser mesh finds; absent: 3.5 in a solid without sizes, with friction, in small strain at given depths, else 1
     mesher : fTetWild; netgen, the same on every run, for CAD; or structured, for extruded designs
@@ -184,7 +184,7 @@ class MeshTable(TomlTable):
 
     size_mm: Edge | None = None
     base_size_mm: Edge | None = None
-    gauge_refinement: Annotated[float, Ge(1), Le(100)] = 1.0
+    gauge_refinement: Annotated[float, Ge(1), Le(100)] | None = None
     stick_refinement: Annotated[float, Ge(1), Le(16)] | None = None
     mesher: Mesher = "ftetwild"
     tolerance: Annotated[float, Ge(1e-6), Lt(1)] | None = None
