@@ -175,11 +175,12 @@ def test_the_table_of_the_readme_is_what_cost_prints(root: Path) -> None:
         [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
         for text in (quoted["parts"]("README.md")[1], quoted["cost_table"]())
     )
-    assert [line[0] for line in told] == [line[0] for line in now]
     assert told[:2] == now[:2]
-    # error bars on two meshes of fTetWild differ by up to a factor of 2: edges for an error by its power 1 / 1.2, unknowns
-    # by the third power of these; on one edge length the unknowns differ by 0.8 to 1.2.  Seconds are of the machine
-    for before, after in zip(told[2:], now[2:], strict=True):
+    both = [(before, after) for before in told[2:] for after in now[2:] if before[0] == after[0]]
+    assert len(both) >= 2  # the smallest errors fit into memory or not
+    # error bars on two meshes of fTetWild differ by up to a factor of 2, edges for an error by its power 1 / 1.2, and
+    # unknowns by the third power of these; on one edge length the unknowns differ by 0.8 to 1.2
+    for before, after in both:
         edges, unknowns = (1.0, 1.3) if before[0] == "default" else (1.8, 6.0)
         for column, factor in {1: edges, 2: unknowns, 5: 2.0, 6: 2.0, 7: 2.0}.items():
             one, other = (re.findall(r"[\d.]+", row[column].replace(" ", "")) for row in (before, after))
