@@ -49,8 +49,8 @@ _LEAST_BARS_S, _BARS_SHARE, _USUAL_SHARE = 0.7, 0.7, 0.15
 those that the estimated effect of large deformation usually takes, over the largest."""
 
 _COMPANIONS = 0.7
-"""Seconds of three companions at large deformation, and of the runs that choose the increments, over those of the press:
-they have 0.35, 0.13 and 0.02 of its unknowns in solids, and that with 0.13 runs twice."""
+"""Seconds of three companions at large deformation, and of the runs that choose increments, over those of the press.
+They have 0.35, 0.13 and 0.02 of its unknowns in solids, and that with 0.13 runs twice."""
 
 _SOLUTIONS = 5
 """Contact solutions of an increment in small strain under an object that is not flat, whose normals change.
