@@ -16,13 +16,13 @@ from typing import IO, TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from finger3d.cli.common import Json, app, print_json
-from finger3d.csv_table import CsvTable, decoded, is_row, read_table, with_names
 from finger3d.errors import Finger3dError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from finger3d._types import Float, Tree
+    from finger3d.csv_table import CsvTable
     from finger3d.sensor import Calibration, Estimate
 
 _POLL_S = 0.02
@@ -115,6 +115,8 @@ def estimate(
 
 def _estimate_file(job: _Job, path: Path, out: Path | None, json_: bool) -> None:
     """Write or print an estimate for each line of a CSV file."""
+    from finger3d.csv_table import read_table  # loads NumPy, which --help can do without
+
     table = read_table(path, job.is_column)
     job.check_columns(table)
     readings, stds = job.readings_in(table)
@@ -245,6 +247,8 @@ def _followed(job: _Job, source: str) -> Iterator[str]:
 
     A line that is no reading is answered with the reason, so that it does not stop a robot.
     """
+    from finger3d.csv_table import decoded, is_row, with_names
+
     yield _csv_line(job.columns)
     head, table, number = list[str](), None, 0
     for content in _written_lines(source):

@@ -64,23 +64,19 @@ def checked_tets(design: Design, field: Sizing, options: MeshSizes) -> float:
 
 def check_rows(contact: int, readings: int) -> None:
     """Raise a Finger3dError if the dense compliance of the condensed rows is estimated to need too much memory."""
-    need, have = rows_gb(contact + readings), _machine_gb()
-    if need > MEMORY_SHARE * have:
-        cure = "fewer gauges and markers" if readings > contact else "a larger mesh.size_mm"
-        raise Finger3dError(
-            f"mesh.size_mm: {contact} rows of contact points and {readings} of readings are condensed to, forecast "
-            f"{need:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; choose {cure}"
-        )
+    rows = f"{contact} rows of contact points and {readings} of readings"
+    cure = "fewer gauges and markers" if readings > contact else "a larger mesh.size_mm"
+    check_memory(rows_gb(contact + readings), f"mesh.size_mm: {rows} are condensed to", cure)
 
 
-def check_memory(need_gb: float, what: str) -> None:
-    """Raise a Finger3dError if a press is estimated to need too much memory."""
+def check_memory(
+    need_gb: float, what: str, cure: str = "a larger mesh.size_mm, fewer increments or fewer gauges"
+) -> None:
+    """Raise a Finger3dError, which names a cure, if something is estimated to need too much memory."""
     have = _machine_gb()
     if need_gb > MEMORY_SHARE * have:
-        raise Finger3dError(
-            f"{what}: forecast {need_gb:.2g} GB; allowed: at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB; "
-            "choose a larger mesh.size_mm, fewer increments or fewer gauges"
-        )
+        limit = f"at most {MEMORY_SHARE * have:.1f} GB of {have:.1f} GB"
+        raise Finger3dError(f"{what}: forecast {need_gb:.2g} GB; allowed: {limit}; choose {cure}")
 
 
 def _machine_gb() -> float:
