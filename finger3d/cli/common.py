@@ -17,7 +17,6 @@ import finger3d
 from finger3d._machine import reserve_for_linear_algebra
 from finger3d._ranges import printable
 from finger3d.errors import Finger3dError
-from finger3d.io import holds
 from finger3d.progress import Progress, reporter
 
 if TYPE_CHECKING:
@@ -87,6 +86,8 @@ def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
     Interrupted
         On Ctrl-C, SIGTERM or SIGHUP.
     """
+    from finger3d.io import holds  # loads NumPy, which --help can do without
+
     report = reporter(sys.stderr if json_ else None)
     reserve_for_linear_algebra()
     try:
