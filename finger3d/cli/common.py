@@ -86,8 +86,6 @@ def job(json_: bool, kept: Callable[[Progress], str]) -> Iterator[Progress]:
     Interrupted
         On Ctrl-C, SIGTERM or SIGHUP.
     """
-    from finger3d.io import holds  # loads NumPy, which --help can do without
-
     report = reporter(sys.stderr if json_ else None)
     reserve_for_linear_algebra()
     try:
@@ -121,6 +119,8 @@ def load(path: Path, overrides: list[str] | None, out: Path | None = None) -> Sc
 
 def check_writable(out: Path, scene: Path) -> None:
     """Raise Finger3dError if the output folder cannot be written, or holds the scene file itself."""
+    from finger3d.io import holds  # loads NumPy, which --help can do without
+
     if holds(out, ["scene.toml"], scene):
         raise Finger3dError(f"--out {out}: holds {scene.name}, which the results would overwrite; name another folder")
     check_folder(out)
