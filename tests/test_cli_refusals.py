@@ -57,7 +57,7 @@ def test_beside_a_file_that_is_there_the_keys_of_a_design_are_told(
     assert main(["plan", str(scene), "--set", "finger.geometry=finger.stl"]) == 2
     err = capsys.readouterr().err
     for text in ("finger.half_length_mm = 10.0: no such key beside this file, take it out",
-                 "[finger] takes geometry, up)", "and 2 more mistakes"):  # fmt: skip
+                 "[finger] takes geometry, scale, up)", "and 2 more mistakes"):  # fmt: skip
         assert text in err
 
 
