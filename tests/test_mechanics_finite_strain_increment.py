@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -17,6 +18,7 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.finite_strain import increment as finite_increment
 from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings, snap_warnings
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.formulations import formulation_of, increment_to_force
@@ -31,11 +33,9 @@ from tests.models import block, large_fig9, run
 def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
     nu: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from finger3d.mechanics.finite_strain import increment as finite_increment
-
     errors: list[float] = []
     residual = finite_increment.FiniteIncrement.residual
-    monkeypatch.setattr(finite_increment, "_SLOW", 0.0)
+    monkeypatch.setattr(finite_increment.FiniteIncrement, "remaining", lambda *a: math.inf)
     monkeypatch.setattr(
         finite_increment.FiniteIncrement, "residual", lambda *a: errors.append(residual(*a)) or errors[-1]
     )
@@ -48,6 +48,28 @@ def test_newton_with_a_new_tangent_in_every_iteration_converges_quadratically(
     pairs = [(a, b) for a, b in zip(errors[:-1], errors[1:], strict=True) if 1e-6 < a < 1e-3 and b < a]
     assert pairs
     assert all(b < max(1e3 * a**2, 1e-12) for a, b in pairs)
+
+
+def test_results_do_not_depend_on_how_often_the_tangent_is_factored(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, found = build(large_fig9(0.45, 4.0, legs=(Leg(8.0, steps=8),))), []
+    for cost in (0.0, 40.0):
+        monkeypatch.setattr(finite_increment.FiniteIncrement, "factor_cost", cost)
+        workspace = formulation_of(problem.model).workspace()
+        frames = list(march(problem, workspace=workspace))
+        found.append((workspace.factorizations, measure(problem.points, frames[-1])))
+    (often, numbers), (seldom, same) = found
+    assert seldom <= 3 < 8 <= often
+    for name in ("normal_force_N", "friction_sum_N", "stick_area_mm2"):
+        assert same[name] == pytest.approx(numbers[name], rel=1e-6)
+
+
+def test_secants_solve_a_linear_iteration_in_one_step_more_than_it_has_rates() -> None:
+    rates, place, iterations = np.repeat([0.0, 0.5, -0.8, 2.0], 5), np.linspace(1.0, 2.0, 20), []
+    for _ in range(5):
+        end = rates * place
+        iterations.append((end, end - place))
+        place = finite_increment._accelerated(iterations)
+    assert np.abs(place).max() < 1e-12
 
 
 def test_a_cell_folded_at_a_bonded_rim_is_a_warning_and_not_the_end() -> None:

@@ -112,7 +112,7 @@ class Hyperelastic:
             If a determinant is not positive, or in plane stress no thickness is free of stress.
         """
         d = slope.shape[-1]
-        f = np.zeros((*slope.shape[:-2], 3, 3))
+        f = np.moveaxis(np.zeros((3, 3, *slope.shape[:-2])), (0, 1), (-2, -1))  # each component without gaps: quicker
         f[..., :, :] = np.eye(3)
         f[..., :d, :d] += slope
         if not (determinant(f) > 0.0).all():

@@ -12,7 +12,7 @@ the residual is that of the present one, so that the solution does not depend on
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -51,6 +51,13 @@ negligible, or round-off."""
 _LARGEST_STEP, _LEAST_STEP = 2.0, 0.05
 """Largest displacement in an iteration over that of the object, and the least over the depth that is always allowed."""
 
+_LEAST_COST, _FACTOR_COST = 5.0, 0.03
+"""Iterations that take as long as a factorisation: in small bodies, and over the unknowns to the power of 1/2 in
+sections, 2/3 in solids; measured 6 in sections with 9 000 unknowns, 27 in solids with 30 000."""
+
+NEW_TANGENT = 4
+"""Iterations until convergence with a new tangent."""
+
 _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Fractions of a step tried in the line search."""
 
@@ -84,6 +91,19 @@ class IncrementEquations:
     def has_converged(self, error: float, last_error: float) -> bool:
         """Whether an iteration ends at a residual, after another one."""
         return error <= self.workspace.target or 0.3 * last_error < error <= TOLERANCE
+
+    def remaining(self, errors: Sequence[float]) -> float:
+        """Return the number of iterations until convergence, if the residual falls as in the last two."""
+        last = [error for error in errors[-3:] if math.isfinite(error)]
+        if len(last) < 2:
+            return 0.0 if math.isfinite(errors[-1]) else math.inf
+        fall = math.log(last[0] / last[-1]) / (len(last) - 1)
+        return math.log(last[-1] / self.workspace.target) / fall if fall > 0.0 else math.inf
+
+    @cached_property
+    def factor_cost(self) -> float:
+        """Iterations that take as long as a factorisation and the assembly of a tangent."""
+        return max(_LEAST_COST, _FACTOR_COST * len(self.start.body.unknowns) ** (1.0 - 1.0 / self.problem.dim))
 
     def finished(
         self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int

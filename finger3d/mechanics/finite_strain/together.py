@@ -20,7 +20,7 @@ from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.tensors import InvertedError
-from finger3d.mechanics.finite_strain.equations import Configuration, IncrementEquations
+from finger3d.mechanics.finite_strain.equations import NEW_TANGENT, Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
 from finger3d.mechanics.results.state import State
 
@@ -32,14 +32,8 @@ _ITERATIONS, _FACTORS = 40, 10
 _ASTRAY, _DIVERGED = 0.1, 1.0
 """Residuals above which an iteration starts again with a new tangent, and with a new tangent is given up."""
 
-_NEW_TANGENT, _FACTOR_COST = 5, 20
-"""Iterations that a press needs with a new tangent, and those of one press that take as long as a factorisation."""
-
 _TOO_SLOW = 15
 """Remaining iterations above which a press should wait for a tangent nearer to its own."""
-
-_SMALL = 5e-9
-"""Residual down to which the remaining iterations are counted."""
 
 
 @dataclass
@@ -108,11 +102,7 @@ class _Trial:
     @property
     def remaining(self) -> float:
         """Number of iterations until convergence, if the residual falls as it did."""
-        if not math.isfinite(self.error) or self.error >= self.last_error:
-            return _ITERATIONS
-        if not math.isfinite(self.last_error):
-            return 0.0
-        return min(math.log(_SMALL / self.error) / math.log(self.error / self.last_error), _ITERATIONS)
+        return self.equations.remaining([self.last_error, self.error])
 
 
 def solve_together(
@@ -152,8 +142,8 @@ def solve_together(
                     one = trial.equations.finished(trial.now, trial.solution, trial.error, trial.spent)
                     solutions[trial.number] = one if one.outcome.ok else None
             active = [trial for trial in active if not trial.has_converged]
-            ahead = sum(max(trial.remaining - _NEW_TANGENT, 0.0) for trial in active)
-            if first in active and (first.remaining > _TOO_SLOW if factors else ahead > _FACTOR_COST):
+            ahead = sum(max(trial.remaining - NEW_TANGENT, 0.0) for trial in active)
+            if first in active and (first.remaining > _TOO_SLOW if factors else ahead > first.equations.factor_cost):
                 linearisation = None
                 for trial in active:
                     if not trial.is_new and trial.error > _ASTRAY:
