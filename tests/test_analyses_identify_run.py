@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.identify.fit import FittedValues
+from finger3d.analyses.identify.posterior import FittedValues
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
@@ -80,8 +80,8 @@ def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> 
     assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
 
 
-def test_three_values_need_twelve_presses(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four points with noise: a press has a body and its increments, and no derivative presses again."""
+def test_derivatives_need_no_press(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four points with noise: twelve presses to fit, and some along friction, of which most share a body."""
     counted = {"bodies": 0, "presses": 0}
     built, pressed = PressedBody._built, PressedBody.steps
 
@@ -99,7 +99,7 @@ def test_three_values_need_twelve_presses(tmp_path: Path, scene_file: Path, monk
     measured.write_text("\n".join([lines[0], *lines[2::2]]) + "\n")
     found = finger3d.identify(scene_file, measured, FREE | {"material.nu": (0.3, 0.495)}, tmp_path / "out")
     assert found.measured.count == 2 * 4
-    assert found.presses == counted["presses"] <= 12
+    assert found.presses == counted["presses"] <= 30
     assert counted["bodies"] <= 8  # of one body all friction that is tried at first
     for value, std, true in zip(found.fitted.values, found.fitted.stds, [*TRUE.values(), 0.45], strict=True):
         assert value == pytest.approx(true, abs=4.0 * std)

@@ -10,7 +10,12 @@ import pytest
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.measured import MeasuredPress
 from finger3d.analyses.identify.simulated import Simulation, largest, names_of
+from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Leg
+from finger3d.mechanics.results.history import table_row
 from finger3d.results.journal import Journal
 from tests.sensor_cases import SCENE, scene
 
@@ -59,3 +64,15 @@ def test_names_and_magnitudes() -> None:
     assert {"depth_mm", "normal_force_N", "time_s", "gauge_g36", "gauge_long"} <= set(names)
     assert "method" not in names
     assert largest({"a": np.array([-3.0, 2.0]), "b": np.array([])}) == {"a": 3.0, "b": 0.0}
+
+
+def test_increments_end_at_the_measured_rows(tmp_path: Path) -> None:
+    """Between its four increments of 2.5 mm the press of the scene has no numbers at these depths."""
+    rows, free = measured([1.3, 6.1]), (FreeKey("friction.mu", 0.1, 0.7),)
+    found = Simulation(SCENE, None, free, Journal(tmp_path / "presses.jsonl", []), measured=rows).at([0.4], rows)
+    body = build(scene(friction={"mu": 0.4}).model())
+    for number, depth in enumerate(rows.at):
+        *_, last = march(under(body, legs=(Leg(depth, steps=1),)))
+        numbers = table_row(body.points, last)
+        for name in rows.columns:
+            assert found[name][number] == pytest.approx(numbers[name], rel=1e-9)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from finger3d.mechanics.march.path import AUTO_START, targets
+from finger3d.mechanics.march.path import AUTO_START, ending_at, targets
 from finger3d.mechanics.model import Leg
 from finger3d.objects import Move, ObjectPose
 
@@ -32,3 +33,16 @@ def test_the_ratio_of_lengths_is_none_where_the_path_turns() -> None:
     assert Move(first.end, ObjectPose(1.5, 3.0)).length_ratio(first) == pytest.approx(0.5)
     assert Move(first.end, ObjectPose(1.0, 3.0)).length_ratio(first) is None
     assert Move(first.end, ObjectPose(0.5, 1.0)).length_ratio(first) is None
+
+
+def test_legs_are_cut_where_a_coordinate_has_given_values() -> None:
+    """Every cut is a station, increments are no longer than before, and legs with a force are kept."""
+    legs = (Leg(2.0, steps=4, duration_s=1.0), Leg(2.0, slide_x_mm=3.0, steps=3), Leg(3.0, force_N=5.0, steps=2))
+    cut = ending_at(legs, "depth_mm", np.array([0.3, 1.0, 2.0, 2.5]))
+    assert [leg.depth_mm for leg in cut] == pytest.approx([0.3, 1.0, 2.0, 2.0, 3.0])
+    assert [leg.steps for leg in cut] == [1, 2, 2, 3, 2]
+    assert [leg.duration_s for leg in cut[:3]] == pytest.approx([0.15, 0.35, 0.5])
+    assert cut[3:] == legs[1:]
+    slid = ending_at(legs, "slide_x_mm", np.array([1.5]))
+    assert [(leg.depth_mm, leg.slide_x_mm, leg.steps) for leg in slid[1:3]] == [(2.0, 1.5, 2), (2.0, 3.0, 2)]
+    assert slid[0] == legs[0]

@@ -2,9 +2,11 @@
 
 No source; the measured curves are presses of the same finger on a mesh 1.5 to 4 times finer, with noise.  The finger of
 Fig. 9 is pressed 10 mm, as a section in plane strain and as a solid 20 mm wide; normal force and gauge strain are read
-at ten depths.  Young's modulus, friction, Poisson's ratio, the edges of the mesh, and the noise are drawn; one to three
-of the first are free.  z is (identified - true) / stated standard deviation, with and without the part of mesh and
-increments.
+at ten depths, between increments.  Young's modulus, friction, Poisson's ratio, the edges of the mesh, and the noise are
+drawn; one to three of the first are free.  Then fingers are drawn, too, as sections, with a depth and a gauge: force,
+and in half of them strain, are read at 16 depths with a noise of 1 %, and all three values are free.  In many of these
+the likelihood of friction is flat, or has two maxima.  z is (identified - true) / stated standard deviation, with and
+without the part of mesh and increments.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
+from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 from finger3d.io import write_csv
@@ -25,11 +27,11 @@ from ._paper import columns
 from ._rows import Result, Row
 
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.02, 1.0), "material.nu": (0.3, 0.495)}
-DEPTHS = np.linspace(1.0, 10.0, 10)
-CASES = {"plane-strain": 80, "solid": 20}
+CASES = {"plane-strain": 80, "solid": 20, "drawn": 24}
 SIZES = {"plane-strain": (1.0, 3.0), "solid": (3.5, 5.0)}
-FINER = {"plane-strain": (1.5, 4.0), "solid": (1.5, 2.0)}
+FINER = {"plane-strain": (1.5, 4.0), "solid": (1.5, 2.0), "drawn": (2.0, 3.3)}
 NOISE = 1e-3, 2e-2  # of the largest value of a column
+FIG9 = {"radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6, "width_mm": 20.0}
 _NONE = 1e-12  # standard deviation of nothing
 
 
@@ -57,52 +59,76 @@ class Fitted(NamedTuple):
         return (self.found - self.true) / max(np.sqrt(max(self.std**2 - self.std_numerical**2, 0.0)), _NONE)
 
 
-def scene(domain: str, size: float, values: dict[str, float], steps: int) -> dict[str, Any]:
-    """The finger of Fig. 9 with a gauge."""
-    return {
-        "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6,
-                   "width_mm": 20.0},
-        "material": {"E_MPa": values["material.E_MPa"], "nu": values["material.nu"]},
-        "friction": {"mu": values["friction.mu"]},
-        "press": {"depth_mm": 10.0, "steps": steps},
-        "model": {"domain": domain},
-        "mesh": {"size_mm": size, "base_size_mm": 4.0 * size, "mesher": "swept"},
-        "gauge": [{"name": "g36", "x_mm": 36.0, "y_mm": 40.0, "angle_deg": 30.0}],
-    }  # fmt: skip
+class Bench(NamedTuple):
+    """A finger as its table, the depths (mm) at which it is read, the gauge's x, y and angle, and edges (mm)."""
+
+    finger: dict[str, float]
+    depths: Float
+    gauge: tuple[float, float, float]
+    size: float
+
+    @classmethod
+    def drawn(cls, random: np.random.Generator) -> Bench:
+        """A clipped cylinder with 18 to 40 edges in the half length of its overlap."""
+        radius = random.uniform(40.0, 100.0)
+        half = radius * random.uniform(0.4, 0.6)
+        rise = radius - np.sqrt(radius**2 - half**2)
+        edge, depth = rise * random.uniform(0.6, 1.3), rise * random.uniform(0.2, 0.35)
+        overlap = float(np.sqrt(2.0 * radius * depth))
+        gauge = overlap * random.uniform(0.3, 0.8), (edge + rise) * random.uniform(0.7, 0.85), random.uniform(0.0, 90.0)
+        finger = {"radius_mm": radius, "half_length_mm": half, "edge_height_mm": edge, "width_mm": 8.0}
+        return cls(finger, depth * np.arange(1, 17) / 16.0, gauge, overlap / random.uniform(18.0, 40.0))
+
+    def scene(self, domain: str, size: float, values: dict[str, float], steps: int | str) -> dict[str, Any]:
+        """The finger with a gauge, pressed to the last depth in small strain."""
+        x, y, angle = self.gauge
+        return {
+            "finger": {"geometry": "clipped_cylinder", **self.finger},
+            "material": {"E_MPa": values["material.E_MPa"], "nu": values["material.nu"]},
+            "friction": {"mu": values["friction.mu"]},
+            "press": {"depth_mm": float(self.depths[-1]), "steps": steps},
+            "model": {"domain": domain},
+            "mesh": {"size_mm": size, "base_size_mm": 4.0 * size, "mesher": "swept"},
+            "effects": {"auto": False},
+            "gauge": [{"name": "g", "x_mm": x, "y_mm": y, "angle_deg": angle}],
+        }
 
 
-def case(domain: str, random: np.random.Generator) -> Iterator[Fitted]:
+def case(kind: str, random: np.random.Generator) -> Iterator[Fitted]:
     """Values identified from one curve."""
     true = {"material.E_MPa": random.uniform(0.1, 2.0), "friction.mu": random.uniform(0.06, 0.4),
             "material.nu": random.uniform(0.4, 0.48)}  # fmt: skip
-    free = list(FREE)[: random.integers(1, 4)]
-    size, finer = random.uniform(*SIZES[domain]), random.uniform(*FINER[domain])
-    noise = float(np.exp(random.uniform(*np.log(NOISE))))
-    pressed = press(scene(domain, size / finer, true, 20), error=False)
-    table: dict[str, Any] = {"depth_mm": DEPTHS}
-    depths = [0.0, *(step.depth_mm for step in pressed.steps)]
-    for name, values in (
-        ("normal_force_N", [step.normal_force_N for step in pressed.steps]),
-        ("gauge_g36", [step.gauges["g36"] for step in pressed.steps]),
-    ):
-        std = noise * float(np.abs(values).max())
-        table[name] = PchipInterpolator(depths, [0.0, *values])(DEPTHS) + random.normal(0.0, std, len(DEPTHS))
-        table[f"{name}_std"] = np.full(len(DEPTHS), std)
+    finer, names = random.uniform(*FINER[kind]), ["normal_force_N", "gauge_g"]
+    if kind == "drawn":
+        bench, domain, free, noise = Bench.drawn(random), "plane-strain", list(FREE), 0.01
+        true |= {"friction.mu": random.uniform(0.05, 0.8), "material.nu": random.uniform(0.35, 0.485)}
+        names = names[: random.integers(1, 3)]
+    else:
+        bench = Bench(FIG9, np.linspace(1.0, 10.0, 10), (36.0, 40.0, 30.0), random.uniform(*SIZES[kind]))
+        domain, free = kind, list(FREE)[: random.integers(1, 4)]
+        noise = float(np.exp(random.uniform(*np.log(NOISE))))
+    table: dict[str, Any] = {"depth_mm": bench.depths}
+    # a multiple of the rows, so that increments end at them
+    pressed = press(bench.scene(domain, bench.size / finer, true, 2 * len(bench.depths)), error=False)
+    rows = [min(pressed.steps, key=lambda step: abs(step.depth_mm - depth)) for depth in bench.depths]
+    for name in names:
+        values = np.array([row.normal_force_N if name == "normal_force_N" else row.gauges["g"] for row in rows])
+        table[f"{name}_std"] = np.full(len(rows), noise * float(np.abs(values).max()))
+        table[name] = values + random.normal(0.0, table[f"{name}_std"])
     start = true | {key: 0.5 * sum(FREE[key]) for key in free}
     with TemporaryDirectory() as folder:
         write_csv(Path(folder) / "bench.csv", table)
-        found = identify(
-            scene(domain, size, start, 20), Path(folder) / "bench.csv", {k: FREE[k] for k in free}, Path(folder) / "out"
-        ).fitted
+        scene = bench.scene(domain, bench.size, start, "auto" if kind == "drawn" else 7)
+        found = identify(scene, Path(folder) / "bench.csv", {k: FREE[k] for k in free}, Path(folder) / "out").fitted
     for k, key in enumerate(free):
         told = float(found.values[k]), float(found.stds[k]), float(found.numerical[k])
-        yield Fitted(domain, len(free), key, finer, noise, true[key], *told)
+        yield Fitted(kind, len(free), key, finer, noise, true[key], *told)
 
 
 def run(quick: bool) -> Result:
-    """Quick: two sections."""
+    """Quick: two drawn sections."""
     random = np.random.default_rng(20261126)
-    counts = {"plane-strain": 2} if quick else CASES
+    counts = {"drawn": 2} if quick else CASES
     found = [one for domain, count in counts.items() for _ in range(count) for one in case(domain, random)]
     rows = list(_rows(found, quick))
     table = columns(" ".join(Fitted._fields), found)
@@ -137,7 +163,7 @@ def _draw(figure: Any, found: list[Fitted]) -> None:
         (right, "z", "deviation as stated"),
     ):
         for k, key in enumerate(FREE):
-            for domain, mark in (("plane-strain", "o"), ("solid", "s")):
+            for domain, mark in (("plane-strain", "o"), ("solid", "s"), ("drawn", "^")):
                 some = [f for f in found if (f.key, f.domain) == (key, domain)]
                 label = f"{key}, {domain.replace('-', ' ')}"
                 axes.plot([f.noise for f in some], [abs(getattr(f, which)) for f in some], mark, color=f"C{k}", ms=4,

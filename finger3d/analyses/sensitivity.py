@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -21,6 +21,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.sensitivity import derivatives, held_normals, refusal, tangents
 from finger3d.mechanics.march.step_halving import with_increments_of
+from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.results.history import table_row
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.mechanics.small_strain.variations import Variation, VariedBody
@@ -179,13 +180,20 @@ def sensitivity(
     return found
 
 
-def varied(given: TreeView, path: Path | None, body: VariedBody, key: str) -> Variation:
+def varied(
+    given: TreeView,
+    path: Path | None,
+    body: VariedBody,
+    key: str,
+    legs: Callable[[Model], tuple[Leg, ...]] = lambda model: model.legs,
+) -> Variation:
     """Return the variation of a condensed body with a key of its scene; one-sided where a bound is nearer than a step.
 
     Parameters
     ----------
     given : tables of the scene, with moduli only (`finger3d.scene.material.with_moduli_only`)
     path : of its file, if any
+    legs : path of a model of the scene; automatic increments are those of the body
 
     Raises
     ------
@@ -200,7 +208,7 @@ def varied(given: TreeView, path: Path | None, body: VariedBody, key: str) -> Va
     for low in (value - step, value, value - 2.0 * step):
         try:
             models = [scene_with(given, [key], [at], path).model() for at in (low, low + 2.0 * step)]
-            first, last = (replace(m, legs=with_increments_of(m.legs, count), mesh=own.mesh) for m in models)
+            first, last = (replace(m, legs=with_increments_of(legs(m), count), mesh=own.mesh) for m in models)
             return body.variation(first, last, step)
         except Finger3dError as error:
             problems.append(str(error))

@@ -5,26 +5,19 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
-from finger3d.analyses.identify.fit import (
-    FittedValues,
-    Scale,
-    fit,
-    foretold,
-    jacobian,
-    misfit_text,
-    uncertainty,
-    values_at,
-)
+from finger3d.analyses.identify.fit import Scale, fit, foretold, jacobian, misfit_text, values_at
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
+from finger3d.analyses.identify.posterior import FittedValues, Mixture, along_friction, fitted_values, normal
 from finger3d.analyses.identify.simulated import (
     MODULI,
     OFFSET,
@@ -55,6 +48,7 @@ _SHARE = 0.02  # standard deviation in the first fit of a column without one, ov
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
 _TRIED_MODULI = 41  # values of Young's modulus that are tried at the start
 _FRICTION = 0.2, 0.45, 0.7  # shares tried at the start: a fit does not leave values at which all of the contact sticks
+_FITS, _AS_LIKELY = 3, 0.8  # most fits; likelihood, over the largest one, of values from which no other fit is tried
 _FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
 
 
@@ -177,7 +171,7 @@ def identify(
         claimed(out, "identify") as folder,
         opened(folder / "presses.jsonl", folder / "task.json", task) as journal,
     ):
-        simulation = Simulation(given, path, keys, journal, has_zones(data.columns))
+        simulation = Simulation(given, path, keys, journal, has_zones(data.columns), data)
         found = _fitted(simulation, data, start, report)
         _write(folder, found)
         return found
@@ -193,56 +187,93 @@ def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) 
     return np.array(values)
 
 
+@dataclass(frozen=True)
+class _Misfit:
+    """Residuals of a simulation over their standard deviations, as functions of the values or shares (k).
+
+    Attributes
+    ----------
+    stds : (n,) standard deviations by column
+    root : Cholesky factor of the covariance of all residuals, each over its standard deviation
+    """
+
+    simulation: Simulation
+    data: MeasuredPress
+    report: Progress
+    stds: Mapping[str, Float]
+    root: Float
+
+    @classmethod
+    def of(cls, simulation: Simulation, data: MeasuredPress, report: Progress) -> _Misfit:
+        """Return the misfit by the noise alone; that of columns without standard deviations is a share of them."""
+        stds = {
+            n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
+            for n, v in data.columns.items()
+        }
+        return cls(simulation, data, report, stds, np.eye(data.count))
+
+    @cached_property
+    def scales(self) -> list[Scale]:
+        return [Scale.of(f) for f in self.simulation.free]
+
+    def of_curve(self, simulated: Mapping[str, Float]) -> Float:
+        """Return the residuals of simulated columns."""
+        plain = [(simulated[n] - v) / self.stds[n] for n, v in self.data.columns.items()]
+        return np.asarray(solve_triangular(self.root, np.concatenate(plain), lower=True))
+
+    def residuals(self, values: Float) -> Float:
+        return self.of_curve(self.simulation.at(values, self.data))
+
+    def slopes(self, values: Float) -> Float | None:
+        found = self.simulation.slopes(values, self.data)
+        if found is None:
+            return None
+        plain = [found[n] / self.stds[n][:, None] for n in self.data.columns]
+        return np.asarray(solve_triangular(self.root, np.concatenate(plain), lower=True))
+
+    def jacobian(self, shares: Float, without: int | None = None) -> Float:
+        """Return the derivatives by shares, without those by one of them."""
+        return jacobian(self.scales, shares, self.residuals, self.slopes, without)
+
+    def fit(self, shares: Float) -> Float:
+        """Return the shares with the least sum of squares, from those given."""
+
+        def announce(values: Float) -> None:
+            named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.simulation.free, values, strict=True))
+            self.report.stage(f"fitting, {self.simulation.solved} presses: {named}")
+
+        return fit(self.scales, shares, self.residuals, self.slopes, announce)
+
+    def by_residuals(self, shares: Float) -> _Misfit:
+        """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
+        simulated = self.simulation.at(values_at(self.scales, shares), self.data)
+        return replace(self, stds={**self.stds, **_by_residuals(self.data, simulated, len(shares))})
+
+
 def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
-    """Fit, weight columns without standard deviations by their residuals, and fit again."""
+    """Fit by the noise, then by the noise and the errors of the simulation, and follow the likelihood of friction."""
     report.stage("first presses")
-    scales = [Scale.of(f) for f in simulation.free]
-    given = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
-    begin = np.clip(given, _FROM_BOUND, 1.0 - _FROM_BOUND)
-    own = np.array([f.key.startswith("friction.") for f in simulation.free])
-    starts = [begin, *(np.where(own, share, begin) for share in _FRICTION if own.any())]
-    tried = [_with_modulus(simulation, shares) for shares in starts]
-    curves = [[simulation.at(values_at(scales, shares), data) for shares in trials] for trials in tried]
-    _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
-    stds = {
-        n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
-        for n, v in data.columns.items()
-    }
-
-    def residuals_of(simulated: Mapping[str, Float]) -> Float:
-        return np.concatenate([(simulated[n] - v) / stds[n] for n, v in data.columns.items()])
-
-    def residuals(values: Float) -> Float:
-        return residuals_of(simulation.at(values, data))
-
-    def slopes(values: Float) -> Float | None:
-        found = simulation.slopes(values, data)
-        return None if found is None else np.concatenate([found[n] / stds[n][:, None] for n in data.columns])
-
-    def announce(values: Float) -> None:
-        named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(simulation.free, values, strict=True))
-        report.stage(f"fitting, {simulation.solved} presses: {named}")
-
-    least = [int(np.argmin([np.sum(residuals_of(curve) ** 2) for curve in some])) for some in curves]
-    best = [trials[number] for trials, number in zip(tried, least, strict=True)]
-    shares = min(best, key=lambda s: foretold(scales, s, residuals, slopes)) if len(best) > 1 else best[0]
-    shares = fit(scales, shares, residuals, slopes, announce)
-    weighted = _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
-    if weighted:
-        stds |= weighted
-        shares = fit(scales, shares, residuals, slopes, announce)
-        stds |= _by_residuals(data, simulation.at(values_at(scales, shares), data), len(scales))
-    values = values_at(scales, shares)
-    derivative = jacobian(scales, shares, residuals, slopes)
+    misfit = _Misfit.of(simulation, data, report)
+    shares = misfit.fit(_first(misfit, start))
+    if set(data.stds) != set(data.columns):
+        misfit = misfit.by_residuals(shares)
+        shares = misfit.fit(shares)
+        misfit = misfit.by_residuals(shares)
     report.stage("errors of mesh and increments")
-    simulated = simulation.at(values, data)
-    known = simulation.errors(values, data)
-    unknown = sorted(set(data.columns) - set(known))
+    scales = misfit.scales
+    known = simulation.errors(values_at(scales, shares), data)
     zero = np.zeros((1, len(data.at)))
     # a row of zeros for all columns but the one that the error is of
-    blocks = [known.get(name, zero) / (_BAR * stds[name]) for name in data.columns]
-    fitted = uncertainty(scales, shares, derivative, block_diag(*blocks))
+    plain = block_diag(*(known.get(name, zero) / (_BAR * misfit.stds[name]) for name in data.columns))
+    misfit = replace(misfit, root=np.linalg.cholesky(np.eye(data.count) + plain.T @ plain))
+    errors = solve_triangular(misfit.root, plain.T, lower=True)
+    shares, mixture, derivative = _likelihood(misfit, shares)
+    friction = _friction(simulation.free)
+    fitted = fitted_values(scales, shares, derivative, errors @ errors.T, mixture, friction)
+    values = values_at(scales, shares)
+    simulated = simulation.at(values, data)
     reduced = _reduced_chi_square(data, simulated, len(scales))
+    unknown = sorted(set(data.columns) - set(known))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
     notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
     return Identification(
@@ -251,12 +282,58 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         fitted=fitted,
         measured=data,
         simulated=simulated,
-        stds=stds,
+        stds=misfit.stds,
         curve=simulation.curve(values),
         reduced_chi_square=reduced,
         notes=tuple(notes),
         presses=simulation.solved,
     )
+
+
+def _first(misfit: _Misfit, start: Float) -> Float:
+    """Return the shares to fit from: those of `start`, or with another friction or modulus if these promise more."""
+    simulation, data, scales = misfit.simulation, misfit.data, misfit.scales
+    given = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
+    begin = np.clip(given, _FROM_BOUND, 1.0 - _FROM_BOUND)
+    friction, starts = _friction(simulation.free), [begin]
+    if friction is not None:
+        starts += [np.where(np.arange(len(begin)) == friction, share, begin) for share in _FRICTION]
+    tried = [_with_modulus(simulation, shares) for shares in starts]
+    curves = [[simulation.at(values_at(scales, shares), data) for shares in trials] for trials in tried]
+    _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
+    least = [int(np.argmin([np.sum(misfit.of_curve(curve) ** 2) for curve in some])) for some in curves]
+    best = [trials[number] for trials, number in zip(tried, least, strict=True)]
+    if len(best) == 1:
+        return best[0]
+    return min(best, key=lambda shares: foretold(scales, shares, misfit.residuals, misfit.slopes))
+
+
+def _friction(free: Sequence[FreeKey]) -> int | None:
+    """Return the number of the first key of friction."""
+    return next((i for i, f in enumerate(free) if f.key.startswith("friction.")), None)
+
+
+def _likelihood(misfit: _Misfit, start: Float) -> tuple[Float, Mixture, Float]:
+    """Return the most likely shares (k,), the likelihood about them, and the derivatives (n, k) of the residuals there.
+
+    The fit begins again where the likelihood along friction has a larger maximum.
+    """
+    friction = _friction(misfit.simulation.free)
+
+    def press(shares: Float) -> tuple[Float, Float]:
+        return misfit.residuals(values_at(misfit.scales, shares)), misfit.jacobian(shares, friction)
+
+    for _ in range(_FITS):
+        shares = misfit.fit(start)
+        derivative = misfit.jacobian(shares)
+        if friction is None:
+            return shares, normal(shares, derivative), derivative
+        misfit.report.stage("likelihood of friction")
+        mixture = along_friction(shares, derivative, friction, press)
+        start = mixture.shares[np.argmax(mixture.density)]
+        if np.interp(shares[friction], mixture.shares[:, friction], mixture.density) > _AS_LIKELY:
+            break
+    return shares, mixture, derivative
 
 
 def _check_columns(

@@ -25,9 +25,9 @@ from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.discretise.build import with_material
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.march.path import ending_at, stations, targets
 from finger3d.mechanics.march.sensitivity import derivatives, tangents
-from finger3d.mechanics.march.step_halving import with_increments_of
+from finger3d.mechanics.march.step_halving import automatic, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
 from finger3d.mechanics.results.history import StepResult, table_row
@@ -90,6 +90,7 @@ class Simulation:
     free : keys and bounds
     journal : the solutions that are known
     with_zones : whether curves have lengths and areas of zones, which take most of the time of their numbers
+    measured : the press at whose rows increments end; None for those of the scene
     """
 
     given: TreeView
@@ -97,6 +98,7 @@ class Simulation:
     free: tuple[FreeKey, ...]
     journal: Journal
     with_zones: bool = True
+    measured: MeasuredPress | None = None
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
     _bodies: dict[str, PressedBody] = field(default_factory=dict)
     _presses: dict[tuple[float, ...], tuple[Problem, list[StepResult]]] = field(default_factory=dict)
@@ -116,6 +118,19 @@ class Simulation:
     def scales_with_modulus(self) -> bool:
         """Whether all forces are proportional to Young's modulus, and nothing else depends on it."""
         return self.scene([f.middle for f in self.free]).model().forces_scale_with_modulus
+
+    @cached_property
+    def _increments(self) -> int:
+        """Number of increments of the path of the scene; automatic ones are those at the middle of the bounds."""
+        model = self.scene([f.middle for f in self.free]).model()
+        return len(PressedBody(model).steps() if automatic(model) else stations(model.legs))
+
+    def _legs(self, model: Model) -> tuple[Leg, ...]:
+        """Return the path of a model with increments that end at the measured rows, too."""
+        if self.measured is None or self.measured.index == "step":
+            return model.legs
+        legs = with_increments_of(model.legs, self._increments)
+        return ending_at(legs, self.measured.index, self.measured.at)
 
     def scene(self, values: Sequence[float] | Float) -> Scene:
         """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
@@ -220,6 +235,7 @@ class Simulation:
         def pressed() -> tuple[Problem, list[StepResult]]:
             scene = self.scene(point)
             model = scene.model()
+            model = replace(model, legs=self._legs(model))
             key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
             body = _kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
             steps = body.steps(model.friction, model.rule)  # which may condense it again
@@ -243,7 +259,7 @@ class Simulation:
         problem = under(problem, legs=with_increments_of(problem.model.legs, len(steps)))
         given, body = with_moduli_only(scene.as_dict()), VariedBody(problem)
         try:
-            variations = [varied(given, scene.path, body, key) for key in keys]
+            variations = [varied(given, scene.path, body, key, self._legs) for key in keys]
             rows = [
                 derivatives(step, variations, sides, with_zones=self.with_zones)
                 for step, _, sides in tangents(problem, variations, steps)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -74,3 +76,38 @@ def stations(legs: tuple[Leg, ...]) -> list[Station]:
 def targets(legs: tuple[Leg, ...]) -> list[ObjectPose]:
     """Return the pose at the end of every increment of the legs, in order."""
     return [station.pose for station in stations(legs)]
+
+
+_COORDINATES = ("depth_mm", "slide_x_mm", "slide_z_mm", "turn_x", "turn_y", "turn_z")
+_SHORTEST = 1e-6
+"""Share of a leg below which it is not cut."""
+
+
+def ending_at(legs: tuple[Leg, ...], name: str, values: Float) -> tuple[Leg, ...]:
+    """Return the legs cut where a coordinate of the pose has given values, with increments no longer than before.
+
+    Legs with prescribed forces are kept, since their poses are unknown.
+
+    Parameters
+    ----------
+    name : of a field of `ObjectPose`, such as ``depth_mm``
+    values : (n,) of it
+    """
+    out: list[Leg] = []
+    start = ObjectPose(0.0)
+    for leg in legs:
+        end = leg.end(start)
+        begin, change = getattr(start, name), getattr(end, name) - getattr(start, name)
+        shares = (values - begin) / change if change and not leg.is_under_force else np.zeros(0)
+        inner = np.unique(shares[(shares > _SHORTEST) & (shares < 1.0 - _SHORTEST)])
+        for before, share in pairwise([0.0, *inner.tolist(), 1.0]):
+            pose = Move(start, end).at(share) if share < 1.0 else end
+            part = replace(leg, **{key: getattr(pose, key) for key in _COORDINATES})
+            if leg.duration_s is not None:
+                part = replace(part, duration_s=(share - before) * leg.duration_s)
+            if len(inner):
+                count = leg.steps if isinstance(leg.steps, int) else AUTO_START
+                part = replace(part, steps=max(1, math.ceil((share - before) * count - _SHORTEST)))
+            out.append(part)
+        start = end
+    return tuple(out)
