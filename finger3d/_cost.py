@@ -152,10 +152,10 @@ def netgen_limit_s(cells: float) -> float:
 def tets_made(ratio: float) -> float:
     """Return the number of tets that fTetWild makes over the number that the field of edge lengths asks for.
 
-    Cells grow faster than the field where its largest length is `ratio` times the smallest: 0.57 of them
-    were made at 15 and 20, 0.7 to 0.8 at 10, 0.9 at 5, and 1.03 to 1.07 at 2 to 4.
+    Cells grow faster than the field where its largest length is `ratio` times the smallest: nineteen meshes of five
+    bodies, with ratios of 3 to 20, had 0.8 to 1.7 times the tets that follow.
     """
-    return float(min(5.0 / ratio, 1.0) ** 0.4)
+    return float(0.69 * (5.0 / ratio) ** 0.4)
 
 
 def tets_of_ftetwild(cells: float) -> float:

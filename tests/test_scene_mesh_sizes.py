@@ -8,11 +8,26 @@ from finger3d.scene import parse
 from tests.scene_tables import FINGER, HEIGHT, SMALL
 
 
-@pytest.mark.parametrize(("domain", "share"), [("solid", 1.0), ("plane-strain", 0.25), ("plane-stress", 0.25)])
-def test_absent_mesh_sizes_are_chosen_from_the_height(domain, share) -> None:
-    mesh = parse({**SMALL, "model": {"domain": domain}}).model().mesh
-    assert mesh.size_mm == pytest.approx(share * HEIGHT / 25, rel=1e-3)
-    assert mesh.base_size_mm == pytest.approx(share * HEIGHT / 6.25, rel=1e-3)
+@pytest.mark.parametrize(
+    ("domain", "mesher", "size", "base"),
+    [
+        ("solid", "ftetwild", 1 / 27.5, 1 / 3),
+        ("solid", "netgen", 1 / 27.5, 1 / 3),
+        ("solid", "swept", 1 / 25, 1 / 6.25),  # its rows run through the whole body
+        ("plane-strain", "ftetwild", 1 / 100, 1 / 25),
+        ("plane-stress", "ftetwild", 1 / 100, 1 / 25),
+    ],
+)
+def test_absent_mesh_sizes_are_chosen_from_the_height(domain, mesher, size, base) -> None:
+    wide = {**FINGER, "width_mm": HEIGHT}
+    mesh = parse({**SMALL, "finger": wide, "model": {"domain": domain}, "mesh": {"mesher": mesher}}).model().mesh
+    assert mesh.size_mm == pytest.approx(size * HEIGHT, rel=1e-3)
+    assert mesh.base_size_mm == pytest.approx(base * HEIGHT, rel=1e-3)
+
+
+def test_the_largest_edges_are_not_long_beside_the_width() -> None:
+    narrow = parse({**SMALL, "finger": {**FINGER, "width_mm": 0.5 * HEIGHT}})
+    assert narrow.model().mesh.base_size_mm == pytest.approx(0.4 * 0.5 * HEIGHT, rel=1e-3)
 
 
 @pytest.mark.parametrize("given_size", [{"size_mm": 10.0}, {"base_size_mm": 1.0}])
@@ -30,15 +45,15 @@ def test_a_thin_finger_gets_two_elements_across() -> None:
 @pytest.mark.parametrize(
     ("thing", "size"),
     [
-        ({"shape": "plane", "tilt_deg": 0.0}, 0.4),
+        ({"shape": "plane", "tilt_deg": 0.0}, 10.0 / 27.5),
         ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 600**0.5),  # sqrt(d (2 R - d)) each way, 600 points
-        ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, 2 * 2.78388 / 30),
+        ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, (2 * 2.78388 * 4.0 / 600) ** 0.5),
         ({"shape": "cylinder", "radius_mm": 100.0, "axis": "x"}, 4.0 / 12.0),  # as wide as the finger, no end inside
         (
             {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
             4.0 / 12.0,
         ),  # finer would be more than 600 points
-        ({"shape": "sphere", "radius_mm": 0.1}, 0.05 * 0.4),  # the finest
+        ({"shape": "sphere", "radius_mm": 0.1}, 0.05 * 10.0 / 27.5),  # the finest
         ({"shape": "sphere", "radius_mm": 0.1, "mesher": "swept"}, 0.2 * 0.4),
     ],
 )
@@ -64,8 +79,8 @@ def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> No
         # a plane overlaps a half cylinder of 10 mm over 2 sqrt(d (2 R - d))
         (0.02, "plane-strain", 1.2643 / 20),
         (0.2, "plane-strain", 0.1),
-        (0.1, "solid", 2.8213 / 30),
-        (2.0, "solid", 0.4),
+        (0.1, "solid", (2.8213 * 2.0 / 600) ** 0.5),
+        (2.0, "solid", 10.0 / 27.5),
     ],
 )
 def test_default_edges_resolve_the_contact_of_a_round_finger_with_a_plane(depth, domain, size) -> None:
@@ -83,9 +98,9 @@ def test_default_edges_resolve_the_contact_of_a_round_finger_with_a_plane(depth,
     ("height", "radius", "size", "base"),
     [
         # a ball of 6 mm that is 1.6 mm deep overlaps 8.16 mm of the pad, at 1.925 mm 8.8 mm
-        (4.0, 6.0, 8.16 / 600**0.5, 1.2 * 8.16 / 6.25),
-        (1.5, 6.0, 0.15, 0.6),  # a tenth and 0.4 of the height at most
-        (40.0, 6.0, 8.8 / 600**0.5, 6.4),  # no layer
+        (4.0, 6.0, 8.16 / 600**0.5, 0.4 * 4.0),
+        (1.5, 6.0, 2.5 * 1.5 / 27.5, 0.6),  # 1/11 and 0.4 of the height at most
+        (40.0, 6.0, 8.8 / 600**0.5, 0.4 * 16.0),  # no layer
     ],
 )
 def test_edges_in_a_layer_follow_the_contact_and_the_thickness(height, radius, size, base) -> None:

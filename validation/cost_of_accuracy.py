@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import memory_bytes
-from finger3d.scene.mesh_sizes import BASE_SHARE, SIZE_SHARE
+from finger3d.scene.mesh_sizes import BASE_SHARE, MOST_OF_EXTENT, SIZE_SHARE
 
 from ._child import Bench, best_of
 from ._corner import clamped_free, observed
@@ -43,6 +43,7 @@ BEST = {SECTION: "mixed", SOLID: "mixed", HALF: "quadratic"}
 BEST |= {LARGE[body]: BEST[body] for body in LARGE}
 HEIGHT = {SECTION: 50.0, SOLID: 50.0, HALF: 5.0}
 HEIGHT |= {LARGE[body]: HEIGHT[body] for body in LARGE}
+WIDTH = 20.0  # of the solid
 NEED_GB = 14.0  # of free memory, for 500 000 unknowns
 
 # What the defaults claim, relative; lengths in units of the edge length at the contact.
@@ -61,7 +62,8 @@ def default(body: str) -> Case:
     solid = body in (SOLID, LARGE[SOLID])
     share = HEIGHT[body] * (1.0 if solid else 0.25)
     mesher = "ftetwild" if solid else "swept"
-    return Case(body, share * SIZE_SHARE, share * BASE_SHARE, BEST[body], mesher)
+    longest = min(share * BASE_SHARE[mesher], MOST_OF_EXTENT * WIDTH)
+    return Case(body, share * SIZE_SHARE[mesher], longest, BEST[body], mesher)
 
 
 def groups(body: str, quick: bool) -> Groups:

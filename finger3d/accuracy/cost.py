@@ -260,7 +260,7 @@ def _candidates(model: Model, field: Sizing) -> float:
     overlap = np.max([obj.overlap(x.ravel(), top.ravel(), z.ravel()) for obj in objects], axis=0).reshape(x.shape)
     near = float(vertices[overlap > -MARGIN * max(pose.depth_mm for pose in path)].sum())
     whole = float(vertices.sum())
-    made = field.share_made ** (2.0 / 3.0) * (whole if near >= WHOLE_FACE * whole else near)
+    made = field.share_made**0.5 * (whole if near >= WHOLE_FACE * whole else near)
     return float(made + 1.9 * made**0.5)  # vertices on the rim have half of the area of others
 
 

@@ -13,15 +13,22 @@ from finger3d.scene.tables import MeshTable
 
 Box = tuple[float, float, float, float]
 
-SIZE_SHARE, BASE_SHARE = 1 / 25, 1 / 6.25
-"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of them. They leave less
-than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py)."""
+SIZE_SHARE = {"swept": 1 / 25, "ftetwild": 1 / 27.5, "netgen": 1 / 27.5}
+BASE_SHARE = {"swept": 1 / 6.25, "ftetwild": 1 / 3, "netgen": 1 / 3}
+"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of those of swept solids.
+They leave less than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py). A third
+of the height at the base takes a sixth of the unknowns of 1/6.25 under a ball on a pad, and changes the force by 0.1 %;
+in a swept Fig. 9 it would add 1 %."""
 
-_ACROSS = {"swept": 20.0, "ftetwild": 30.0, "netgen": 30.0}
+MOST_OF_EXTENT = 0.4
+"""Largest of these lengths over the least extent of the finger. On Fig. 9, 20 mm wide, the largest edges of 8 mm leave
+error bars as they are at large deformation, where 10 and 17 mm double and triple those of stick area and force."""
+
+_ACROSS = {"swept": 20.0, "ftetwild": 33.0, "netgen": 33.0}
 """Number of edges across the overlap of a curved object, which is about 1.4 times as wide as the contact. Penetration
 between points at the edge of contact has, over 38 presses of random solids, a median of 0.8 (edges across)^-1.6 times
 the depth, and is below 1 % of it from 20 edges on, except at sharp tips and at rims of the finger. Unstructured meshes,
-whose edges differ in length, need 1.5 times as many."""
+whose edges differ in length, need more."""
 
 _LEAST_ACROSS = 12.0
 """The same if the overlap ends at edges of the finger or the object, and contact extends over all of it; also the least
@@ -73,17 +80,18 @@ def mesh_options(
         longest = max(table.base_size_mm or design.base_size_mm, finest)
         return MeshOptions(finest, longest, table.mesher, gauge_refinement=local[0], stick_refinement=local[1])
     solid = domain == "solid"
+    mesher = table.mesher if solid else "swept"
     scale = _scale(design, obj, box) if solid else 0.25 * design.height_mm
     size, base = table.size_mm, table.base_size_mm
     if solid and size is None and base is None and table.tolerance is None:
         local = table.gauge_refinement or _AT_GAUGES, table.stick_refinement or (_AT_STICK if refine else 1.0)
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
-        coarse = min(scale * SIZE_SHARE, smallest_mm(design, solid) / 2.0, base or math.inf)
+        coarse = min(scale * SIZE_SHARE[mesher], smallest_mm(design, solid) / 2.0, base or math.inf)
         finest = coarse * _FINEST[table.mesher if solid else "ftetwild"]
-        size = four_digits(max(min(coarse, _detail(obj, design, box, solid, table.mesher)), finest))
+        size = four_digits(max(min(coarse, _detail(obj, design, box, solid, mesher)), finest))
     if base is None:
-        base = max(four_digits(min(scale * BASE_SHARE, smallest_mm(design, solid=False))), size)
+        base = max(four_digits(min(scale * BASE_SHARE[mesher], MOST_OF_EXTENT * smallest_mm(design, solid))), size)
     return MeshOptions(size, base, table.mesher, gauge_refinement=local[0], stick_refinement=local[1])
 
 
@@ -103,7 +111,7 @@ def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str
 
     A flat object sets none along a side over all of which it touches.
     """
-    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[mesher if solid else "swept"]
+    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[mesher]
     halves = (design.half_length_mm, 0.5 * design.width_mm) if solid else (design.half_length_mm,)
     wanted, least = [math.inf], [math.inf]
     for side, low, high, half in zip(sides, box[::2], box[1::2], halves, strict=False):

@@ -14,11 +14,13 @@ from finger3d.geometry.design import Design
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.refinement.grading import Grading, SizedPlaces
 
-RATE = 0.3
-"""Growth of the edge length per distance from the zone."""
+RATE = 0.5
+"""Growth of the edge length per distance from the zone.  On Fig. 9 with as many contact points, 0.5 and a background grid
+as fine as the contact take 17 % fewer unknowns than 0.3 and twice the step, at the same error of force and gauge."""
 
 _PLATEAU_STEPS = 1.2  # constant size around the zone, in background steps; the grid would miss a narrower zone
 _TETS_PER_CUBE = 10.0  # tets per (edge length)^3; measured 9.6 to 11
+_GRADED = 0.95  # edge length over the largest below which fewer tets are made
 _LAYER_EDGE = 0.85  # edge length in a layer that is thinner than the edges asked for, over its thickness
 _MAX_BACKGROUND_CELLS = 60  # along the longest side
 
@@ -74,9 +76,14 @@ class Sizing:
         return points, tets, values.ravel()
 
     @property
+    def longest_mm(self) -> float:
+        """Largest edge length that fTetWild is given; an edge longer than the body hangs it."""
+        return min(self.base_mm, float((self.high - self.low).min()))
+
+    @property
     def share_made(self) -> float:
-        """Number of tets that are made over the number that the field asks for."""
-        return tets_made(self.base_mm / self.size_mm)
+        """Number of tets that are made over the number that the field asks for, where edges are shorter than that."""
+        return tets_made(self.longest_mm / self.size_mm)
 
     @property
     def _fills_width(self) -> bool:
@@ -104,7 +111,7 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
     Finger3dError
         If the zone lies outside the box or the footprint.
     """
-    step = float(max(2.0 * options.size_mm, design.half_length_mm / 50.0, (high - low).max() / _MAX_BACKGROUND_CELLS))
+    step = float(max(options.size_mm, design.half_length_mm / 50.0, (high - low).max() / _MAX_BACKGROUND_CELLS))
     x0, x1 = max(zone[0], low[0]), min(zone[1], high[0])
     z0, z1 = max(zone[2], low[2]), min(zone[3], high[2])
     near = 0.5 * step
@@ -120,7 +127,7 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
 
 
 def count_cells(design: Design, field: Sizing, samples: int = 40) -> float:
-    """Estimate the number of tets that are made: 10 times the integral of dV / h^3 over the body, times a share."""
+    """Estimate the number of tets that are made: 10 times the integral of dV / h^3 over the body, less where h grows."""
     from scipy.interpolate import RegularGridInterpolator
 
     # fTetWild interpolates between the grid points, which gives larger edges than the field itself.
@@ -139,6 +146,7 @@ def count_cells(design: Design, field: Sizing, samples: int = 40) -> float:
         thickness = height - below
     for d, w in zip(depth, weight, strict=True):
         h = seen(np.stack([x.ravel(), top * (1.0 - d), z.ravel()], axis=1))
-        h = np.where(d * top < thickness, np.minimum(h, _LAYER_EDGE * thickness), h)
-        total += w * float(column @ h**-3.0)
-    return field.share_made * _TETS_PER_CUBE * total
+        made = np.where(h < _GRADED * field.longest_mm, field.share_made, 1.0) * np.minimum(h, field.longest_mm) ** -3.0
+        made = np.where(d * top < thickness, np.maximum(made, (_LAYER_EDGE * thickness or 1.0) ** -3.0), made)
+        total += w * float(column @ made)
+    return _TETS_PER_CUBE * total

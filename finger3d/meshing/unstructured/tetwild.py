@@ -166,14 +166,13 @@ def run_child(
 
     pytetwild finds the inside by winding numbers, which triangles inside the body would make ambiguous.
     """
-    extent = np.ptp(points, axis=0)
     bg_points, bg_tets, bg_values = field.background()
     return run_mesher(
         _meshers.pytetwild,
         limit,
         points=points,
         triangles=triangles,
-        edge_length=min(field.base_mm, float(extent.min())),  # an edge longer than the body hangs it
+        edge_length=field.longest_mm,
         epsilon=epsilon,
         stop_energy=STOP_ENERGY,
         keep_outside=keep_outside,
