@@ -152,7 +152,8 @@ def test_automatic_increments_are_foretold_with_all_the_runs_that_choose_them() 
     assert told["contact_s"] == fixed["contact_s"]
     assert "steps_of_all_runs" not in fixed
     large = effect_type("large_deformation")().apply(replace(baseline("solid"), legs=legs))
-    assert forecast(large)["steps_of_all_runs"] == 6 + 12
+    assert forecast(large)["steps"] == 12  # chosen on a coarser mesh
+    assert "steps_of_all_runs" not in forecast(large)
 
 
 def test_an_exact_path_is_foretold_with_one_run() -> None:

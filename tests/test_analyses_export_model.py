@@ -34,7 +34,7 @@ def test_a_mesh_that_was_written_is_the_same_finger(scene_file: Path, tmp_path: 
     for file in done.files:
         back = scene_file.with_name("back.toml")
         table = BLOCK.split("[material]", 1)[1].split("[model]")[0].split("[mesh]")[0]
-        back.write_text(f'[finger]\ngeometry = "{file}"\n[material]{table}', encoding="utf-8")
+        back.write_text(f'effects.auto = false\n[finger]\ngeometry = "{file}"\n[material]{table}', encoding="utf-8")
         result = finger3d.press(load(back), error=False)
         forces.append(result.last.normal_force_N)
         assert result.summary()["scene"]["mesh"]["size_mm"] == pytest.approx(2.0, rel=0.3)

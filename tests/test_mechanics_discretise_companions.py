@@ -137,10 +137,10 @@ def test_a_finer_companion_at_large_deformation_is_not_so_fine() -> None:
 def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: list[str], monkeypatch: Any) -> None:
     asked: list[float] = []
 
-    def no_coarser_than(model: Model, *more: Any) -> Problem:
+    def no_coarser_than(model: Model, *more: Any, **options: Any) -> Problem:
         asked.append(model.mesh.size_mm)
         mesh = replace(model.mesh, size_mm=min(model.mesh.size_mm, 0.4), base_size_mm=min(model.mesh.base_size_mm, 1.0))
-        return build(replace(model, mesh=mesh), *more)
+        return build(replace(model, mesh=mesh), *more, **options)
 
     model = replace(unstructured(), mesh=MeshOptions(0.8, 2.0, "ftetwild"))
     monkeypatch.setattr(companions, "build", no_coarser_than)

@@ -207,7 +207,7 @@ def written(tmp_path: Path, text: str = SCENE) -> str:
 def test_no_command_gives_numbers(tmp_path: Path, command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code = main([command[0], written(tmp_path), "--out", str(tmp_path / "out"), *command[1:]])
     last = capsys.readouterr().err.strip().splitlines()[-1]
-    assert code == (2 if command[0] == "optimise" else 3)
+    assert code == 3
     assert "mesh.size_mm = 4" in last
     assert "mesh.size_mm = 0.25" in last
 

@@ -208,8 +208,8 @@ def test_summary_counts_the_factorisations(tmp_path: Path) -> None:
 
     scene = tmp_path / "scene.toml"
     scene.write_text(
-        '[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 2.0\n[material]\nE_MPa = 1.0\nnu = 0.3\n'
-        '[model]\ndomain = "plane-strain"\n[mesh]\nsize_mm = 0.3\nbase_size_mm = 1.0\n'
+        'effects.auto = false\n[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 2.0\n[material]\n'
+        'E_MPa = 1.0\nnu = 0.3\n[model]\ndomain = "plane-strain"\n[mesh]\nsize_mm = 0.3\nbase_size_mm = 1.0\n'
         "[[press.leg]]\ndepth_mm = 0.5\nsteps = 5\nduration_s = 1\n"
         "[[press.leg]]\ndepth_mm = 0.5\nsteps = 2\nduration_s = 1\n"
         "[effects.viscosity]\nprony = [[0.3, 0.5]]\nbulk = false\n",

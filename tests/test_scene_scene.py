@@ -100,7 +100,7 @@ def test_every_design_loads(finger) -> None:
     ],
 )
 def test_round_trip(extra, defaults) -> None:
-    scene = parse({**SMALL, **extra})
+    scene = parse({**SMALL, "friction": {"mu": 0.2}, **extra})
     again = parse(tomllib.loads(scene.to_toml(defaults)))
     assert again == scene
     assert again.model() == scene.model()

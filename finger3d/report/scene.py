@@ -26,7 +26,8 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     gauges = scene.get("gauge")
     for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
-    effects = _mapping(scene.get("effects"))
+    named = _mapping(scene.get("effects")).items()
+    effects = {name: settings for name, settings in named if isinstance(settings, Mapping)}
     rows += [(f"effect {name}", _settings(settings) or "on") for name, settings in effects.items()]
     parts: list[Part] = [Table(("", "settings, with defaults"), rows)]
     if not effects:

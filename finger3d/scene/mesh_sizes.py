@@ -16,9 +16,9 @@ Box = tuple[float, float, float, float]
 SIZE_SHARE = {"swept": 1 / 25, "ftetwild": 1 / 27.5, "netgen": 1 / 27.5}
 BASE_SHARE = {"swept": 1 / 6.25, "ftetwild": 1 / 3, "netgen": 1 / 3}
 """Default edge lengths in a solid as shares of the finger's height; sections take a quarter of those of swept solids.
-They leave less than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py). A third
-of the height at the base takes a sixth of the unknowns of 1/6.25 under a ball on a pad, and changes the force by 0.1 %;
-in a swept Fig. 9 it would add 1 %."""
+They leave less than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py). A
+third of the height at the base takes a sixth of the unknowns of 1/6.25 under a ball on a pad, and changes the force by
+0.1 %; in a swept Fig. 9 it would add 1 %."""
 
 MOST_OF_EXTENT = 0.4
 """Largest of these lengths over the least extent of the finger. On Fig. 9, 20 mm wide, the largest edges of 8 mm leave

@@ -15,8 +15,8 @@ from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.refinement.grading import Grading, SizedPlaces
 
 RATE = 0.5
-"""Growth of the edge length per distance from the zone.  On Fig. 9 with as many contact points, 0.5 and a background grid
-as fine as the contact take 17 % fewer unknowns than 0.3 and twice the step, at the same error of force and gauge."""
+"""Growth of the edge length per distance from the zone.  On Fig. 9 with as many contact points, 0.5 and a background
+grid as fine as the contact take 17 % fewer unknowns than 0.3 and twice the step, at the same error of force and gauge."""
 
 _PLATEAU_STEPS = 1.2  # constant size around the zone, in background steps; the grid would miss a narrower zone
 _TETS_PER_CUBE = 10.0  # tets per (edge length)^3; measured 9.6 to 11
@@ -127,7 +127,7 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
 
 
 def count_cells(design: Design, field: Sizing, samples: int = 40) -> float:
-    """Estimate the number of tets that are made: 10 times the integral of dV / h^3 over the body, less where h grows."""
+    """Estimate the number of tets that are made: 10 times the integral of dV / h^3, less where h grows."""
     from scipy.interpolate import RegularGridInterpolator
 
     # fTetWild interpolates between the grid points, which gives larger edges than the field itself.
