@@ -247,7 +247,8 @@ def test_press_writes_both_strains(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         'effects.auto = false\n[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 4.0\n[material]\n'
-        'E_MPa = 1.0\nnu = 0.3\n[press]\ndepth_mm = 0.5\nsteps = 3\n[model]\ndomain = "plane-strain"\n[mesh]\nsize_mm = 0.3\n'
+        'E_MPa = 1.0\nnu = 0.3\n[press]\ndepth_mm = 0.5\nsteps = 3\n[model]\ndomain = "plane-strain"\n'
+        "[mesh]\nsize_mm = 0.3\n"
         'base_size_mm = 1.0\n[[gauge]]\nname = "g"\nx_mm = 1.0\ny_mm = 3.5\nangle_deg = 20.0\nlength_mm = 1.5\n'
         "[effects.embedded_gauge]\nE_MPa = 3000.0\nthickness_mm = 0.02\nwidth_mm = 3.0\n",
         encoding="utf-8",

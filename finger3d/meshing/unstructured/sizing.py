@@ -16,7 +16,8 @@ from finger3d.meshing.refinement.grading import Grading, SizedPlaces
 
 RATE = 0.5
 """Growth of the edge length per distance from the zone.  On Fig. 9 with as many contact points, 0.5 and a background
-grid as fine as the contact take 17 % fewer unknowns than 0.3 and twice the step, at the same error of force and gauge."""
+grid as fine as the contact take 17 % fewer unknowns than 0.3 and twice the step, with the same error of force and
+gauge."""
 
 _PLATEAU_STEPS = 1.2  # constant size around the zone, in background steps; the grid would miss a narrower zone
 _TETS_PER_CUBE = 10.0  # tets per (edge length)^3; measured 9.6 to 11
