@@ -155,7 +155,7 @@ def tets_made(ratio: float) -> float:
     Cells grow faster than the field where its largest length is `ratio` times the smallest: nineteen meshes of five
     bodies, with ratios of 3 to 20, had 0.8 to 1.7 times the tets that follow.
     """
-    return float(0.69 * (5.0 / ratio) ** 0.4)
+    return float(min(0.69 * (5.0 / ratio) ** 0.4, 1.0))
 
 
 def tets_of_ftetwild(cells: float) -> float:

@@ -58,5 +58,5 @@ def test_a_million_unknowns_may_be_pressed_in_24_gib(monkeypatch: pytest.MonkeyP
     [(5.0, 9_930, 7_277), (10.0, 51_867, 26_841), (10.0, 9_841, 5_731), (20.0, 318_534, 112_008), (4.6, 14_780, 9_230)],
 )
 def test_fewer_tets_are_made_where_sizes_differ_much(ratio: float, wanted: int, made: int) -> None:
-    # by fTetWild: Fig. 9, whole and a quarter, and a pad under a ball; cells of the largest size are left out
+    # by fTetWild, of the Fig. 9 finger, whole and a quarter, and of a pad under a ball, below the largest size
     assert tets_made(ratio) * wanted == pytest.approx(made, rel=0.15)

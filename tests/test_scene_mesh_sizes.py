@@ -9,25 +9,20 @@ from tests.scene_tables import FINGER, HEIGHT, SMALL
 
 
 @pytest.mark.parametrize(
-    ("domain", "mesher", "size", "base"),
+    ("domain", "mesher", "width", "size", "base"),
     [
-        ("solid", "ftetwild", 1 / 27.5, 1 / 3),
-        ("solid", "netgen", 1 / 27.5, 1 / 3),
-        ("solid", "swept", 1 / 25, 1 / 6.25),  # its rows run through the whole body
-        ("plane-strain", "ftetwild", 1 / 100, 1 / 25),
-        ("plane-stress", "ftetwild", 1 / 100, 1 / 25),
+        ("solid", "ftetwild", HEIGHT, HEIGHT / 27.5, HEIGHT / 3),
+        ("solid", "ftetwild", 20.0, HEIGHT / 27.5, 0.4 * 20.0),  # the largest edges are not long beside the width
+        ("solid", "ftetwild", 1.0, 0.5, 0.5),  # a thin finger gets two elements across
+        ("solid", "swept", HEIGHT, HEIGHT / 25, HEIGHT / 6.25),  # its rows run through the whole body
+        ("plane-strain", "ftetwild", HEIGHT, HEIGHT / 100, HEIGHT / 25),
+        ("plane-stress", "ftetwild", HEIGHT, HEIGHT / 100, HEIGHT / 25),
     ],
 )
-def test_absent_mesh_sizes_are_chosen_from_the_height(domain, mesher, size, base) -> None:
-    wide = {**FINGER, "width_mm": HEIGHT}
-    mesh = parse({**SMALL, "finger": wide, "model": {"domain": domain}, "mesh": {"mesher": mesher}}).model().mesh
-    assert mesh.size_mm == pytest.approx(size * HEIGHT, rel=1e-3)
-    assert mesh.base_size_mm == pytest.approx(base * HEIGHT, rel=1e-3)
-
-
-def test_the_largest_edges_are_not_long_beside_the_width() -> None:
-    narrow = parse({**SMALL, "finger": {**FINGER, "width_mm": 0.5 * HEIGHT}})
-    assert narrow.model().mesh.base_size_mm == pytest.approx(0.4 * 0.5 * HEIGHT, rel=1e-3)
+def test_absent_mesh_sizes_are_chosen_from_the_extents(domain, mesher, width, size, base) -> None:
+    finger = {**FINGER, "width_mm": width}
+    mesh = parse({**SMALL, "finger": finger, "model": {"domain": domain}, "mesh": {"mesher": mesher}}).model().mesh
+    assert (mesh.size_mm, mesh.base_size_mm) == pytest.approx((size, base), rel=1e-3)
 
 
 @pytest.mark.parametrize("given_size", [{"size_mm": 10.0}, {"base_size_mm": 1.0}])
@@ -37,11 +32,6 @@ def test_a_chosen_size_never_contradicts_a_given_one(given_size) -> None:
     assert {k: getattr(mesh, k) for k in given_size} == given_size
 
 
-def test_a_thin_finger_gets_two_elements_across() -> None:
-    thin = parse({**SMALL, "finger": {**FINGER, "width_mm": 1.0}})
-    assert thin.model().mesh.size_mm == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize(
     ("thing", "size"),
     [
@@ -49,26 +39,24 @@ def test_a_thin_finger_gets_two_elements_across() -> None:
         ({"shape": "sphere", "radius_mm": 8.0}, 2 * 2.78388 / 600**0.5),  # sqrt(d (2 R - d)) each way, 600 points
         ({"shape": "cylinder", "radius_mm": 8.0, "axis": "z"}, (2 * 2.78388 * 4.0 / 600) ** 0.5),
         ({"shape": "cylinder", "radius_mm": 100.0, "axis": "x"}, 4.0 / 12.0),  # as wide as the finger, no end inside
-        (
-            {"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1},
-            4.0 / 12.0,
-        ),  # finer would be more than 600 points
+        ({"shape": "wave", "wavelength_mm": 5.0, "amplitude_mm": 0.1}, 4.0 / 12.0),  # finer: more than 600 points
         ({"shape": "sphere", "radius_mm": 0.1}, 0.05 * 10.0 / 27.5),  # the finest
         ({"shape": "sphere", "radius_mm": 0.1, "mesher": "swept"}, 0.2 * 0.4),
     ],
 )
 def test_default_edges_resolve_the_overlap_of_a_curved_object(thing, size) -> None:
-    mesh = {key: value for key, value in thing.items() if key == "mesher"}
-    thing = {key: value for key, value in thing.items() if key not in mesh}
     tables = {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 4.0},
+        "finger": {
+            "geometry": "block",
+            "half_length_mm": 10.0,
+            "height_mm": 10.0,
+            "width_mm": 20.0 if thing["shape"] in ("sphere", "plane") else 4.0,
+        },
         "material": {"E_MPa": 1.0, "nu": 0.3},
         "press": {"depth_mm": 0.5},
-        "object": thing,
-        "mesh": mesh,
+        "object": {key: value for key, value in thing.items() if key != "mesher"},
+        "mesh": {"mesher": thing.get("mesher", "ftetwild")},
     }
-    wide = thing["shape"] in ("sphere", "plane")
-    tables["finger"]["width_mm"] = 20.0 if wide else 4.0
     # the overlap is found on a grid of a hundredth of the finger
     assert parse(tables).mesh.size_mm == pytest.approx(size, rel=0.06)
 

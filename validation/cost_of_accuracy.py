@@ -59,11 +59,10 @@ Groups = dict[str, list[Case]]
 
 def default(body: str) -> Case:
     """What a scene that gives no sizes and no steps is solved with."""
-    solid = body in (SOLID, LARGE[SOLID])
-    share = HEIGHT[body] * (1.0 if solid else 0.25)
-    mesher = "ftetwild" if solid else "swept"
-    longest = min(share * BASE_SHARE[mesher], MOST_OF_EXTENT * WIDTH)
-    return Case(body, share * SIZE_SHARE[mesher], longest, BEST[body], mesher)
+    kind = "ftetwild" if body in (SOLID, LARGE[SOLID]) else "section"
+    height = HEIGHT[body]
+    longest = min(height * BASE_SHARE[kind], MOST_OF_EXTENT * WIDTH)
+    return Case(body, height * SIZE_SHARE[kind], longest, BEST[body], "swept" if kind == "section" else kind)
 
 
 def groups(body: str, quick: bool) -> Groups:

@@ -13,18 +13,18 @@ from finger3d.scene.tables import MeshTable
 
 Box = tuple[float, float, float, float]
 
-SIZE_SHARE = {"swept": 1 / 25, "ftetwild": 1 / 27.5, "netgen": 1 / 27.5}
-BASE_SHARE = {"swept": 1 / 6.25, "ftetwild": 1 / 3, "netgen": 1 / 3}
-"""Default edge lengths in a solid as shares of the finger's height; sections take a quarter of those of swept solids.
-They leave less than 1 % of the force in both, and .3 % of a gauge in a section (validation/cost_of_accuracy.py). A
-third of the height at the base takes a sixth of the unknowns of 1/6.25 under a ball on a pad, and changes the force by
-0.1 %; in a swept Fig. 9 it would add 1 %."""
+SIZE_SHARE = {"section": 1 / 100, "swept": 1 / 25, "ftetwild": 1 / 27.5, "netgen": 1 / 27.5}
+BASE_SHARE = {"section": 1 / 25, "swept": 1 / 6.25, "ftetwild": 1 / 3, "netgen": 1 / 3}
+"""Default edge lengths at the contact and far from it as shares of the finger's height. They leave less than 1 % of the
+force, and .3 % of a gauge in a section (validation/cost_of_accuracy.py). A pad under a ball has 151 000 unknowns with
+1/6.25 at the base, and 27 000 with 1/3, which changes the force by 0.03 %; in a swept Fig. 9 it would add 1 %, and in a
+section twice 1/25 halves the unknowns, and more than doubles the error of the force."""
 
 MOST_OF_EXTENT = 0.4
 """Largest of these lengths over the least extent of the finger. On Fig. 9, 20 mm wide, the largest edges of 8 mm leave
 error bars as they are at large deformation, where 10 and 17 mm double and triple those of stick area and force."""
 
-_ACROSS = {"swept": 20.0, "ftetwild": 33.0, "netgen": 33.0}
+_ACROSS = {"section": 20.0, "swept": 20.0, "ftetwild": 33.0, "netgen": 33.0}
 """Number of edges across the overlap of a curved object, which is about 1.4 times as wide as the contact. Penetration
 between points at the edge of contact has, over 38 presses of random solids, a median of 0.8 (edges across)^-1.6 times
 the depth, and is below 1 % of it from 20 edges on, except at sharp tips and at rims of the finger. Unstructured meshes,
@@ -55,7 +55,7 @@ _IN_LAYERS, _LARGEST_SCALE = 1.2, 2.5
 those of a finger as high would take ten times the unknowns. Under seven balls whose overlap is about as wide as the
 finger is high, penetration stays below 1 % of the depth with 1.2, and reaches 1.3 % with 1.25."""
 
-_FINEST = {"swept": 0.2, "ftetwild": 0.05, "netgen": 0.05}
+_FINEST = {"section": 0.05, "swept": 0.2, "ftetwild": 0.05, "netgen": 0.05}
 """Least edge length over the default: finer is left to those who ask for it.  Lines of a swept solid run through all of
 it: under a ball of 0.4 mm on a block of 20 mm it has 700 000 unknowns with 0.2; one by fTetWild 45 000 with 0.05."""
 
@@ -80,18 +80,17 @@ def mesh_options(
         longest = max(table.base_size_mm or design.base_size_mm, finest)
         return MeshOptions(finest, longest, table.mesher, gauge_refinement=local[0], stick_refinement=local[1])
     solid = domain == "solid"
-    mesher = table.mesher if solid else "swept"
-    scale = _scale(design, obj, box) if solid else 0.25 * design.height_mm
+    kind = table.mesher if solid else "section"
+    scale = _scale(design, obj, box) if solid else design.height_mm
     size, base = table.size_mm, table.base_size_mm
     if solid and size is None and base is None and table.tolerance is None:
         local = table.gauge_refinement or _AT_GAUGES, table.stick_refinement or (_AT_STICK if refine else 1.0)
     if size is None:
         # A thin finger gets two elements across its width; four significant digits keep scene.toml readable.
-        coarse = min(scale * SIZE_SHARE[mesher], smallest_mm(design, solid) / 2.0, base or math.inf)
-        finest = coarse * _FINEST[table.mesher if solid else "ftetwild"]
-        size = four_digits(max(min(coarse, _detail(obj, design, box, solid, mesher)), finest))
+        coarse = min(scale * SIZE_SHARE[kind], smallest_mm(design, solid) / 2.0, base or math.inf)
+        size = four_digits(max(min(coarse, _detail(obj, design, box, kind)), coarse * _FINEST[kind]))
     if base is None:
-        base = max(four_digits(min(scale * BASE_SHARE[mesher], MOST_OF_EXTENT * smallest_mm(design, solid))), size)
+        base = max(four_digits(min(scale * BASE_SHARE[kind], MOST_OF_EXTENT * smallest_mm(design, solid))), size)
     return MeshOptions(size, base, table.mesher, gauge_refinement=local[0], stick_refinement=local[1])
 
 
@@ -106,12 +105,13 @@ def _scale(design: Design, obj: RigidObject, box: Box) -> float:
     return max(design.height_mm, min(_IN_LAYERS * side, _LARGEST_SCALE * design.height_mm))
 
 
-def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str) -> float:
+def _detail(obj: RigidObject, design: Design, box: Box, kind: str) -> float:
     """Return the edge length, mm, that gives a curved contact some elements across, or those of a crest.
 
     A flat object sets none along a side over all of which it touches.
     """
-    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[mesher]
+    solid = kind != "section"
+    sides, edges = [box[1] - box[0], box[3] - box[2]], _ACROSS[kind]
     halves = (design.half_length_mm, 0.5 * design.width_mm) if solid else (design.half_length_mm,)
     wanted, least = [math.inf], [math.inf]
     for side, low, high, half in zip(sides, box[::2], box[1::2], halves, strict=False):
@@ -131,7 +131,4 @@ def _detail(obj: RigidObject, design: Design, box: Box, solid: bool, mesher: str
 
 def smallest_mm(design: Design, solid: bool) -> float:
     """Return the smallest extent of the meshed part, mm."""
-    extents = [design.height_mm, 2.0 * design.half_length_mm]
-    if solid:
-        extents.append(design.width_mm)
-    return min(extents)
+    return min(design.height_mm, 2.0 * design.half_length_mm, design.width_mm if solid else math.inf)

@@ -140,9 +140,7 @@ class Hyperelastic:
             short = 1.0 - area * stretch - scale * excess
             low, high = np.where(short > 0.0, stretch, low), np.where(short < 0.0, stretch, high)
             step = short / slope
-            settled = (np.abs(step) < _THICKNESS_ERROR * stretch) & (
-                slope > 0.0
-            )  # round-off may lead out of the interval
+            settled = (np.abs(step) < _THICKNESS_ERROR * stretch) & (slope > 0.0)  # round-off may leave the interval
             outside = (stretch + step <= low) | (stretch + step >= high) | (slope <= 0.0)
             halved = np.where(np.isinf(high), 2.0 * stretch, 0.5 * (low + high)) - stretch
             f[..., 2, 2] = stretch + np.where(outside & ~settled, halved, step)
@@ -182,10 +180,9 @@ class Hyperelastic:
         """
         isochoric, cof = self.law.stress(f), cofactor(f)
         spherical = self._spherical(f, cof, isochoric, p, relaxing)[..., None, None]
-        if relaxing is None:
-            stress = np.asarray(isochoric + spherical * cof)
-        else:
-            stress = np.asarray(relaxing.isochoric * isochoric + spherical * cof - f @ relaxing.past)
+        stress = np.asarray((1.0 if relaxing is None else relaxing.isochoric) * isochoric + spherical * cof)
+        if relaxing is not None:
+            stress -= f @ relaxing.past
         if self.stiff is not None and slope is not None:
             stress[self.stiff] = self._stress_at_stiff_points(slope, f, p, relaxing)
         return stress

@@ -103,7 +103,8 @@ class IncrementEquations:
     @cached_property
     def factor_cost(self) -> float:
         """Iterations that take as long as a factorisation and the assembly of a tangent."""
-        return max(_LEAST_COST, _FACTOR_COST * len(self.start.body.unknowns) ** (1.0 - 1.0 / self.problem.dim))
+        cost: float = _FACTOR_COST * self.start.body.unknowns.size ** (1.0 - 1.0 / self.problem.dim)
+        return max(_LEAST_COST, cost)
 
     def finished(
         self, now: Configuration, solution: ContactSolution[ContactState], error: float, spent: int

@@ -74,6 +74,8 @@ _FIRST_DAMPING, _MORE_DAMPING, _LEAST_DAMPING = 1.0, 4.0, 1e-4
 change and value), and share below which none is added.  With a factor of 10 the snap of one press in twelve did not
 settle."""
 
+_Secants = list[tuple[Float, Float]]
+
 
 @dataclass(frozen=True)
 class FiniteIncrement(IncrementEquations):
@@ -139,19 +141,18 @@ class FiniteIncrement(IncrementEquations):
         first = increment, now, force = self, *self.initial(guess, expected)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
         linearisation, factors, spent, errors = None if is_new else self.last_linearisation(), 0, 0, [math.inf]
-        secants = list[tuple[Float, Float]]()
+        secants = _Secants()
         for _ in range(_ITERATIONS):
             if linearisation is None:
                 if factors >= (_PATIENT_FACTORS if patient or errors[-1] < _NEAR else _FACTORS):
                     break
                 linearisation = increment.linearise(now, force, local=factors % 2 == 1)
-                factors, secants = factors + 1, []
+                factors, secants = factors + 1, _Secants()
             is_astray = errors[-1] > _ASTRAY
             longest = increment._largest_step if factors and is_astray and not patient else math.inf
             solution, after = increment._advance(now, force, linearisation, longest, None if is_astray else secants)
             spent += solution.iterations
             if after is None:
-                secants = []
                 if factors:
                     break
                 linearisation, (increment, now, force), errors = None, first, [math.inf]
@@ -179,7 +180,7 @@ class FiniteIncrement(IncrementEquations):
         may_snap, rises, snapped = self._may_snap, 0, False
         least, stalls = math.inf, 0
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
-            solution, after = self._advance(now, force, self.linearise(now, force, damping))
+            solution, after = self._advance(now, force, self.linearise(now, force, damping), math.inf, None)
             spent += solution.iterations
             next_error = math.inf if after is None else self._error(after[1], solution.state)
             stalls = 0 if next_error < _FALLS * least else stalls + 1
@@ -214,14 +215,9 @@ class FiniteIncrement(IncrementEquations):
         return ()
 
     def _advance(
-        self,
-        now: Configuration,
-        force: Float,
-        linearisation: Linearisation,
-        longest: float = math.inf,
-        secants: list[tuple[Float, Float]] | None = None,
+        self, now: Configuration, force: Float, linearisation: Linearisation, longest: float, secants: _Secants | None
     ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
-        """Return the contact solution, and the next configuration.
+        """Return the contact solution, and the next configuration, accelerated by secants if they are given.
 
         There is none if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
         """
@@ -249,7 +245,7 @@ class FiniteIncrement(IncrementEquations):
             return solution, None
 
 
-def _accelerated(iterations: Sequence[tuple[Float, Float]]) -> Float:
+def _accelerated(iterations: _Secants) -> Float:
     """Return the next z (m,) of a fixed-point iteration z -> g(z), accelerated by secants (Anderson 1965).
 
     It is the combination of g(z) in the last iterations, with weights of sum 1, that has the shortest step.

@@ -65,8 +65,7 @@ def new_mesh(
         checked_tets(design, field, options)  # before CAD, which takes seconds
     report.say("building the CAD solid")
     body, epsilon = _body(design, symmetry, field)
-    if body.part_labels:
-        field = finer_in_layers(field, body)
+    field = finer_in_layers(field, body)
     cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
     check_surface(body.points, body.surface)
