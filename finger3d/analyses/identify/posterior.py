@@ -43,6 +43,7 @@ below which they need not."""
 _UNTOLD = 0.25
 """Standard deviation of a combination, relative to the range, at which the data do not determine it."""
 
+_LEAST_SD = 1e-12  # of a share
 _STRONG = 0.95  # correlation that is named
 _AT_BOUND = 1e-3  # distance of a share from 0 or 1
 _PART = 0.3  # component of an eigenvector that is named
@@ -208,8 +209,9 @@ def fitted_values(
     )
     covariance = normal(shares, derivative).covariance[0]
     shift = np.linalg.pinv(derivative)
+    whole, part = (np.sqrt(np.diag(shift @ matrix @ shift.T)) for matrix in (np.eye(len(errors)), errors))
     slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
-    numerical = np.minimum(slopes * np.sqrt(np.diag(shift @ errors @ shift.T)), stds)
+    numerical = np.minimum(slopes, stds / np.maximum(whole, _LEAST_SD)) * part
     eigenvalues, vectors = np.linalg.eigh(fisher)
     about = mixture.about(shares)
     told = [
