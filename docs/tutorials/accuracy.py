@@ -24,6 +24,7 @@ import matplotlib.pyplot as plt
 import finger3d
 
 _ = Path("finger.toml").write_text("""
+effects.auto = false  # small strain: quick, and what the text below is about
 [finger]
 geometry = "clipped_cylinder"
 radius_mm = 20.0

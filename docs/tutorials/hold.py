@@ -26,6 +26,7 @@ import numpy as np
 import finger3d
 
 FINGER = """
+effects.auto = false  # small strain: quick, and what the text below is about
 [finger]
 geometry = "clipped_cylinder"
 radius_mm = 100.0

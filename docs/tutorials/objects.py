@@ -23,6 +23,7 @@ import matplotlib.pyplot as plt
 import finger3d
 
 SCENE = """
+effects.auto = false  # small strain: quick, and what the text below is about
 [finger]
 geometry = "clipped_cylinder"
 radius_mm = 20.0

@@ -27,6 +27,7 @@ import finger3d
 
 _ = Path("finger.toml").write_text("""
 title = "A finger 8 mm wide"
+effects.auto = false  # small strain: quick, and what the text below is about
 
 [finger]
 geometry = "clipped_cylinder"
