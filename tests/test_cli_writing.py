@@ -26,7 +26,7 @@ def test_new_says_what_to_do_next(tmp_path, capsys) -> None:
 def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
     loaded = load(scene)
     assert loaded.design.width_mm == 20.0
-    assert loaded.model().mesh == MeshOptions(2.0, 8.0, "ftetwild", gauge_refinement=2.0, stick_refinement=3.5)
+    assert loaded.model().mesh == MeshOptions(1.818, 8.0, "ftetwild", gauge_refinement=2.0, stick_refinement=3.5)
     assert [leg.depth_mm for leg in loaded.legs] == [10.0]
 
 

@@ -17,7 +17,7 @@ from finger3d.cli import main
 COARSE = {
     "press": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
     "gear": "mesh.mesher=swept mesh.size_mm=1.5 mesh.base_size_mm=5.0",
-    "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5",
+    "compare": "mesh.mesher=swept mesh.size_mm=8.0 mesh.base_size_mm=20.0 press.steps=5 effects.auto=false",
     "sensitivity": "mesh.size_mm=3.0 mesh.base_size_mm=10.0",
     "cost": "mesh.mesher=swept mesh.size_mm=4.0 mesh.base_size_mm=12.0",
     "calibrate": "mesh.size_mm=2.0 mesh.base_size_mm=8.0 press.steps=10",
@@ -149,6 +149,7 @@ def test_the_examples_of_models_and_objects_in_python_run(root: Path, folder: Pa
         "press": {"leg": [{"depth_mm": 0.5, "steps": 10}, {"depth_mm": 0.5, "slide_x_mm": 0.3, "steps": 10}]},
         "gauge": [{"name": "g", "x_mm": 1.0, "y_mm": 4.0, "angle_deg": 30.0}],
         "model": {"domain": "plane-strain"},
+        "effects": {"auto": False},
     }
     last = finger3d.press(scene, error=False).last
     assert names["numbers"]["normal_force_N"] == pytest.approx(last.normal_force_N, rel=1e-9)

@@ -26,7 +26,7 @@ def test_a_picture_of_a_scene_has_its_stick_and_its_slip_zone(tmp_path: Path) ->
     from finger3d.contact.friction import SLIP, STICK
     from finger3d.plotting.solid import COLOURS
 
-    coarse = ["mesh.size_mm=1.0", "mesh.base_size_mm=4.0", "press.steps=3"]
+    coarse = ["mesh.size_mm=1.0", "mesh.base_size_mm=4.0", "press.steps=3", "effects.auto=false"]
     _pictures.draw("edge", tmp_path, coarse)
     for status in (STICK, SLIP):
         assert share(tmp_path / "edge.png", COLOURS[status], within=0.15) > 1e-3

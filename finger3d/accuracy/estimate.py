@@ -283,7 +283,9 @@ def discretisation(
     kind = "coarse" if ratio > 1.0 else "finer"
     spread = [(r, other) for r, _, other in told]
     found = ErrorEstimate(
-        discretisation=spread_error(numbers(own, steps[-1]), spread, in_space(steps[-1].readings)),
+        discretisation=spread_error(
+            numbers(own, steps[-1]), spread, PointResolution.of(own, steps[-1]), in_space(steps[-1].readings)
+        ),
         method=_on_meshes([problem for _, problem, _ in told], kind),
         companion_numbers=dict(known),
         ratio=ratio,

@@ -148,7 +148,10 @@ _FITTED = 0.9
 
 
 def spread_error(
-    numbers: Mapping[str, float], companions: Iterable[tuple[float, Mapping[str, float]]], readings: Iterable[Column]
+    numbers: Mapping[str, float],
+    companions: Iterable[tuple[float, Mapping[str, float]]],
+    own: PointResolution,
+    readings: Iterable[Column],
 ) -> dict[str, float]:
     """Return the discretisation error by name, from the spread of a number q over several meshes.
 
@@ -163,14 +166,15 @@ def spread_error(
     Parameters
     ----------
     companions : edge length over that of the mesh, and numbers by name, of every companion
+    own : resolution of the contact points, below which no error is
     readings : columns of the readings among the numbers
     """
     kinds, told = kinds_of(readings), list(companions)
-    found = {}
+    found = _least_errors(numbers, kinds, own)
     for name, value in numbers.items():
         order = _SPREAD_ORDERS.get(kinds[name], ORDER)
         errors = [(value - other[name]) / gain(ratio, order) for ratio, other in told]
-        found[name] = _FITTED * math.sqrt(sum(error**2 for error in errors) / len(errors))
+        found[name] = max(found[name], _FITTED * math.sqrt(sum(error**2 for error in errors) / len(errors)))
     return {name: error for name, error in found.items() if math.isfinite(error)}
 
 
@@ -201,17 +205,26 @@ def mesh_error(
     """
     own, other = resolutions
     kinds = kinds_of(readings)
-    scales, found = largest_readings(numbers, kinds), {}
+    found = _least_errors(numbers, kinds, own)
     for name, value in numbers.items():
-        kind, change, bound = kinds[name], abs(value - companion[name]), own.least.get(name, 0.0)
+        kind, change = kinds[name], abs(value - companion[name])
         if kind.is_length or kind is Kind.AREA:
             # a difference below the resolution of the companion's points does not count
             change = max(0.0, change - other.least.get(name, 0.0))
-        else:
-            scale = scales.get(kind, abs(value))
+        found[name] = max(change / gain(ratio, ORDERS.get(kind, ORDER)), found[name])
+    return {name: float(error) for name, error in found.items() if math.isfinite(error)}
+
+
+def _least_errors(numbers: Mapping[str, float], kinds: Mapping[str, Kind], own: PointResolution) -> dict[str, float]:
+    """Return what the contact points leave open of every number, whatever companions tell."""
+    scales, found = largest_readings(numbers, kinds), dict[str, float]()
+    for name, value in numbers.items():
+        kind, bound = kinds[name], own.least.get(name, 0.0)
+        if not (kind.is_length or kind is Kind.AREA):
             power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
-            bound = max(bound, _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power * scale)
+            floor = _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power
+            bound = max(bound, floor * scales.get(kind, abs(value)))
         if kind is Kind.DISSIPATION:
             bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, kinds, Kind.WORK))
-        found[name] = max(change / gain(ratio, ORDERS.get(kind, ORDER)), bound)
-    return {name: float(error) for name, error in found.items() if math.isfinite(error)}
+        found[name] = bound
+    return found
