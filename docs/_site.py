@@ -99,7 +99,8 @@ def _scene_tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
                 told = choice["properties"][kind].get("const", choice.get("title"))
                 yield f'[{name}] {kind} = "{told}"', choice
         elif name == "effects":
-            tables = {key: table for key, table in node["properties"].items() if "properties" in table}
+            # true and false stand for a table, too
+            tables = {key: table["oneOf"][1] for key, table in node["properties"].items() if "oneOf" in table}
             own = {key: value for key, value in node["properties"].items() if key not in tables}
             yield "[effects]", {"properties": own}
             yield from ((f"[effects.{effect}]", table) for effect, table in tables.items())
