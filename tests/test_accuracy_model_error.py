@@ -9,8 +9,9 @@ import pytest
 
 from finger3d.accuracy import model_error as module
 from finger3d.accuracy.changes import changing_numbers
-from finger3d.accuracy.model_error import LARGE_DEFORMATION, Judged, Judgement, at_large_deformation
+from finger3d.accuracy.model_error import Judged, Judgement, at_large_deformation
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError

@@ -34,9 +34,9 @@ import finger3d
 from finger3d._types import Float, Tree
 from finger3d.accuracy.changes import changing_numbers, natural_scales
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.model_error import LARGE_DEFORMATION
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.analyses.result import PressResult
+from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic
 from finger3d.mechanics.discretise.build import build

@@ -33,16 +33,13 @@ from finger3d.accuracy.changes import (
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.contact.friction import TwoCoefficients
-from finger3d.effects import fill
+from finger3d.effects import LARGE_DEFORMATION, fill
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace
 from finger3d.mechanics.model import Model
-
-LARGE_DEFORMATION = "large_deformation"
-"""The effect that every scene has the data for."""
 
 STRAIN_TOLERANCE = 0.02
 """Principal strain of linear elasticity from which large deformation is used where its change is not known: stresses

@@ -10,10 +10,11 @@ import numpy as np
 
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.accuracy.changes import changing_numbers, two_digits
-from finger3d.accuracy.model_error import LARGE_DEFORMATION, Judgement, at_large_deformation
+from finger3d.accuracy.model_error import Judgement, at_large_deformation
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.mechanics.discretise.problem import Problem

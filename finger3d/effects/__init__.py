@@ -10,6 +10,9 @@ from typing import Any, ClassVar, Protocol
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
 
+LARGE_DEFORMATION = "large_deformation"
+"""The effect that every scene has the data for."""
+
 
 class Effect(Protocol):
     """Settings of an effect: a frozen dataclass whose fields are the keys of its table.

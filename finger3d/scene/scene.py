@@ -10,6 +10,7 @@ from pathlib import Path
 from finger3d._ranges import printable
 from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
+from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
@@ -33,9 +34,6 @@ from finger3d.scene.tables import (
     TomlTable,
     record_of,
 )
-
-LARGE_DEFORMATION = "large_deformation"
-"""The effect that every scene has the data for."""
 
 _AUTO_TOLERANCE = 0.02
 """Default relative change of a number above which an effect is needed."""
