@@ -69,8 +69,8 @@ class Outcome(Enum):
         "[effects.large_deformation], or press less"
     )
     NEWTON = (
-        "large deformation did not settle; the increments before are good; try more increments or a shallower press, "
-        "and a fillet where a sharp edge of the finger folds over"
+        "large deformation did not settle; the increments before are good; try more increments, a shallower press, a "
+        "fillet where a sharp edge of the finger folds over, or small strain, effects.auto = false"
     )
     FORCE_NOT_REACHED = (
         "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"

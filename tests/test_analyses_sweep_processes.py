@@ -19,7 +19,13 @@ import pytest
 from finger3d.analyses.sweep.points import combinations
 from tests.sweep_cases import table
 
-SETTINGS = ("model.domain=plane-strain", "mesh.size_mm=4", "mesh.base_size_mm=16", "press.steps=10")
+SETTINGS = (
+    "model.domain=plane-strain",
+    "mesh.size_mm=4",
+    "mesh.base_size_mm=16",
+    "press.steps=10",
+    "effects.auto=false",
+)
 COARSE = [word for setting in SETTINGS for word in ("--set", setting)]
 SLOW = ("--set", "press.steps=200")
 """Makes a point take some tenths of a second, so that a sweep of few points is still running when a signal comes."""

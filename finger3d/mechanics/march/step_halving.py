@@ -48,13 +48,16 @@ Run: TypeAlias = tuple[int, tuple[StepResult, ...]]
 """Number of increments in an automatic leg, and the results of all increments."""
 
 TOLERANCE = 0.01
-"""Relative error allowed in normal force, friction sum and strain; a strain's is relative to the largest strain."""
+"""Relative error allowed in normal force, friction sum and strain, on the scales of `StepEstimate`."""
 
 DISSIPATION_TOLERANCE = 0.05
 """Relative error allowed in the dissipation, or in a fiftieth of the external work if that is larger."""
 
 _LEAST_DISSIPATION = 0.02
 """Share of the external work in which the error of a smaller dissipation is measured."""
+
+_LEAST_STRAIN = 0.05
+"""Share of the depth over the height in which the error of a smaller strain is measured, as where a gauge reads 0."""
 
 _FIRST, _LARGEST = 5, 640
 
@@ -81,8 +84,9 @@ class StepEstimate:
     Attributes
     ----------
     steps : increments of each automatic leg
-    normal_force, friction_sum : relative to the largest over the ends of the legs
-    gauges : relative to the largest strain of all gauges
+    normal_force : relative to the largest over the ends of the legs
+    friction_sum : relative to the largest over the ends of the legs, or mu times that normal force if it is larger
+    gauges : relative to the largest strain of all gauges, or a twentieth of the depth over the height if that is larger
     dissipation : relative to the dissipation, or to a fiftieth of the external work if that is larger
     met : whether every error is below its tolerance
     runs : in the order of their numbers of increments
@@ -296,16 +300,20 @@ def _estimate(problem: Problem, runs: Sequence[Run]) -> StepEstimate:
     counts, finest = [count for count, _ in runs], ends[-1]
     errors = [errors_of_runs(list(zip(counts, leg, strict=True))) for leg in zip(*ends, strict=True)]
     strains = [name for name, value in finest[-1].items() if name not in _FORCES_AND_ENERGIES and not math.isnan(value)]
-    least = _LEAST_DISSIPATION * max(abs(quantities["external_work_mJ"]) for quantities in finest)
+
+    def largest(*names: str) -> float:
+        return max((abs(quantities[name]) for quantities in finest for name in names), default=0.0)
 
     def largest_error(*names: str, least: float = 0.0) -> float:
-        largest = max((abs(quantities[name]) for quantities in finest for name in names), default=0.0)
         error = max((leg.get(name, math.inf) for leg in errors for name in names), default=0.0)
-        return error / max(largest, least) if error else 0.0
+        return error / max(largest(*names), least) if error else 0.0
 
-    forces, gauges = (largest_error(name) for name in _FORCES_AND_ENERGIES[:2]), largest_error(*strains)
-    normal_force, friction_sum = forces
-    dissipation = largest_error("dissipation_mJ", least=least)
+    model, last = problem.model, _leg_ends(with_steps(problem, counts[-1]), runs[-1][1])
+    compression = max(abs(end.target.depth_mm) for end in last) / model.design.height_mm
+    normal_force = largest_error("normal_force_N")
+    friction_sum = largest_error("friction_sum_N", least=model.friction.largest * largest("normal_force_N"))
+    gauges = largest_error(*strains, least=_LEAST_STRAIN * compression)
+    dissipation = largest_error("dissipation_mJ", least=_LEAST_DISSIPATION * largest("external_work_mJ"))
     return StepEstimate(
         steps=counts[-1],
         normal_force=normal_force,
