@@ -6,13 +6,10 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, short_press
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
-from finger3d.accuracy.refine import Refinement, Round, _affordable, refine_mesh
+from finger3d.accuracy.refine import Refinement, Round, _affordable, _shorter, refine_mesh
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
@@ -22,8 +19,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.meshing.refinement.grading import Grading
+from finger3d.mechanics.results.history import StepResult
 from finger3d.scene import load
 from tests.logs import Log
 from tests.scenes import written
@@ -70,7 +66,6 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     assert len(said.lines) == len(found.rounds) > 1
     assert found.rounds[0].error > 2e-3 >= found.rounds[-1].error
     assert found.rounds[-1].dofs > found.rounds[0].dofs
-    assert found.mesh.grading is not None
     assert found.problem is not None
     assert found.problem.body.stiffness.upper.shape[0] == found.rounds[-1].dofs
     # and it is true, within twice the tolerance
@@ -79,15 +74,15 @@ def test_it_refines_until_the_estimate_is_met_and_says_every_round() -> None:
     assert force[0] == pytest.approx(force[1], rel=2 * 2e-3)
 
 
-@pytest.mark.parametrize("adjoint", [True, False])
-def test_a_mesh_that_is_finer_than_the_tolerance_asks_for_is_made_coarser(adjoint: bool) -> None:
-    model = section(0.1) if adjoint else replace(section(0.15), legs=(Leg(1.0, steps=3, force_N=0.5),))
+@pytest.mark.parametrize("by_depth", [True, False])
+def test_a_mesh_that_is_finer_than_the_tolerance_asks_for_is_made_coarser(by_depth: bool) -> None:
+    model = section(0.1) if by_depth else replace(section(0.15), legs=(Leg(1.0, steps=3, force_N=0.5),))
     found = refine_mesh(model, 0.02)
     assert found.met
     assert found.stopped == "met"
     assert found.best.dofs < 0.7 * found.rounds[0].dofs
     assert (found.mesh.size_mm, found.mesh.base_size_mm) == (found.best.size_mm, found.best.base_size_mm)
-    assert found.best.number == ("normal_force_N" if adjoint else "depth_mm")  # under a force the depth is the unknown
+    assert found.best.number == ("normal_force_N" if by_depth else "depth_mm")  # under a force the depth is the unknown
     # and the error is below the tolerance
     coarse, fine = (build(replace(model, mesh=mesh)) for mesh in (found.mesh, MeshOptions(0.04, 0.2, "swept")))
     ends = [list(march(p))[-1] for p in (coarse, fine)]
@@ -102,17 +97,22 @@ def test_a_mesh_that_just_meets_the_tolerance_is_kept() -> None:
     assert found.mesh == section(0.4).mesh
 
 
-def test_a_mesh_is_refined_where_its_goal_needs_it() -> None:
+def test_edges_at_a_gauge_become_shorter_for_its_strain_only() -> None:
     model = replace(section(0.5), gauges=(Gauge("g", 1.5, 4.0, angle=0.5),))
+    found = {goal: refine_mesh(model, 2e-3, goal=goal).mesh.gauge_refinement for goal in ("gauge_g", "normal_force_N")}
+    assert found["gauge_g"] > 1.0
+    assert found["normal_force_N"] == 1.0
 
-    def edge_ratio(goal: str, tolerance: float) -> float:
-        """Edge length at the gauge over that at the corner of the base."""
-        found = refine_mesh(model, tolerance, goal=goal)
-        assert found.mesh.grading is not None
-        at_gauge, at_corner = found.mesh.grading.at(np.array([[1.5, 4.0], [5.0, 0.0]]), 0.25)
-        return float(at_gauge / at_corner)
 
-    assert edge_ratio("gauge_g", 5e-3) < 0.5 * edge_ratio("normal_force_N", 3e-4)
+def test_edges_of_other_zones_are_kept() -> None:
+    mesh = MeshOptions(1.0, 4.0, gauge_refinement=2.0, stick_refinement=4.0)
+    base, contact, gauges, border = (_shorter(mesh, {zone}, 0.5) for zone in ("base", "contact", "gauges", "border"))
+    assert (base.size_mm, base.base_size_mm, base.gauge_refinement, base.stick_refinement) == (1.0, 2.0, 2.0, 4.0)
+    # edges at gauges and at the border are given over those at the contact
+    assert (contact.size_mm, contact.base_size_mm) == (0.5, 4.0)
+    assert (contact.gauge_refinement, contact.stick_refinement) == (1.0, 2.0)
+    assert (gauges.size_mm, gauges.gauge_refinement, gauges.stick_refinement) == (1.0, 4.0, 4.0)
+    assert (border.size_mm, border.gauge_refinement, border.stick_refinement) == (1.0, 2.0, 8.0)
 
 
 @pytest.mark.parametrize(
@@ -159,68 +159,12 @@ def test_a_goal_that_the_press_has_not_is_refused_by_its_name(
     assert "stick_half_length_mm" in str(found.value)
 
 
-def test_a_goal_of_stick_shortens_the_edges_at_its_border_only() -> None:
-    # the largest refinement of the border alone reaches some 1.1 %
-    found = refine_mesh(section(0.5), 0.015, goal="stick_area_mm2")
-    assert found.mesh.size_mm == 0.5
-    assert found.mesh.stick_refinement > 4.0
-    assert found.mesh.borders is None  # a press finds them anew
-    assert "mm at the border of stick" in found.rounds[-1].line(1)
-    assert found.rounds[-1].dofs < 2.5 * found.rounds[0].dofs
-
-
-def test_all_numbers_are_refined_for_together() -> None:
-    one, other = (Grading(np.full((2, 3), at), np.full(2, size)) for at, size in ((0.0, 1.0), (5.0, 0.5)))
-    coarse = MeshOptions(1.0, 4.0, grading=one, gauge_refinement=4.0, refined_gauges=("a",))
-    fine = MeshOptions(0.5, 3.0, grading=other, stick_refinement=2.0)
-    both = finest([coarse, fine])
-    assert (both.size_mm, both.base_size_mm, both.stick_refinement) == (0.5, 3.0, 2.0)
-    assert (both.gauge_refinement, both.refined_gauges) == (2.0, ("a",))  # 0.25 mm, as before
-    assert both.grading is not None
-    assert both.grading.at(np.array([[0.0] * 3, [5.0] * 3]), 0.3) == pytest.approx([1.0, 0.5])
-
-
-@pytest.mark.slow
-def test_a_graded_solid_needs_a_fraction_of_the_unknowns() -> None:
-    # 303.52 N: extrapolated from validation/cost_of_accuracy, where equal grading needs 79 290 unknowns for 0.1 %
-    scene = load(Path(__file__).parents[1] / "geometries" / "fig9.toml", ["press.steps=5", "mesh.mesher=swept"])
-    found = refine_mesh(replace(scene.model(), mesh=MeshOptions(4.0, 16.0, "swept")), 1.5e-3)
-    assert found.met
-    assert found.problem is not None
-    step = list(march(found.problem))[-1]
-    assert measure(found.problem.points, step)["normal_force_N"] == pytest.approx(303.52, rel=1e-3)
-    assert found.rounds[-1].dofs < 79_290 / 2
-
-
-def test_a_press_without_adjoint_bars_is_refined_by_a_companion(monkeypatch: pytest.MonkeyPatch) -> None:
-    def unknown(*_: object) -> None:
-        raise NoAdjointBarsError("the contact forces are not unique")
-
-    monkeypatch.setattr("finger3d.accuracy.refine.adjoint_bars", unknown)
-    found = refine_mesh(section(1.0), 1e-2)
-    assert found.met
-    assert found.mesh.grading is None
-
-
 def test_the_time_stops_it_with_the_best_so_far() -> None:
     found = refine_mesh(section(0.4), 1e-4, max_seconds=0.0)
     assert len(found.rounds) == 1
     assert not found.met
     assert found.warning.startswith("mesh.tolerance = 0.0001")
     assert f"{found.rounds[0].error:.2g}" in found.warning
-
-
-def test_a_graded_mesh_is_forecast_by_its_cells() -> None:
-    found = refine_mesh(section(0.5), 1e-4, max_seconds=1e4)
-    assert found.met
-    first, second = found.rounds[0], found.rounds[1]
-    problem = build(section(0.5))
-    short, steps = short_press(problem)
-    bars = adjoint_bars(short, steps)
-    force = -steps[-1].meshed_state.contact.force[:, 0].sum() * 2.0
-    growth = cell_growth(short, graded_sizes(short, bars, "normal_force_N", 0.9 * 1e-4 * abs(force)))
-    # prescribed lengths grow with the distance, and rows of the structured mesh are as fine as their finest place
-    assert 0.5 * growth < second.dofs / first.dofs < 4.0 * growth
 
 
 def test_too_large_a_mesh_stops_it_with_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,12 +223,10 @@ def test_press_with_a_tolerance(tmp_path: Path, domain: str, mesher: str, tolera
     assert summary["mesh"]["dofs"] == last["dofs"]
     assert summary["outcome"] == "converged"
     assert last["number"] == "normal_force_N"
-    # the scene as run loads; it has the sizes found, or the tolerance for which a graded mesh is found again
+    # the scene as run loads, and has the sizes found
     again = load(tmp_path / "out" / "scene.toml")
-    if again.tables.mesh.tolerance is None:
-        assert again.mesh == MeshOptions(last["size_mm"], last["base_size_mm"], mesher)  # type: ignore[arg-type]
-    else:
-        assert again.tables.mesh.tolerance == tolerance
+    assert again.tables.mesh.tolerance is None
+    assert (again.mesh.size_mm, again.mesh.base_size_mm) == (last["size_mm"], last["base_size_mm"])
 
 
 def test_the_warning_reaches_the_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

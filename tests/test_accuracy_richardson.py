@@ -1,4 +1,4 @@
-"""Richardson extrapolation of quantities on two meshes."""
+"""Discretisation errors from the spread over several meshes."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import ORDER, mesh_error
-from finger3d.mechanics.readings.columns import strain_columns
+from finger3d.accuracy.richardson import ORDER, spread_error
 
 
 def test_the_order_is_that_of_the_corners_of_the_base() -> None:
@@ -20,18 +18,24 @@ def test_the_order_is_that_of_the_corners_of_the_base() -> None:
     assert pytest.approx(2.0 * root, abs=0.01) == ORDER
 
 
-def test_an_error_of_the_assumed_order_is_found_exactly() -> None:
-    exact, scale = 7.0, 0.3
-    fine, coarse = ({"normal_force_N": exact + scale * h**ORDER, "gauge_g": 0.0} for h in (1.0, 2.0))
-    # the grain is so fine that its floor, 0.1 * share^2 of the force, lies far below
-    found = mesh_error(
-        fine, coarse, 2.0, (PointResolution(1e-3, 1e-3), PointResolution(2e-3, 2e-3)), strain_columns("g")
-    )
-    assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
+NUMBERS = {"normal_force_N": 2.0, "contact_half_length_mm": 1.0, "stick_area_mm2": 0.5, "force_x_N": 0.0}
 
 
-def test_an_error_is_found_exactly_from_a_finer_mesh_too() -> None:
+def test_an_error_of_the_assumed_order_is_found_exactly_from_coarser_and_finer_meshes() -> None:
     exact, scale = 7.0, 0.3
-    own, finer = ({"normal_force_N": exact + scale * h**ORDER} for h in (1.0, 0.5))
-    found = mesh_error(own, finer, 0.5, (PointResolution(1e-3, 1e-3), PointResolution(5e-4, 5e-4)))
-    assert found["normal_force_N"] == pytest.approx(scale, rel=1e-12)
+    by_edge = {h: NUMBERS | {"normal_force_N": exact + scale * h**ORDER} for h in (0.5, 1.0, 2.0**0.5, 2.0, 4.0)}
+    companions = [(h, numbers) for h, numbers in by_edge.items() if h != 1.0]
+    found = spread_error(by_edge[1.0], companions)
+    assert found["normal_force_N"] == pytest.approx(0.9 * scale, rel=1e-12)
+
+
+def test_one_companion_that_agrees_by_chance_does_not_make_the_error_vanish() -> None:
+    other = NUMBERS | {"normal_force_N": 2.3}
+    one, both = spread_error(NUMBERS, [(2.0, other)]), spread_error(NUMBERS, [(2.0, other), (4.0, NUMBERS)])
+    assert both["normal_force_N"] == pytest.approx(one["normal_force_N"] / 2.0**0.5, rel=1e-12)
+
+
+def test_no_error_is_below_what_the_distance_of_the_points_leaves_open() -> None:
+    found = spread_error(NUMBERS, [(2.0, NUMBERS)], spacing=0.1)
+    # 0.002 h/a of the number itself, for a net force of the normal force
+    assert found == pytest.approx(dict(zip(NUMBERS, (4e-4, 2e-4, 1e-4, 4e-4), strict=True)), rel=1e-12)

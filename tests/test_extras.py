@@ -100,7 +100,8 @@ def test_the_full_extra_brings_what_the_readme_shows(root: Path) -> None:
     assert set(shown) <= brought
 
 
-def test_a_command_that_lacks_its_extra_ends_with_one_line(root, paper_scene, tmp_path) -> None:
+def test_a_command_that_lacks_its_extra_ends_with_one_line(root, paper_scene, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("FINGER3D_CACHE", str(tmp_path / "cache"))  # a mesh from the cache needs no mesher
     scene = str(paper_scene)
     cases = [
         (["press", scene, "--out", "o", "--set", "mesh.mesher=ftetwild"], "cad"),

@@ -14,7 +14,6 @@ from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import MooneyRivlin, NeoHooke
 from finger3d.fem.mesh.parts import ElasticityByPart, elasticity_of
 from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.recovery.patch_recovery import PatchRecovery
 from finger3d.fem.recovery.recover import strain_and_stress
 from finger3d.fem.solids.deformed import nodal_fields
 from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian
@@ -94,16 +93,6 @@ def test_a_law_of_some_cells_is_that_of_their_part() -> None:
     stress = law.stress(strain)
     np.testing.assert_array_equal(stress[:2], laws[0].stress(strain[:2]))
     np.testing.assert_array_equal(stress[2:6], laws[1].stress(strain[2:6]))
-
-
-def test_recovery_does_not_smooth_a_jump_of_strain_between_parts() -> None:
-    mesh = layered(2)
-    recovery = PatchRecovery.of(mesh)
-    strain = np.where(mesh.part == 1, 5.0, -2.0)
-    samples = np.repeat(strain, 3)[:, None]
-    cells, bary = np.arange(len(mesh.cells)), np.full((1, 3), 1.0 / 3.0)
-    found = recovery.evaluated(recovery.polynomials(samples), cells, bary)[:, 0, 0]
-    np.testing.assert_allclose(found, strain, rtol=1e-10)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def test_a_factor_without_memory_is_a_lack_of_memory(monkeypatch: pytest.MonkeyP
         phase = arguments[4]._obj.value
         arguments[-1]._obj.value = -2 if phase == 22 else 0  # PARDISO's number for it
 
-    monkeypatch.setattr(pardiso, "_library", lambda: refuses)
+    monkeypatch.setattr(pardiso, "_library", lambda: (refuses, lambda count: 0, 1))
     with pytest.raises(MemoryError):
         pardiso.PardisoFactor(sp.csr_matrix(np.eye(3)), 1)
 

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from finger3d._types import Float
-from finger3d.accuracy.adjoint_bars import adjoint_bars
+from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
@@ -183,5 +183,5 @@ def test_a_reading_of_another_kind_needs_a_class_and_nothing_else(effect: object
     (step,) = steps_of({"steps": [entry]})
     assert step.other_readings == {"wire": read}
     if effect is None:
-        bar = adjoint_bars(problem, frames).bars["reading_wire"]
+        bar = estimate(problem, frames, numbers=press_numbers).discretisation["reading_wire"]
         assert 0.0 < bar < abs(read)

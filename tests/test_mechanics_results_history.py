@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finger3d.accuracy.point_resolution import least_bars
-from finger3d.contact.friction import OPEN, STICK, Coulomb
+from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.solids.material import Isotropic
@@ -17,9 +16,8 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
-from finger3d.objects import MeshObject, ObjectPose, Sphere
-from tests.bodies import box
-from tests.models import ended, small_section, swept_fig9
+from finger3d.objects import ObjectPose, Sphere
+from tests.models import ended, small_section
 
 
 def grid(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
@@ -75,35 +73,6 @@ def test_a_length_does_not_depend_on_the_half_that_is_meshed() -> None:
         assert last < numbers["contact_half_length_mm"] < line[line > last].min()
         lengths.append([numbers["contact_half_length_mm"], numbers["stick_half_length_mm"]])
     assert lengths[0] == pytest.approx(lengths[1], rel=1e-9)
-
-
-def test_an_area_is_uncertain_by_a_share_of_a_spacing_all_round() -> None:
-    # a circle of radius 8: its border cuts facets over a width of some 1.3 spacings
-    points = grid(31, 31, shift=-15.0)
-    touching = np.hypot(points.points[:, 0] - 15.0, points.points[:, 2]) <= 8.0
-    far = np.hypot(points.points[:, 0] - 15.0, points.points[:, 2]) - 8.0
-    state = ContactState(
-        np.where(touching, STICK, OPEN), np.zeros((len(touching), 3)), np.maximum(far, 0.0),
-        np.zeros((len(touching), 2)), np.zeros((len(touching), 2)),
-    )  # fmt: skip
-    frame = StepResult(
-        ObjectPose(1.0), state, state, (15.0, 0.0), np.zeros(3), {}, 0.0, 0.0, Outcome.CONVERGED, 0.0, 1, "newton", 0.0
-    )
-    model = swept_fig9(4.0, mu=0.25)
-    bars = least_bars(points, frame, 1.0, model)
-    with_edges = least_bars(points, frame, 1.0, replace(model, object=MeshObject(surface=box(2.0, 3.0, 4.0))))
-    around = 2.0 * np.pi * 8.0
-    # no point slips around it; where no friction is used at its border, there is no slip between the points
-    sticking = np.where(touching[:, None], [1.0, 0.0, 0.0], 0.0)
-    sure = least_bars(points, replace(frame, state=replace(state, force=sticking)), 1.0, model)
-    assert 0.275 * around <= bars["stick_area_mm2"] <= 1.4 * 0.275 * around
-    assert sure["stick_area_mm2"] == pytest.approx(0.075 / 0.275 * bars["stick_area_mm2"], rel=1e-12)
-    assert 0.02 * around <= bars["contact_area_mm2"] <= 0.06 * around
-    assert 0.25 * around <= with_edges["contact_area_mm2"] <= 1.4 * 0.25 * around
-    # both ends lie one spacing before the next point of the line
-    # of the circle, the last points are alone
-    assert bars["stick_half_length_mm"] == pytest.approx(0.35, rel=1e-12)  # the last points are alone
-    assert with_edges["contact_half_length_mm"] == pytest.approx(0.25, rel=1e-12)
 
 
 def test_without_contact_the_force_is_0_and_not_minus_0() -> None:

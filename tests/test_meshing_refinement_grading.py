@@ -25,14 +25,3 @@ def test_a_size_between_two_classes_errs_by_less_than_half_a_class() -> None:
     sizes = np.geomspace(0.1, 10.0, 50)
     found = [Grading(np.zeros((1, 3)), np.array([size])).at(np.zeros((1, 3)), 0.3)[0] for size in sizes]
     assert np.abs(np.log2(np.array(found) / sizes)).max() <= 0.25 + 1e-12
-
-
-def test_in_a_section_the_width_does_not_count() -> None:
-    plane = np.array([[1.0, 2.0]])
-    assert GRADING.in_section.at(plane, 0.3)[0] == pytest.approx(0.25)
-    assert GRADING.at(plane, 0.3)[0] == pytest.approx(0.25 + 0.3 * 0.5)
-
-
-def test_the_key_is_that_of_the_content() -> None:
-    assert GRADING.key == Grading(GRADING.points.copy(), GRADING.sizes.copy()).key
-    assert GRADING.key != GRADING.in_section.key

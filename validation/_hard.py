@@ -214,7 +214,7 @@ def coarse_and_deep(quick: bool) -> Iterator[Row]:
 def _pressed(folder: str, *changes: str) -> Any:
     path = Path(folder, "scene.toml")
     path.write_text(SCENE, encoding="utf-8")
-    return press(load(path, changes), Path(folder, "out"), figures=False)
+    return press(load(path, ["effects.auto=false", *changes]), Path(folder, "out"), figures=False)
 
 
 def _warned(result: Any, words: str) -> bool:
@@ -254,7 +254,7 @@ def surfaces(quick: bool) -> Iterator[Row]:
             path = Path(folder, "scene.toml")
             path.write_text(text, encoding="utf-8")
             # the edge is averaged over a hat, which must be low beside the depth of 0.5 mm
-            result = press(load(path, ["mesh.size_mm=0.25"]), Path(folder, "out"), figures=False)
+            result = press(load(path, ["effects.auto=false", "mesh.size_mm=0.25"]), Path(folder, "out"), figures=False)
             forces.append(result.summary()["steps"][-1]["normal_force_N"] if result.outcome.ok else np.nan)
         yield Row("STL prism touching at its edge: force over that of the wedge", ROBUST, 1, forces[1] / forces[0],
                   1e-9, "the same surface")  # fmt: skip

@@ -83,7 +83,7 @@ def _scene(size: float, base: float) -> Scene:
             "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
                        "edge_height_mm": 36.6, "width_mm": 20.0},
             "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.25}, "press": {"depth_mm": 10.0, "steps": 10},
-            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"},
+            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"}, "effects": {"auto": False},
         }
     )  # fmt: skip
 

@@ -31,19 +31,16 @@ from typing import Any
 import numpy as np
 
 import finger3d
-from finger3d._types import Float, Tree
-from finger3d.accuracy.changes import changing_numbers, natural_scales
+from finger3d._types import Tree
+from finger3d.accuracy.changes import changing_numbers, natural_scales, unresolved
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.analyses.result import PressResult
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.finite_strain.state import FiniteStrainWorkspace
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.objects import Move
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
@@ -132,10 +129,8 @@ class Pressed:
     zones: Mapping[str, float]
 
     @classmethod
-    def of(cls, model: Model, ends: dict[Move, tuple[Float, Float]], with_free_strain: bool = False) -> Pressed:
+    def of(cls, model: Model, with_free_strain: bool = False) -> Pressed:
         """Press a model; the free strain of stiff gauges takes a second press of the body without them.
-
-        `ends` are those of similar presses on the same mesh, where the iterations begin.
 
         Raises
         ------
@@ -144,11 +139,10 @@ class Pressed:
         """
         problem, cancel = build(model), Event()
         problem = problem if with_free_strain else replace(problem, without_inclusions=None)
-        workspace = FiniteStrainWorkspace(ends=ends) if model.finite_strain else None
         timer = Timer(MOST_S, cancel.set)
         timer.start()
         try:
-            *_, step = march(problem, workspace=workspace, cancel=cancel)
+            *_, step = march(problem, cancel=cancel)
         except CancelledError:
             raise Finger3dError(f"the press takes more than {MOST_S:g} s") from None
         finally:
@@ -157,7 +151,7 @@ class Pressed:
             raise Finger3dError(f"the press did not converge ({step.outcome})")
         numbers = changing_numbers(problem, step)
         scales = natural_scales(model, step.target.depth_mm, numbers)
-        return cls(numbers, scales, PointResolution.of(problem, step).zone_bars)
+        return cls(numbers, scales, unresolved(problem, step, scales))
 
 
 def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
@@ -170,9 +164,8 @@ def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
     """
     names = (LARGE_DEFORMATION, *scene.effects)
     everything = scene.with_effects(names).model()
-    ends = dict[Move, tuple[Float, Float]]()
-    every = Pressed.of(everything, ends)
-    without = {effect: Pressed.of(_without(scene, names, effect), ends) for effect in names}
+    every = Pressed.of(everything)
+    without = {effect: Pressed.of(_without(scene, names, effect)) for effect in names}
     start = time.perf_counter()
     auto = finger3d.press(scene)
     seconds = time.perf_counter() - start
@@ -190,7 +183,7 @@ def compare(name: str, scene: Scene, with_truth: bool) -> Compared:
         return found
     finer = FINER["solid" if scene.domain == "solid" else "section"]
     mesh = replace(scene.mesh, size_mm=finer * scene.mesh.size_mm, base_size_mm=finer * scene.mesh.base_size_mm)
-    truth = Pressed.of(replace(everything, mesh=mesh), {}, with_free_strain=True)
+    truth = Pressed.of(replace(everything, mesh=mesh), with_free_strain=True)
     return replace(found, shares=tuple(_errors_over_bars(auto, truth.numbers)))
 
 

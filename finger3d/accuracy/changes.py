@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from finger3d._types import Tree
-from finger3d.accuracy.richardson import Kind, kinds_of, largest
+from finger3d.accuracy.richardson import Kind, kinds_of, largest, spacing
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
@@ -22,6 +22,9 @@ FAILURES = Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, Memor
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""
+
+_UNRESOLVED = 0.3
+"""Error of the place of a border of contact or stick over the distance of the contact points, on a coarse mesh."""
 
 _LEAST_CHANGE = 0.01
 """Least significant change, over the natural scale of the number."""
@@ -117,6 +120,7 @@ def natural_scales(model: Model, depth_mm: float, numbers: Mapping[str, float]) 
     for strains, the depth for displacements, and the mean pressure on the base for taxels.
     """
     kinds, force, design = kinds_of(model.columns), abs(numbers["normal_force_N"]), model.design
+    numbers = {name: value for name, value in numbers.items() if name in kinds}  # without strains of free gauges
     base = 2.0 * design.half_length_mm * design.width_mm
 
     def scale(name: str) -> float:
@@ -136,3 +140,14 @@ def natural_scales(model: Model, depth_mm: float, numbers: Mapping[str, float]) 
         return abs(numbers[name])
 
     return {name: scale(name) for name in numbers if math.isfinite(numbers[name])}
+
+
+def unresolved(problem: Problem, step: StepResult, scales: Mapping[str, float]) -> dict[str, float]:
+    """Return the changes of lengths and areas by name that contact points do not resolve.
+
+    Parameters
+    ----------
+    scales : natural scales of the numbers, see `natural_scales`
+    """
+    kinds, share = kinds_of(problem.model.columns), _UNRESOLVED * spacing(problem, step)
+    return {name: share * scale for name, scale in scales.items() if kinds[name].is_zone}

@@ -1,8 +1,7 @@
 """Error estimate of a press: the discretisation error, and the error due to the size of the increments.
 
-In small strain under a rigid object the discretisation error follows from the condensed body itself
-(`finger3d.accuracy.adjoint_bars`).  At large deformation, with viscosity, inclusions or an elastic object, and under a
-prescribed force it is taken from a companion mesh (`finger3d.mechanics.discretise.companions`).
+The discretisation error follows from the same press on companion meshes (`finger3d.mechanics.discretise.companions`,
+`finger3d.accuracy.richardson`).
 
 Which counts of increments are solved, and on which mesh, follows from the numbers of increments, unknowns and contact
 points.  Two identical presses hence have identical error bars, whatever the load of the machine.
@@ -12,29 +11,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from finger3d._cost import INCREMENT_ERRORS
-from finger3d._types import Float, Tree
-from finger3d.accuracy.adjoint_bars import AdjointBars, NoAdjointBarsError, adjoint_bars, applies
+from finger3d._types import Float
+from finger3d.accuracy.companion_presses import FAILURES, CompanionPress, companion_presses
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.point_resolution import PointResolution
-from finger3d.accuracy.richardson import mesh_error, spread_error
-from finger3d.accuracy.weighted_residuals import BodyErrors
+from finger3d.accuracy.richardson import gain, kinds_of, spacing, spread_error
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.companions import coarse_companions, companion, edge_ratio, is_unstructured
+from finger3d.mechanics.discretise.companions import edge_ratio, is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
-    FEW_CUTS,
-    Run,
     StepEstimate,
     errors_of_runs,
     last_step,
-    rough_workspace,
     step_error,
     with_increments_of,
 )
@@ -47,11 +41,11 @@ from finger3d.progress import QUIET, Progress
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
+Companions = Callable[[Problem, StepEstimate | None, Progress], list[CompanionPress]]
+"""Returns the presses of companions, as `companion_presses` does."""
+
 _MESHED_S = 1.0
 """Seconds above which a mesh was made by pytetwild and not read from the cache."""
-
-_FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
-"""Errors that end one part of an estimate, and no other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,16 +56,10 @@ class ErrorEstimate(ErrorBars):
     ----------
     companion_numbers : numbers of the companion by name; empty without a companion mesh
     ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
-    body : signed errors that the body's mesh causes, with the shares of its cells; None with a companion mesh
     """
 
     companion_numbers: dict[str, float] = field(default_factory=dict)
     ratio: float = math.nan
-    body: BodyErrors | None = None
-
-    def as_dict(self) -> Tree:
-        """Return the entries of summary.json, with the signed errors of the body's mesh where they are known."""
-        return super().as_dict() | ({"signed": dict(self.body.signed)} if self.body else {})
 
 
 def main_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
@@ -91,31 +79,16 @@ def press_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
 
 
-def compared(
-    problem: Problem, step: StepResult, beside: Problem, last: StepResult, numbers: Measure = main_numbers
-) -> dict[str, float]:
-    """Return the discretisation error by name, from an increment of a problem and one of its companion."""
-    resolutions = PointResolution.of(problem, step), PointResolution.of(beside, last)
-    ratio, columns = edge_ratio(problem, beside), in_space(step.readings)
-    return mesh_error(numbers(problem, step), numbers(beside, last), ratio, resolutions, columns)
-
-
-def reading_error(
-    problem: Problem, step: StepResult, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge"
-) -> Float:
+def reading_error(problem: Problem, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge") -> Float:
     """Return the discretisation error (m,) of a reading at several coefficients of friction.
 
     Parameters
     ----------
-    step : last increment at any of the coefficients, for the resolution of the contact points
     fine, coarse : (m,) readings of the problem and of its companion
     kind : of the reading: gauge, marker or taxel
     """
-    columns = [Column(str(k), kind) for k in range(len(fine))]
-    numbers, other = (by_key(dict(zip(columns, map(float, reading), strict=True))) for reading in (fine, coarse))
-    resolutions = (PointResolution.of(problem, step),) * 2
-    found = mesh_error(numbers, other, edge_ratio(problem, beside), resolutions, columns)
-    return np.array([found.get(column.key, math.nan) for column in columns])
+    order = kinds_of([column := Column("", kind)])[column.key].order
+    return np.abs(fine - coarse) / gain(edge_ratio(problem, beside), order)
 
 
 def estimate(
@@ -124,6 +97,7 @@ def estimate(
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
     chosen: StepEstimate | None = None,
+    companions: Companions = companion_presses,
 ) -> ErrorEstimate:
     """Estimate the errors of the last increment from the mesh and from other counts of increments.
 
@@ -133,6 +107,7 @@ def estimate(
     report : receives the messages
     numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
     chosen : how automatic increments were chosen
+    companions : presses the companions, or returns what was pressed already
 
     Returns
     -------
@@ -148,13 +123,13 @@ def estimate(
     own = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
     beside, where = None, ""
     try:
-        found, beside, where = discretisation(own, steps, report, numbers, used)
-    except _FAILURES as error:
+        found, beside, where = discretisation(own, steps, report, numbers, used, companions)
+    except FAILURES as error:
         found = ErrorEstimate(method=f"mesh: no estimate: {_reason(error)}")
     try:
         known = found.companion_numbers
         increment_errors, by = _of_increments(own, steps, (beside, where, known), numbers, used)
-    except _FAILURES as error:
+    except FAILURES as error:
         increment_errors, by = {}, f"no estimate: {_reason(error)}"
     if own.model.ends_at_force:  # the normal force is given
         mesh = {name: error for name, error in found.discretisation.items() if name not in GIVEN_BY_FORCE}
@@ -170,10 +145,9 @@ def estimate_with_grid(
     grid: MarkerGrid,
     report: Progress = QUIET,
     chosen: StepEstimate | None = None,
+    companions: Companions = companion_presses,
 ) -> tuple[ErrorEstimate, dict[str, float]]:
     """Estimate the errors of a press, and those of the displacements of a grid of markers.
-
-    Those of the grid come from a companion mesh in any case: an adjoint for every marker would cost more.
 
     Returns
     -------
@@ -188,15 +162,10 @@ def estimate_with_grid(
         return press_numbers(p, step) | moved(p, step)
 
     if not steps or not steps[-1].outcome.ok:
-        return estimate(problem, steps, report, press_numbers, chosen), {}
+        return estimate(problem, steps, report, press_numbers, chosen, companions), {}
     own = grid.readings(problem, steps[-1])
-    if applies(problem.model):
-        found = estimate(problem, steps, report, press_numbers, chosen)
-        markers = estimate(problem, [*steps[:-1], replace(steps[-1], readings=own)], report, moved, chosen)
-        missing = "" if markers.discretisation else f"; marker grid: {markers.method}"
-        return replace(found, method=found.method + missing), markers.totals()
     read = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)]
-    found = estimate(problem, read, report, both, chosen)
+    found = estimate(problem, read, report, both, chosen, companions)
     totals, of_grid = found.totals(), by_key(own)
 
     def of_press(errors: Mapping[str, float]) -> dict[str, float]:
@@ -240,7 +209,7 @@ def _of_increments(
         try:
             there = numbers(own, steps[-1]) if judged is own else known or numbers(judged, last_step(judged))
             errors = step_error(judged, there, numbers, ratio)
-        except _FAILURES as error:
+        except FAILURES as error:
             failure = failure or error
             continue
         by = "twice" if ratio > 1.0 else "half"
@@ -258,6 +227,7 @@ def discretisation(
     report: Progress = QUIET,
     numbers: Measure = main_numbers,
     chosen: StepEstimate | None = None,
+    companions: Companions = companion_presses,
 ) -> tuple[ErrorEstimate, Problem, str]:
     """Estimate the discretisation errors of the last increment.
 
@@ -267,64 +237,19 @@ def discretisation(
     beside : a press that costs less than this one
     where : what that press differs in, in words
     """
-    bars = _own_bars(own, steps, chosen.runs if chosen else ()) if numbers in (main_numbers, press_numbers) else None
-    if bars is not None:
-        named = {name: bars.bars[name] for name in numbers(own, steps[-1])}
-        method = "mesh: dual-weighted residuals, and every second multiplier"
-        return (
-            ErrorEstimate(discretisation=named, method=method, body=bars.body),
-            replace(bars.coarse, model=own.model, contact_geometry=None),  # it is pressed to other poses
-            "with every second multiplier",
-        )
-    told = list(_pressed_companions(own, steps, report, numbers, chosen))
-    if not told:
-        raise Finger3dError("no other mesh of this body could be pressed for an estimate; change mesh.size_mm")
-    ratio, beside, known = told[0]
+    pressed = companions(own, chosen, report)
+    told = [(one.ratio, numbers(one.problem, one.end)) for one in pressed]
+    ratio, beside, _ = pressed[0]
     kind = "coarse" if ratio > 1.0 else "finer"
-    spread = [(r, other) for r, _, other in told]
     found = ErrorEstimate(
         discretisation=spread_error(
-            numbers(own, steps[-1]), spread, PointResolution.of(own, steps[-1]), in_space(steps[-1].readings)
+            numbers(own, steps[-1]), told, in_space(steps[-1].readings), spacing(own, steps[-1])
         ),
-        method=_on_meshes([problem for _, problem, _ in told], kind),
-        companion_numbers=dict(known),
+        method=_on_meshes([one.problem for one in pressed], kind),
+        companion_numbers=told[0][1],
         ratio=ratio,
     )
     return found, beside, f"on the {kind} mesh"
-
-
-def _pressed_companions(
-    own: Problem, steps: Sequence[StepResult], report: Progress, numbers: Measure, chosen: StepEstimate | None
-) -> Iterator[tuple[float, Problem, Mapping[str, float]]]:
-    """Yield the ratio of edge lengths, the problem and the numbers of companions in the increments of the press.
-
-    They are those on coarser meshes, or a finer one where there are none; what does not converge is left out.
-    """
-    made = False
-    for ratio, beside in coarse_companions(own, report, chosen.beside if chosen else None):
-        try:
-            yield ratio, beside, numbers(beside, _last_of(beside, len(steps), chosen))
-        except _FAILURES:
-            continue
-        made = True
-    if not made:
-        beside = companion(own, report)
-        yield edge_ratio(own, beside), beside, numbers(beside, _last_of(beside, len(steps), None))
-
-
-def _last_of(beside: Problem, increments: int, chosen: StepEstimate | None) -> StepResult:
-    """Return the last increment of a companion, pressed roughly unless it is known."""
-    if chosen and chosen.beside and chosen.beside.mesh is beside.mesh and len(chosen.runs[-1][1]) == increments:
-        return chosen.runs[-1][1][-1]
-    return last_step(beside, rough_workspace(beside), cuts=FEW_CUTS)
-
-
-def _own_bars(own: Problem, steps: Sequence[StepResult], runs: Sequence[Run]) -> AdjointBars | None:
-    """Return the error bars from the condensed body itself; None where a companion mesh is needed."""
-    try:
-        return adjoint_bars(own, steps, runs) if applies(own.model) else None
-    except NoAdjointBarsError:
-        return None
 
 
 def _marching_cost(problem: Problem) -> float:

@@ -29,9 +29,9 @@ from finger3d.accuracy.changes import (
     changing_numbers,
     natural_scales,
     two_digits,
+    unresolved,
 )
 from finger3d.accuracy.cost import forecast, without_output_s
-from finger3d.accuracy.point_resolution import PointResolution
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects import LARGE_DEFORMATION, fill
 from finger3d.errors import Finger3dError
@@ -181,10 +181,9 @@ class Judgement:
             problem = replace(build(model), without_inclusions=None)
             last = last_step(problem, rough_workspace(problem), cuts=FEW_CUTS)
             strain = formulation_of(model).fields(problem, last.meshed_state)[1]
-            resolved = PointResolution.of(problem, last).zone_bars
             numbers = changing_numbers(problem, last)
             scales = natural_scales(model, last.target.depth_mm, numbers)
-            self._known[key] = _Press(numbers, scales, resolved, strain)
+            self._known[key] = _Press(numbers, scales, unresolved(problem, last, scales), strain)
         return self._known[key]
 
     def _strain(self, factor: float | None) -> float | None:

@@ -23,10 +23,10 @@ def price_of_a_third(problem: Problem, increments: int, seconds: float) -> str:
     Returns
     -------
     str
-        Empty where the mesh has no edge lengths to choose: it is given, or graded towards a number.
+        Empty where the mesh was given, so that there are no edge lengths to choose.
     """
     model, own = problem.model, problem.size
-    if isinstance(model.design, GivenMesh) or model.mesh.grading:
+    if isinstance(model.design, GivenMesh):
         return ""
     finer = PressSize(own.dim, own.dofs * _FACTOR**-own.dim, own.contact_points * _FACTOR ** (1 - own.dim))
 

@@ -1,9 +1,9 @@
 """Mesh refinement until the estimated error of one number, the goal, is below a tolerance.
 
-A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  In small
-strain the mesh is graded towards the goal by the shares of the cells in its error (`finger3d.accuracy.graded`).  Where
-the error is estimated from a companion mesh, two lengths are free, that of the contact and that of the body far from it
-(the corners of the base).  A second coarse run, coarse at the contact only, separates their contributions to the error.
+A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  Otherwise
+the edges of some zones of the mesh become shorter: those at the contact, at the base and the body around, at gauges,
+and at the border of stick.  Which of them is found on the companion with twice the edges, on which the edges of one
+zone at a time are made short again: the zones whose edges change the goal most are refined.
 """
 
 from __future__ import annotations
@@ -16,16 +16,13 @@ from dataclasses import asdict, dataclass, field, replace
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
-from finger3d.accuracy.adjoint_bars import NoAdjointBarsError, adjoint_bars, applies, short_press
 from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_borders
-from finger3d.accuracy.estimate import compared, press_numbers
-from finger3d.accuracy.graded import cell_growth, finest, graded_sizes
-from finger3d.accuracy.richardson import ORDER, ORDERS, Kind, kinds_of, relative_error
+from finger3d.accuracy.estimate import discretisation, press_numbers
+from finger3d.accuracy.richardson import Kind, kinds_of, relative_error
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.companions import FACTOR, companion
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.step_halving import last_step
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.progress import QUIET, Progress
 
@@ -33,7 +30,9 @@ MAX_ROUNDS = 8
 GOAL, ALL = "normal_force_N", "all"
 """Number that a mesh is refined for unless a scene names another, and the name of all numbers together."""
 
-_MIN_SHARE = 0.3  # of the difference to the companion: an edge length that causes less is kept
+_MIN_SHARE = 0.3
+"""Least share of a zone in the largest change by any zone from which its edges become shorter."""
+
 _FACTOR_RANGE = (0.4, 0.85)  # a round changes an edge length at least and at most by these factors
 _COARSEN = 0.25
 """Error over the tolerance from which a mesh is not made coarser: the next would hardly have fewer unknowns."""
@@ -44,7 +43,15 @@ _WORTHWHILE = 0.7
 _FEWEST_POINTS = 8
 """Contact points that the half-length of contact keeps on a coarser mesh."""
 
-_AT_STICK = (1.5, 4.0)  # a round makes edges at the border of stick at least and at most so much shorter, by halving
+_MOST_GAUGE_REFINEMENT = 8.0
+"""Largest edge length at the contact over that around a gauge."""
+
+_FINER = 2.0
+"""Edges of the companion over those of one of its zones, when that is tried, and the least ratio at gauges and borders,
+where cells are bisected."""
+
+_FASTEST = 2.0
+"""Order with which an error falls at most from round to round: a bar that is small by chance must not end the rounds."""
 
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
 
@@ -159,12 +166,11 @@ def refine_mesh(
         goal = "depth_mm"
     start, rounds, meshes = time.perf_counter(), list[Round](), list[MeshOptions]()
     options, problem = model.mesh, None
-    run = _graded_round if applies(model) else _run_round
     stopped = f"{MAX_ROUNDS} rounds"
     while len(rounds) < MAX_ROUNDS:
         problem = None  # two factors at once would halve the mesh that memory allows
         try:
-            problem, done, wanted = run(replace(model, mesh=options), tolerance, goal)
+            problem, done, wanted = _run_round(replace(model, mesh=options), tolerance, goal)
         except UnresolvedError as error:
             if rounds and rounds[-1].error <= tolerance:
                 break
@@ -177,6 +183,9 @@ def refine_mesh(
                 raise
             stopped = f"no finer mesh: {error or 'out of memory'}"
             break
+        if rounds and rounds[-1].number == done.number:
+            fall = min(new / old for new, old in zip(_edges(options), _edges(meshes[-1]), strict=True)) ** _FASTEST
+            done = replace(done, error=max(done.error, min(1.0, fall) * rounds[-1].error))
         rounds.append(done)
         meshes.append(options)
         report.say(done.line(len(rounds)))
@@ -189,10 +198,7 @@ def refine_mesh(
         if coarsest or (done.error > tolerance and any(r.error <= tolerance for r in rounds)):
             break
         left = math.inf if max_seconds is None else max_seconds - (time.perf_counter() - start)
-        if wanted.grading is None:
-            found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
-        else:
-            found = wanted if _graded_seconds(problem, wanted, done.seconds) <= left else None
+        found = _affordable(options, wanted, done.seconds, left, 3 if model.domain == "solid" else 2)
         if found is None:
             stopped = f"max_seconds = {max_seconds:g}"
             break
@@ -212,48 +218,80 @@ def _relative_errors(
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def _graded_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
-    """Press on one mesh; return its problem, its round, and the mesh graded towards the goal to try next."""
-    start = time.perf_counter()
-    problem = with_refined_borders(model)
-    short, steps = short_press(problem)
-    steps[-1].check("the press on this mesh")
-    try:
-        bars = adjoint_bars(short, steps)
-    except NoAdjointBarsError:
-        return _run_round(model, tolerance, goal)
-    numbers = press_numbers(short, steps[-1])
-    errors = _relative_errors(numbers, bars.kinds, bars.bars, goal)
-    worst, error = next(iter(errors.items()))
-    wanted = []
-    for name, its_error in errors.items():
-        if name not in bars.parts:  # of a zone, whose border alone counts
-            wanted.append(_at_borders(problem, name, bars.kinds[name], its_error, tolerance, numbers))
-        elif name == worst or its_error > _COARSEN * tolerance:
-            allowed = _SAFETY * tolerance * bars.bars[name] / its_error if its_error > 0.0 else 0.0
-            wanted.append(graded_sizes(short, bars, name, allowed) if allowed > 0.0 else model.mesh)
-    dofs = int(problem.body.stiffness.upper.shape[0])
-    seconds = time.perf_counter() - start
-    return problem, _round(model.mesh, dofs, error, worst, seconds), finest(wanted)
-
-
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
-    problem = build(model)
-    step = last_step(problem)
-    numbers = press_numbers(problem, step)
-    other = companion(problem)
-    last = last_step(other)
-    kinds = kinds_of(step.readings)
-    errors = _relative_errors(numbers, kinds, compared(problem, step, other, last, press_numbers), goal)
-    goal, error = next(iter(errors.items()))
-    # a finer companion changes both lengths, so that their effects cannot be separated
-    coarse = press_numbers(other, last) if other.model.mesh.base_size_mm >= model.mesh.base_size_mm else None
-    sizes = _next_sizes(problem, (goal, kinds[goal]), error, tolerance, numbers, coarse)
-    seconds = time.perf_counter() - start
+    problem = with_refined_borders(model)
+    short = with_few_increments(problem)
+    steps = list(march(short))
+    steps[-1].check("the press on this mesh")
+    numbers, kinds = press_numbers(short, steps[-1]), kinds_of(steps[-1].readings)
+    found, beside, _ = discretisation(short, steps, numbers=press_numbers)
+    errors = _relative_errors(numbers, kinds, found.discretisation, goal)
+    worst, error = next(iter(errors.items()))
+    mesh = model.mesh
+    if error <= tolerance:
+        wanted = _longer(problem, numbers["contact_half_length_mm"])
+    else:
+        factor = (_SAFETY * tolerance / error) ** (1.0 / (1.0 if kinds[worst].is_zone else kinds[worst].order))
+        factor = min(max(factor, _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
+        wanted = _shorter(mesh, _zones_to_refine(beside, found.companion_numbers, worst, kinds[worst]), factor)
     dofs = int(problem.body.stiffness.upper.shape[0])
-    return problem, _round(model.mesh, dofs, error, goal, seconds), sizes
+    return problem, _round(mesh, dofs, error, worst, time.perf_counter() - start), wanted
+
+
+def _edges(mesh: MeshOptions) -> tuple[float, ...]:
+    """Return the edge lengths (mm) of the zones of a mesh."""
+    size = mesh.size_mm
+    return size, mesh.base_size_mm, size / mesh.gauge_refinement, size / mesh.stick_refinement
+
+
+def _zones_to_refine(beside: Problem, known: Mapping[str, float], goal: str, kind: Kind) -> set[str]:
+    """Return the zones of a mesh whose edges change the goal most, from presses on its companion with one finer zone.
+
+    Parameters
+    ----------
+    known : numbers of the companion
+    """
+    mesh, zones = beside.model.mesh, {"contact"} if kind.is_zone else {"contact", "base"}
+    zones |= {"gauges"} if kind is Kind.STRAIN else set()
+    zones |= {"border"} if goal.startswith("stick") else set()
+    changes = {}
+    for zone in sorted(zones):
+        finer = _shorter(mesh, {zone}, 1.0 / _FINER)
+        if finer == mesh:
+            continue
+        try:
+            problem = with_refined_borders(replace(beside.model, mesh=finer))
+            end = last_step(problem, rough_workspace(problem), cuts=FEW_CUTS)
+        except (Finger3dError, MemoryError):
+            continue
+        changes[zone] = abs(press_numbers(problem, end)[goal] - known[goal])
+    largest = max(changes.values(), default=0.0)
+    return {zone for zone, change in changes.items() if change >= _MIN_SHARE * largest} or {"contact", "base"}
+
+
+def _shorter(mesh: MeshOptions, zones: set[str], factor: float) -> MeshOptions:
+    """Return the edge lengths with those of some zones times a factor below 1; all others are kept."""
+    at_contact = factor if "contact" in zones else 1.0
+    size = mesh.size_mm * at_contact
+    base = max(size, mesh.base_size_mm * (factor if "base" in zones else 1.0))
+    # edges at gauges and borders are given over those at the contact
+    finer = [
+        four_digits(min(max(1.0, ratio * at_contact / (min(factor, 1.0 / _FINER) if zone in zones else 1.0)), most))
+        for zone, ratio, most in (
+            ("gauges", mesh.gauge_refinement, _MOST_GAUGE_REFINEMENT),
+            ("border", mesh.stick_refinement, MOST_STICK_REFINEMENT),
+        )
+    ]
+    return replace(
+        mesh,
+        size_mm=four_digits(size),
+        base_size_mm=four_digits(base),
+        gauge_refinement=finer[0],
+        stick_refinement=finer[1],
+        borders=None,
+    )
 
 
 def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
@@ -263,68 +301,14 @@ def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float
     )
 
 
-def _next_sizes(
-    problem: Problem,
-    goal: tuple[str, Kind],
-    error: float,
-    tolerance: float,
-    fine: Mapping[str, float],
-    coarse: Mapping[str, float] | None,
-) -> MeshOptions:
-    """Return smaller edge lengths of contact, base or both by the error of the goal, or longer ones of both."""
-    options = problem.model.mesh
-    if error <= tolerance:
-        return _longer(problem, fine["contact_half_length_mm"])
-    number, kind = goal
-    is_zone = kind.is_length or kind is Kind.AREA
-    shares = (1.0, 0.0) if is_zone else _error_shares(problem, number, fine, coarse)
-    power = 1.0 if is_zone else ORDERS.get(kind, ORDER)
-    factor = min(max((_SAFETY * tolerance / error) ** (1.0 / power), _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
-    size = options.size_mm * (factor if shares[0] >= _MIN_SHARE else 1.0)
-    base = options.base_size_mm * (factor if shares[1] >= _MIN_SHARE else 1.0)
-    return replace(options, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))
-
-
-def _at_borders(
-    problem: Problem, goal: str, kind: Kind, error: float, tolerance: float, numbers: Mapping[str, float]
-) -> MeshOptions:
-    """Return shorter edges at the border of stick, or at the whole contact, for the length or area of a zone."""
-    own = problem.model.mesh
-    if error <= tolerance or not goal.startswith("stick") or own.stick_refinement >= MOST_STICK_REFINEMENT:
-        return replace(_next_sizes(problem, (goal, kind), error, tolerance, numbers, None), borders=None)
-    least, most = _AT_STICK
-    finer = own.stick_refinement * min(max(error / (_SAFETY * tolerance), least), most)
-    return replace(own, stick_refinement=four_digits(min(finer, MOST_STICK_REFINEMENT)), borders=None)
-
-
 def _longer(problem: Problem, contact_half_length_mm: float) -> MeshOptions:
     """Return twice the edge lengths, as far as contact stays resolved and the body is two edges thick."""
     own, design = problem.model.mesh, problem.model.design
     most = 0.5 * min(design.height_mm, 2.0 * design.half_length_mm)
     width = 0.25 * design.width_mm if problem.dim == 3 else math.inf
     size = max(own.size_mm, min(2.0 * own.size_mm, contact_half_length_mm / _FEWEST_POINTS, most, width))
-    return replace(
-        own, size_mm=four_digits(size), base_size_mm=four_digits(max(size, min(2.0 * own.base_size_mm, most)))
-    )
-
-
-def _error_shares(
-    problem: Problem, number: str, fine: Mapping[str, float], coarse: Mapping[str, float] | None
-) -> tuple[float, float]:
-    """Return the shares of the difference to the companion that the edge lengths of contact and base cause."""
-    options = problem.model.mesh
-    size = min(FACTOR * options.size_mm, options.base_size_mm)
-    if coarse is None or size < 1.1 * options.size_mm:
-        return 1.0, 1.0
-    third = build(replace(problem.model, mesh=replace(_with_swept_mesher(problem, options), size_mm=size)))
-    middle = press_numbers(third, last_step(third))[number]
-    contact, base = abs(fine[number] - middle), abs(middle - coarse[number])
-    total = contact + base
-    return (contact / total, base / total) if total > 0.0 else (1.0, 0.0)
-
-
-def _with_swept_mesher(problem: Problem, options: MeshOptions) -> MeshOptions:
-    return replace(options, mesher="swept") if problem.model.design.section() is not None else options
+    base = max(size, min(2.0 * own.base_size_mm, most))
+    return replace(own, size_mm=four_digits(size), base_size_mm=four_digits(base), borders=None)
 
 
 def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: float, dim: int) -> MeshOptions | None:
@@ -343,10 +327,3 @@ def _affordable(now: MeshOptions, wanted: MeshOptions, seconds: float, left: flo
         b * (w / b) ** part for b, w in ((now.size_mm, wanted.size_mm), (now.base_size_mm, wanted.base_size_mm))
     )
     return replace(now, size_mm=four_digits(size), base_size_mm=four_digits(max(size, base)))
-
-
-def _graded_seconds(problem: Problem, wanted: MeshOptions, seconds: float) -> float:
-    """Return the forecast seconds of a press on a graded mesh, from those of a round on the mesh that it follows."""
-    at_contact = (problem.model.mesh.size_mm / wanted.size_mm) ** (problem.dim - 1)
-    growth = max(cell_growth(problem, wanted), at_contact)
-    return float(PRESS_TO_ROUND * seconds * growth ** GROWTH[problem.dim])

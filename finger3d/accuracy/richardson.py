@@ -1,13 +1,17 @@
-"""Discretisation error by Richardson extrapolation from two meshes.
+"""Discretisation error from the spread of a number over several meshes.
 
-If the error of a number x falls as h^p with the edge length h, the number x' on a mesh of edge length r h gives ::
+If the error of a number q falls as h^p with the edge length h, its error and the number q_k on a mesh with edges of k h
+are related by ::
 
-    error of x = |x - x'| / |r^p - 1|
+    error of q = |q - q_k| / |k^p - 1|
+
+A single difference is small by chance in one of five numbers.  The error bar is therefore the root mean square over
+several companions, times a factor fitted to drawn scenes (validation/error_bars.py) ::
+
+    bar of q = c root mean square over k of |q - q_k| / |k^p - 1|
 
 The order p of forces is that of quadratic elements at a bonded corner, p = 2 lambda, where displacements go as
-distance^lambda (Williams 1952).  Numbers that depend less on the corners have a higher order.  Lengths and areas are
-resolved no better than the distance of contact points.  ``validation/error_bars.py`` measures how often the true error
-lies within twice the estimate.
+distance^lambda (Williams 1952).  Numbers that depend less on the corners have a higher order.
 """
 
 from __future__ import annotations
@@ -16,22 +20,21 @@ import math
 from collections.abc import Iterable, Mapping
 from enum import Enum, auto
 
-from finger3d.accuracy.point_resolution import PointResolution
+import numpy as np
+
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.readings.columns import RESULTANTS, Column
+from finger3d.mechanics.results.history import StepResult, measure
 
 ORDER = 1.2
 """Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
 
-_RESOLUTION_FLOOR = 0.1
-"""Points of distance h at the edge of a contact of half-length a leave a relative error of about this times (h/a)^2 in
-the normal force, and of this times h/a in friction and strains (validation/error_bars.py)."""
-
-UNRESOLVED_DISSIPATION = 2e-4
-"""Dissipation that points of distance h leave unresolved over the external work times h/a: few of them slip."""
+_LEAST = 0.002
+"""Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""
 
 
 class Kind(Enum):
-    """Kind of a number, which determines the lower bound of its error."""
+    """Kind of a number, which determines its order of convergence."""
 
     NORMAL_FORCE = auto()
     FRICTION_SUM = auto()
@@ -50,9 +53,19 @@ class Kind(Enum):
     MOMENT = auto()
 
     @property
-    def is_length(self) -> bool:
-        """Return whether the number is a length of a zone of contact points."""
-        return self in (Kind.LENGTH, Kind.HALF_LENGTH)
+    def is_zone(self) -> bool:
+        """Return whether the number is a length or an area of contact or stick."""
+        return self in (Kind.LENGTH, Kind.HALF_LENGTH, Kind.AREA)
+
+    @property
+    def order(self) -> float:
+        """Order of convergence with the edge length."""
+        return 1.5 if self in (Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT) else ORDER
+
+    @property
+    def factor(self) -> float:
+        """Factor c of the error bars, fitted to 118 drawn sections and 28 solids, a third of them deformed largely."""
+        return 1.1 if self is Kind.DISSIPATION else 0.9
 
 
 _KINDS = {name: Kind.MOMENT if name.startswith("moment") else Kind.FORCE for name in RESULTANTS[3]} | {
@@ -80,12 +93,6 @@ _KINDS = {name: Kind.MOMENT if name.startswith("moment") else Kind.FORCE for nam
     "contact_area_mm2": Kind.AREA,
     "stick_area_mm2": Kind.AREA,
 }
-
-ORDERS = {Kind.FRICTION_SUM: 1.5, Kind.STRAIN: 1.5, Kind.DISPLACEMENT: 2.0}
-"""Orders of numbers that depend less on the bonded corners than forces do; of the others `ORDER`."""
-
-_FLOORS = {Kind.DISPLACEMENT: 0.01, Kind.BASE_PRESSURE: 0.03, Kind.WORK: 0.01}
-"""Values in place of `_RESOLUTION_FLOOR` for numbers that depend less on the edge of contact."""
 
 _READINGS = {
     "gauge": Kind.STRAIN,
@@ -117,24 +124,30 @@ def largest_readings(numbers: Mapping[str, float], kinds: Mapping[str, Kind]) ->
     return {kind: largest(numbers, kinds, kind) for kind in (*_READINGS.values(), Kind.OTHER_READING)}
 
 
-def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
-    """Return the relative error of a number.
+def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str) -> float:
+    """Return the magnitude to which an error of a number is relative.
 
-    That of a reading is relative to the largest of its kind, of a length to that of contact, of a component of the
-    force to the normal force, and of a moment to the normal force at the end of contact at least, since those vanish in
-    symmetric presses.  Where nothing sticks or slips, areas, friction and dissipation are relative to the area of
-    contact, the normal force and the work.
+    For a reading it is the largest of its kind, for a length that of contact, for a component of the force the normal
+    force, and for a moment the normal force at the end of contact at least, since those vanish in symmetric presses.
+    Where nothing sticks or slips, it is the area of contact, the normal force and the work for areas, friction and
+    dissipation.
     """
-    kind, force = kinds[name], abs(numbers["normal_force_N"])
-    scale = largest_readings(numbers, kinds).get(kind, abs(numbers[name]))
-    if kind.is_length:
-        scale = numbers["contact_half_length_mm"]
-    elif kind is Kind.FORCE:
-        scale = force
-    elif kind is Kind.MOMENT:
-        scale = max(scale, force * numbers["contact_half_length_mm"])
-    elif kind in _IF_ZERO and scale <= _ROUND_OFF * abs(numbers[_IF_ZERO[kind]]):
-        scale = abs(numbers[_IF_ZERO[kind]])
+    kind, scale = kinds[name], abs(numbers[name])
+    scale = largest_readings(numbers, kinds).get(kind, scale)
+    force, reach = abs(numbers.get("normal_force_N", 0.0)), numbers.get("contact_half_length_mm", scale)
+    if kind in (Kind.LENGTH, Kind.HALF_LENGTH):
+        return reach
+    if kind is Kind.FORCE:
+        return force
+    if kind is Kind.MOMENT:
+        return max(scale, force * reach)
+    whole = abs(numbers.get(_IF_ZERO.get(kind, name), 0.0))
+    return whole if scale <= _ROUND_OFF * whole else scale
+
+
+def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
+    """Return the relative error of a number, see `scale_of`."""
+    scale = scale_of(numbers, kinds, name)
     return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
 
 
@@ -143,88 +156,39 @@ def gain(ratio: float, order: float = ORDER) -> float:
     return abs(math.pow(ratio, order) - 1.0)
 
 
-_FITTED = 0.9
-"""Error bar over the root mean square of the errors that three companions give; see `spread_error`."""
+def spacing(problem: Problem, step: StepResult) -> float:
+    """Return the distance of the contact points over the half-length of contact, at most 1."""
+    points, reach = problem.points, measure(problem.points, step)["contact_half_length_mm"]
+    touching = step.state.force[:, 0] > 0.0
+    area = float(np.median(points.area[touching])) if touching.any() else math.inf
+    distance = math.sqrt(area) if points.dim == 3 else area / (2.0 * points.half_width_mm)
+    return min(1.0, distance / reach) if reach > 0.0 else 1.0
 
 
 def spread_error(
     numbers: Mapping[str, float],
     companions: Iterable[tuple[float, Mapping[str, float]]],
-    own: PointResolution,
-    readings: Iterable[Column],
-) -> dict[str, float]:
-    """Return the discretisation error by name, from the spread of a number q over several meshes.
-
-    With edges k times as long a number q_k would be off by k^p - 1 times the error of q ::
-
-        error of q = 0.9 root mean square over k of |q - q_k| / |k^p - 1|
-
-    A single difference is small by chance in one of five numbers, which the spread over three meshes is not.  The
-    factor was fitted to 79 drawn sections in small strain, of whose numbers 92 to 99 % then lie within two bars
-    (dissipation 86 %); of 74 sections at large deformation 85 to 97 % do.
-
-    Parameters
-    ----------
-    companions : edge length over that of the mesh, and numbers by name, of every companion
-    own : resolution of the contact points, below which no error is
-    readings : columns of the readings among the numbers
-    """
-    kinds, told = kinds_of(readings), list(companions)
-    found = _least_errors(numbers, kinds, own)
-    for name, value in numbers.items():
-        order = _SPREAD_ORDERS.get(kinds[name], ORDER)
-        errors = [(value - other[name]) / gain(ratio, order) for ratio, other in told]
-        found[name] = max(found[name], _FITTED * math.sqrt(sum(error**2 for error in errors) / len(errors)))
-    return {name: error for name, error in found.items() if math.isfinite(error)}
-
-
-_SPREAD_ORDERS = dict.fromkeys((Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT), 1.5)
-"""Orders of the errors of `spread_error`; of other kinds `ORDER`."""
-
-
-def mesh_error(
-    numbers: Mapping[str, float],
-    companion: Mapping[str, float],
-    ratio: float,
-    resolutions: tuple[PointResolution, PointResolution],
     readings: Iterable[Column] = (),
+    spacing: float = 0.0,
 ) -> dict[str, float]:
-    """Return the discretisation error by name.
+    """Return the discretisation error by name, from the spread of a number over several meshes.
 
     Parameters
     ----------
-    numbers, companion : of the mesh and of its companion, by name
-    ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
-    resolutions : of the contact points of both
+    numbers : of the press, by name
+    companions : edge length over that of the mesh (below 1 for a finer one), and numbers by name, of every companion
     readings : columns of the readings among the numbers
+    spacing : distance of the contact points over the half-length of contact, see `spacing`
 
     Returns
     -------
     dict
         Errors in the units of the numbers; names without a finite error are left out.
     """
-    own, other = resolutions
-    kinds = kinds_of(readings)
-    found = _least_errors(numbers, kinds, own)
+    kinds, told = kinds_of(readings), list(companions)
+    found = {}
     for name, value in numbers.items():
-        kind, change = kinds[name], abs(value - companion[name])
-        if kind.is_length or kind is Kind.AREA:
-            # a difference below the resolution of the companion's points does not count
-            change = max(0.0, change - other.least.get(name, 0.0))
-        found[name] = max(change / gain(ratio, ORDERS.get(kind, ORDER)), found[name])
-    return {name: float(error) for name, error in found.items() if math.isfinite(error)}
-
-
-def _least_errors(numbers: Mapping[str, float], kinds: Mapping[str, Kind], own: PointResolution) -> dict[str, float]:
-    """Return what the contact points leave open of every number, whatever companions tell."""
-    scales, found = largest_readings(numbers, kinds), dict[str, float]()
-    for name, value in numbers.items():
-        kind, bound = kinds[name], own.least.get(name, 0.0)
-        if not (kind.is_length or kind is Kind.AREA):
-            power = 2 if kind in (Kind.NORMAL_FORCE, Kind.DEPTH) else 1
-            floor = _FLOORS.get(kind, _RESOLUTION_FLOOR) * own.share**power
-            bound = max(bound, floor * scales.get(kind, abs(value)))
-        if kind is Kind.DISSIPATION:
-            bound = max(bound, UNRESOLVED_DISSIPATION * own.share * largest(numbers, kinds, Kind.WORK))
-        found[name] = bound
-    return found
+        errors = [(value - other[name]) / gain(ratio, kinds[name].order) for ratio, other in told]
+        bar = kinds[name].factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
+        found[name] = max(bar, _LEAST * spacing * scale_of(numbers, kinds, name))
+    return {name: error for name, error in found.items() if math.isfinite(error)}

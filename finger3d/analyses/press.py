@@ -8,8 +8,9 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from finger3d.accuracy.companion_presses import CompanionThread
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody
@@ -22,8 +23,11 @@ from finger3d.progress import Progress
 if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.discretise.problem import Problem
+    from finger3d.mechanics.march.step_halving import StepEstimate
     from finger3d.scene import Scene, Source
 
+
+Begun: TypeAlias = "Callable[[Problem, StepEstimate | None], None]"
 
 _SHOWN_EVERY_S = 1.0
 """Seconds between reports of the trial depths under a prescribed force, and of the increments of a trial run."""
@@ -85,31 +89,36 @@ def run_press(
     from finger3d.analyses.effects_by_need import settled
 
     scene, need = settled(scene, report)
-    record = _solve(scene, writer, report, started)
-    record.need = need
-    fields = _recover(record, writer, report)
-    writer.summary(record, record.outcome())
-    with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
-        if error:
-            _estimate_errors(record, report)
-            writer.markers(record)
-            _estimate_changes(record, report)
-            writer.summary(record, record.outcome())
-        if figures:
-            from finger3d.report.press import press_page
+    with CompanionThread() as companions:
+        record = _solve(scene, writer, report, started, companions.begin if error else None)
+        record.need = need
+        fields = _recover(record, writer, report)
+        writer.summary(record, record.outcome())
+        with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
+            if error:
+                _estimate_errors(record, report, companions)
+                writer.markers(record)
+                _estimate_changes(record, report)
+                writer.summary(record, record.outcome())
+            if figures:
+                from finger3d.report.press import press_page
 
-            report.stage("drawing")
-            draw()
-            press_page(writer.folder)
+                report.stage("drawing")
+                draw()
+                press_page(writer.folder)
     return record
 
 
 # --- solve --------------------------------------------------------------------------------------------------------
 
 
-def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float) -> PressRecord:
+def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float, begun: Begun | None) -> PressRecord:
     """Build the problem and march through its increments, again with all points of the free faces if contact reaches
     beyond the candidate points.
+
+    Parameters
+    ----------
+    begun : called with the problem, and how its increments were chosen, before a press at large deformation
     """
     for warning in scene.model().warnings:
         report.say(f"warning: {warning}")
@@ -127,7 +136,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float)
         # derivatives solve for an elastic object again, a press does not: its factor takes memory
         light = replace(problem, system=replace(problem.system, object_body=None))
         record = PressRecord(scene, light, started, refinement, spent)
-        _march(record, writer, report)
+        _march(record, writer, report, begun if problem.model.finite_strain else None)
         return record, record.converged_steps
 
     record, checks = body.pressed(press_all)
@@ -149,17 +158,20 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
     return refine_mesh(scene.model(), mesh.tolerance, mesh.max_seconds, report, goal)
 
 
-def _march(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
+def _march(record: PressRecord, writer: ResultWriter, report: Progress, begun: Begun | None) -> None:
     """Solve the increments of a record, and write what there is after each and after an interruption."""
-    from finger3d.mechanics.march.step_halving import automatic
+    from finger3d.mechanics.march.path import AUTO_START
+    from finger3d.mechanics.march.step_halving import automatic, with_steps
 
     for warning in record.warnings[len(record.problem.model.warnings) :]:  # those of the model are said before
         report.say(f"warning: {warning}")
     writer.progress(record, "incomplete: no increment was finished")
     try:
         if automatic(record.problem.model):
-            _march_automatically(record, writer, report)
+            _march_automatically(record, writer, report, begun or (lambda problem, chosen: None))
         else:
+            if begun:
+                begun(with_steps(record.problem, AUTO_START), None)
             _march_through(record, writer, report)
     finally:
         writer.progress(record)
@@ -181,14 +193,14 @@ def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) 
         begin = time.perf_counter()
 
 
-def _march_automatically(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
+def _march_automatically(record: PressRecord, writer: ResultWriter, report: Progress, begun: Begun) -> None:
     """Halve the increments until their error is small; every finer run takes the place of the one before."""
     from finger3d.mechanics.march.step_halving import refine
 
     report.stage("pressing, increments chosen by their error")
     begin = time.perf_counter()
     advanced = _now_and_then(lambda done, total, step: report.step(done, total, _remark(record.problem, step)))
-    for steps, estimate in refine(record.problem, record.workspace, advanced=advanced):
+    for steps, estimate in refine(record.problem, record.workspace, advanced=advanced, chosen=begun):
         record.seconds["contact"] += time.perf_counter() - begin
         record.steps, record.step_estimate = list(steps), estimate
         writer.progress(record)
@@ -246,7 +258,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
     return fields
 
 
-def _estimate_errors(record: PressRecord, report: Progress) -> None:
+def _estimate_errors(record: PressRecord, report: Progress, companions: CompanionThread) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, estimate_with_grid, press_numbers
     from finger3d.accuracy.modulus import modulus_errors
@@ -256,9 +268,11 @@ def _estimate_errors(record: PressRecord, report: Progress) -> None:
     report.stage("estimating the error")
     grid, of_grid = record.marker_grid, dict[str, float]()
     if grid is None:
-        found = estimate(record.problem, record.steps, report, press_numbers, record.step_estimate)
+        found = estimate(record.problem, record.steps, report, press_numbers, record.step_estimate, companions.of)
     else:
-        found, of_grid = estimate_with_grid(record.problem, record.steps, grid, report, record.step_estimate)
+        found, of_grid = estimate_with_grid(
+            record.problem, record.steps, grid, report, record.step_estimate, companions.of
+        )
     record.marker_errors = found.totals() | of_grid
     known = spreads(record.scene.tables)
     by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers, record.workspace)

@@ -37,7 +37,7 @@ Made = TypeVar("Made", RigidObject, FrictionLaw)
 FORMAT, VERSION = "finger3d condensed body", 6
 _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()} | {"MeshObject": MeshObject}
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
-"""Mesh options that a file stores; the grading is omitted, as a reduced model has no mesh."""
+"""Mesh options that a file stores."""
 
 _FRICTION: dict[str, type[FrictionLaw]] = {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 _MAX_STEPS = 1_000_000

@@ -51,9 +51,9 @@ def increment_to_force(
     Returns
     -------
     Motion to the depth of the force, and the solution; None where the iteration does not converge.  In small strain
-    there is none with viscosity, where the increments define the solution, and where the contact geometry is given.
+    there is none with viscosity, where the increments define the solution.
     """
     formulation = formulation_of(problem.model)
-    if problem.contact_geometry is not None or not isinstance(formulation, ReachesForce):
+    if not isinstance(formulation, ReachesForce):
         return None
     return formulation.increment_to_force(problem, start, move, wanted, workspace)

@@ -18,7 +18,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Reading, Taxel
 from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.meshing.options import Mesher
-from finger3d.meshing.refinement.grading import Grading, SizedPlaces
+from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.objects import (
     ContactPath,
     FirstTouch,
@@ -88,9 +88,8 @@ class MeshOptions:
     """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
-    free end.  `grading` prescribes edge lengths inside the body, as a refinement towards a goal finds them.
-    `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face close to them;
-    at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
+    free end.  `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face
+    close to them; at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
     `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
     lengths there, once a press has found it.
     """
@@ -99,7 +98,6 @@ class MeshOptions:
     base_size_mm: float
     mesher: Mesher = "ftetwild"
     layers: int = 2
-    grading: Grading | None = None
     gauge_refinement: float = 1.0
     refined_gauges: tuple[str, ...] = ()
     stick_refinement: float = 1.0

@@ -42,7 +42,6 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
             **design.cache_fields,
             "code": [code, source_hash("geometry"), source_hash("meshing")],
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
-            **({"grading": options.grading.key} if options.grading else {}),
             "zone": [repr(float(z)) for z in zone],
             "symmetry": sorted(symmetry),
             "versions": {name: _version(name) for name in _PACKAGES["netgen" if netgen else "ftetwild"]},

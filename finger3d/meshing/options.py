@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Protocol
-
-if TYPE_CHECKING:
-    from finger3d.meshing.refinement.grading import Grading
+from typing import Literal, Protocol
 
 Mesher = Literal["ftetwild", "netgen", "swept"]
 """Unstructured tetrahedra by fTetWild or netgen, or tetrahedra swept along z."""
@@ -32,7 +29,3 @@ class MeshSizes(Protocol):
     @property
     def layers(self) -> int:
         """Least number of layers of a swept mesh over half the width."""
-
-    @property
-    def grading(self) -> Grading | None:
-        """Edge lengths inside the body; None where they follow from those above."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -138,12 +138,7 @@ class Scene:
         return tuple(names)
 
     def with_mesh(self, mesh: MeshOptions) -> Scene:
-        """Return the scene with edge lengths in place of a tolerance.
-
-        A scene cannot state the edge lengths of a graded mesh: it keeps its tolerance, from which they are found again.
-        """
-        if mesh.grading is not None:
-            return replace(self, mesh=mesh)
+        """Return the scene with edge lengths in place of a tolerance."""
         return parse({**self.given, "mesh": mesh.as_table()}, self.path)
 
     def with_effects(self, names: Iterable[str]) -> Scene:

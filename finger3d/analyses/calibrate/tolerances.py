@@ -34,7 +34,6 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.objects import Plane
 from finger3d.progress import Progress
@@ -161,7 +160,7 @@ def evaluate_tolerances(
         report.stage(f"tolerance {name}")
         known = mu
         if name == "mesh":
-            effects = [(sd, sd * _mesh_errors(body, coarse, base.frame, readings))] if coarse else []
+            effects = [(sd, sd * _mesh_errors(body, coarse, readings))] if coarse else []
         elif name == "increments":
             if has_exact_path(problem.model):
                 continue
@@ -320,17 +319,14 @@ def _on_coarser_mesh(body: ReferenceBody, report: Progress) -> ReferenceBody | N
         return None
 
 
-def _mesh_errors(
-    body: ReferenceBody, coarse: ReferenceBody, frame: StepResult, readings: Sequence[CalibratedReading]
-) -> Float:
+def _mesh_errors(body: ReferenceBody, coarse: ReferenceBody, readings: Sequence[CalibratedReading]) -> Float:
     """Return the error bars (k, m) of readings due to the mesh, nowhere below their root mean square over mu.
 
-    The error depends little on mu, and where the readings of the two meshes cross they agree by chance.  `frame` is the
-    last increment at any mu.
+    The error depends little on mu, and where the readings of the two meshes cross they agree by chance.
     """
     found = []
     for own, other, reading in zip(body.readings, coarse.readings, readings, strict=True):
-        error = reading_error(body.problem, frame, coarse.problem, own, other, reading.kind)
+        error = reading_error(body.problem, coarse.problem, own, other, reading.kind)
         known = error[np.isfinite(error)]
         found.append(np.maximum(error, math.sqrt(float(np.mean(known**2)))) if len(known) else error)
     return np.array(found)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.richardson import ORDERS, Kind, gain
+from finger3d.accuracy.richardson import Kind, gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.fem.recovery.recover import displacement
@@ -111,7 +111,7 @@ class GaugeFields:
         if "mesh" in tolerances:
             report.stage("tolerance mesh")
             beside = companion(problem)
-            coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside), ORDERS[Kind.STRAIN])
+            coarse, ratio = StrainField.of(beside, mus), gain(edge_ratio(problem, beside), Kind.STRAIN.order)
         return cls(nominal, tuple(mus), noise, tolerances, shared, coarse, ratio)
 
     def effects(self, points: Float, angles: Float) -> ReadingEffects:

@@ -19,12 +19,16 @@ from finger3d.errors import OUT_OF_MEMORY, MissingError
 Call: TypeAlias = Callable[..., object]
 """PARDISO's only function."""
 
+Threads: TypeAlias = Callable[[int], int]
+"""Sets MKL's number of threads in the calling thread, 0 for that of the process, and returns the one before."""
+
 _MTYPE = ctypes.c_int32(-2)  # real, symmetric, indefinite
 _INT32_MAX = 2**31 - 1
 _NO_MEMORY = -2
 
 
-def _library() -> Call:
+def _library() -> tuple[Call, Threads, int]:
+    """Return PARDISO, the function that sets its threads, and their number now."""
     if "PYPARDISO_MKL_RT" not in os.environ:
         # pypardiso's own search walks the whole environment, which costs more than a small solve.
         libraries = sorted(Path(sys.prefix, "lib").glob("libmkl_rt.so*"))
@@ -34,8 +38,8 @@ def _library() -> Call:
 
     library = PyPardisoSolver().libmkl
     library.mkl_set_exit_handler(_EXIT_HANDLER)
-    call: Call = library.pardiso
-    return call
+    threads = ctypes.CDLL(library._name).MKL_Set_Num_Threads_Local
+    return library.pardiso, threads, int(library.MKL_Get_Max_Threads())
 
 
 def _exit(code: int) -> None:
@@ -85,7 +89,8 @@ class PardisoFactor:
         upper.sort_indices()
         if upper.nnz > _INT32_MAX:
             raise PardisoError("matrix has more entries than 32-bit PARDISO can index")
-        self._call = _library()
+        # PARDISO crashes if a matrix is factored again on another number of threads
+        self._call, self._set_threads, self._threads = _library()
         self._n = upper.shape[0]
         self._rows = rows
         self._a = np.ascontiguousarray(upper.data, dtype=np.float64)
@@ -117,7 +122,11 @@ class PardisoFactor:
         self.perturbed = int(self._iparm[13])
 
     def _phase(self, phase: int, b: Float, x: Float, nrhs: int) -> None:
-        _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
+        before = self._set_threads(self._threads)
+        try:
+            _run(self._call, self._pt, phase, self._n, self._a, self._ia, self._ja, self._perm, nrhs, self._iparm, b, x)
+        finally:
+            self._set_threads(before)
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
         """Forward substitution of loads (n, m): what `substituted` needs of it, and ``R K^-1 load`` (r, m)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -22,7 +22,7 @@ from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solids.material import LinearElasticity
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.traces import BoundarySurface, joined, surface
-from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry, may_touch
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column
@@ -116,8 +116,6 @@ class Problem:
     inclusions : stiffness that inclusions add; empty without
     seconds : time of each stage of the build by name
     without_inclusions : the same problem without inclusions, if there are any
-    contact_geometry : of each pose, the contact geometry, and the displacement (c, d) mm that its gaps are linearised
-        at, if they are known; an increment then takes one solution
     """
 
     model: Model
@@ -127,7 +125,6 @@ class Problem:
     inclusions: AddedStiffness = field(default_factory=AddedStiffness)
     seconds: dict[str, float] = field(default_factory=dict)
     without_inclusions: Problem | None = None
-    contact_geometry: Mapping[ObjectPose, tuple[ContactGeometry, Float]] | None = None
 
     @property
     def body(self) -> CondensedBody:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
 from finger3d.fem.mesh.parts import contact_compliance
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, reflect_into_part, unfold
+from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, unfold
 from finger3d.fem.solids.material import LinearElasticity
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.model import Model
@@ -93,10 +93,6 @@ class Symmetry:
         for axis in axis_numbers(self.axes):
             whole *= np.where(np.arange(3) == axis, 2.0, 0.0)
         return whole
-
-    def reflect(self, point: Float, direction: Float) -> tuple[Float, Float]:
-        """Return a place and a direction (3,) in the meshed part (d,), reflected if they lie in a mirror image."""
-        return reflect_into_part(point, direction, self.axes, self.mirror_sign.shape[1])
 
     def _unfold_bases(self, bases: Float | None) -> Float | None:
         if bases is None:

@@ -113,8 +113,6 @@ class IncrementEquations:
         if self.body.instability(now.x):
             return self.failed(now, Outcome.UNSTABLE, error, spent)
         state, error = self.reached(now, solution.state), max(solution.residual, error)
-        if self.workspace.ends is not None:
-            self.workspace.ends.setdefault(self.move, (self.start.body.unknowns, now.x))
         return replace(solution.with_state(state), residual=error, iterations=spent)
 
     def failed(
@@ -187,12 +185,9 @@ class IncrementEquations:
         return self.at(self.start.body.unknowns), force
 
     def _extrapolated(self) -> Iterator[Float]:
-        """Yield unknowns (N,) at which the increment may end: of a similar press, and of the path continued."""
+        """Yield unknowns (N,) at which the increment may end, if the path continues as before."""
         start = self.start
         unknowns = start.body.unknowns
-        if self.workspace.ends and self.move in self.workspace.ends:
-            first, last = self.workspace.ends[self.move]
-            yield unknowns + last - first
         if start.body.previous is not None:
             before, x = start.body.previous
             ratio = self.move.length_ratio(before)

@@ -83,17 +83,15 @@ class FiniteStrainWorkspace(Workspace):
     Attributes
     ----------
     target : residual at which the iteration of an increment ends
-    ends : unknowns before and after each motion of the first press, near which similar ones begin; None: not kept
     """
 
     target: float = TARGET_RESIDUAL
-    ends: dict[Move, tuple[Float, Float]] | None = None
     bodies: dict[bool, FiniteBody] = field(default_factory=dict)
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
 
     def rough(self) -> Self:
         """Return a workspace for solutions near which others begin, with the same factors and a count of its own."""
-        return replace(self, factorizations=0, target=_ROUGH, ends=None)
+        return replace(self, factorizations=0, target=_ROUGH)
 
 
 def contact_of(problem: Problem, face: BoundarySurface, u: Float, target: ObjectPose) -> DeformedContact:

@@ -105,7 +105,7 @@ class Press:
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed, self._cancel, self._report = False, cancel, report
-        self._is_exact = has_exact_path(model) and problem.contact_geometry is None
+        self._is_exact = has_exact_path(model)
         self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else cuts
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None

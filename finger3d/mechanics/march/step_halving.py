@@ -67,6 +67,9 @@ _LEAST_RUNS = 3
 _FALL = 1.5
 """Power of the number of increments with which an error falls, between that of kinks, 1, and of smooth paths, 2."""
 
+_FEW = 10
+"""Largest number of increments in a leg of a press for the errors of the mesh, which hardly depend on this number."""
+
 FEW_CUTS = 1
 """Times that an increment of a press which serves an estimate is halved, at most: it may cost more than the press."""
 
@@ -155,6 +158,14 @@ def with_scaled_steps(problem: Problem, ratio: float) -> tuple[Problem, float]:
     return replace(problem, model=replace(problem.model, legs=scaled)), sum(counts) / sum(own)
 
 
+def with_few_increments(problem: Problem) -> Problem:
+    """Return the problem with at most `_FEW` increments in each leg."""
+    legs = (
+        replace(leg, steps=min(leg.steps, _FEW) if isinstance(leg.steps, int) else _FEW) for leg in problem.model.legs
+    )
+    return replace(problem, model=replace(problem.model, legs=tuple(legs)))
+
+
 def increment_error(value: Value, other: Value, ratio: float) -> Value:
     """Estimated error of a quantity in N increments, from its value in `ratio` times as many.
 
@@ -171,6 +182,7 @@ def refine(
     workspace: Workspace | None = None,
     cancel: Event | None = None,
     advanced: Callable[[int, int, StepResult], None] = lambda done, total, step: None,
+    chosen: Callable[[Problem, StepEstimate | None], None] = lambda problem, estimate: None,
 ) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Yield the results of runs with more and more increments, each with its estimate; the first run has none.
 
@@ -183,16 +195,22 @@ def refine(
     problem, workspace, cancel : see `march`
     advanced : function, optional
         Called after every increment of a run with the number of those solved, of all in the run, and its result.
+    chosen : function, optional
+        Called before the press itself, where its increments are chosen on a coarser mesh, with it and the estimate.
     """
     workspace = workspace or formulation_of(problem.model).workspace()
     if problem.model.finite_strain:
-        yield from _refined_beside(problem, workspace, cancel, advanced)
+        yield from _refined_beside(problem, workspace, cancel, advanced, chosen)
         return
     yield from _refined(problem, workspace, cancel, advanced)
 
 
 def _refined_beside(
-    problem: Problem, workspace: Workspace, cancel: Event | None, advanced: Callable[[int, int, StepResult], None]
+    problem: Problem,
+    workspace: Workspace,
+    cancel: Event | None,
+    advanced: Callable[[int, int, StepResult], None],
+    chosen: Callable[[Problem, StepEstimate | None], None],
 ) -> Iterator[tuple[tuple[StepResult, ...], StepEstimate | None]]:
     """Yield the results of one run, in increments chosen on a coarser mesh; of more where these do not converge."""
     beside = next((coarse for _, coarse in coarse_companions(problem)), None)
@@ -200,12 +218,15 @@ def _refined_beside(
         yield from _refined(problem, workspace, cancel, advanced)
         return
     *_, (_, estimate) = _refined(beside, rough_workspace(beside), cancel, lambda done, total, step: None)
-    chosen = estimate.steps if estimate else AUTO_START
-    for steps in (chosen, 2 * chosen):
-        results = _run(with_steps(problem, steps), workspace, cancel, advanced)
+    estimate = estimate and replace(estimate, beside=beside)
+    first = estimate.steps if estimate else AUTO_START
+    for steps in (first, 2 * first):
+        counted = with_steps(problem, steps)
+        chosen(counted, estimate)
+        results = _run(counted, workspace, cancel, advanced)
         if results[-1].outcome.ok or len(results) <= _fixed_first(problem.model):
             break
-    yield results, estimate and replace(estimate, beside=beside)
+    yield results, estimate
 
 
 def rough_workspace(problem: Problem) -> Workspace:
@@ -382,8 +403,10 @@ def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str,
     return largest
 
 
-def last_step(problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS) -> StepResult:
-    """Solve all increments and return the result of the last; for the workspace and cuts see `march`.
+def last_step(
+    problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS, cancel: Event | None = None
+) -> StepResult:
+    """Solve all increments and return the result of the last; for the workspace, cuts and cancel see `march`.
 
     Raises
     ------
@@ -391,7 +414,7 @@ def last_step(problem: Problem, workspace: Workspace | None = None, cuts: int = 
         If an increment does not converge.
     """
     result = None
-    for result in march(problem, workspace=workspace, cuts=cuts):
+    for result in march(problem, workspace=workspace, cancel=cancel, cuts=cuts):
         if not result.outcome.ok:
             raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
     if result is None:

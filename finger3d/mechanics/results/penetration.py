@@ -116,8 +116,6 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
         cure = f"mesh.base_size_mm = {rounded_down(ratio * mesh.base_size_mm):g} {effect}"
     else:
         cure = size_advice(problem.model, ratio * mesh.size_mm, effect, "a finer one leaves less")
-    if mesh.grading is not None:
-        cure = "a smaller mesh.tolerance leaves less"
     if deepest.at_crease:
         cure += "; a fillet at that sharp edge of the finger leaves less"
     return [

@@ -20,7 +20,6 @@ from finger3d.mechanics.small_strain.linear_contact import (
     LinearBody,
     solve_increment,
     solve_increment_to_force,
-    solve_linearised,
 )
 from finger3d.objects import Move, ObjectPose
 
@@ -45,8 +44,6 @@ class SmallStrain:
     ) -> ContactSolution[State[Float]]:
         """Solve contact along the normals of the object."""
         body = LinearBody(problem.delassus, np.zeros_like(state.body))
-        if problem.contact_geometry is not None:
-            return solve_linearised(problem, state, move, body, guess)
         return solve_increment(problem, state, move, body, guess, workspace)
 
     def increment_to_force(

@@ -113,24 +113,6 @@ def solve_increment_to_force(
     return (increment.move, solution) if is_there else None
 
 
-def solve_linearised(
-    problem: Problem, state: State[Float], move: Move, body: LinearBody, guess: Float | None
-) -> ContactSolution[State[Float]]:
-    """Advance a state by one solution with the contact geometry that the problem knows of the pose at the end.
-
-    An increment to a pose that is not known does not converge.
-    """
-    if problem.contact_geometry is None or move.end not in problem.contact_geometry:
-        return ContactSolution(state, Outcome.NO_CONVERGENCE, np.inf, 0, "none")
-    geometry, expansion_point = problem.contact_geometry[move.end]
-    increment = Increment(problem, state, move, body, DistanceTracker())
-    increment, solution = increment.solve_linearised(geometry, expansion_point, guess)
-    if not solution.outcome.ok:
-        return solution.with_state(state)
-    displacement = body.displacement(solution.state.force, geometry.bases)
-    return solution.with_state(increment.reached(geometry, expansion_point, displacement, solution.state, None))
-
-
 def extrapolated(tried: list[Float], results: list[Float]) -> Float:
     """Return the next displacement from those tried and those found from them, by Anderson's method."""
     if len(tried) == 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,16 +54,6 @@ class Grading:
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
-
-    @property
-    def key(self) -> str:
-        """SHA-256 of the points and sizes."""
-        return hashlib.sha256(self.points.tobytes() + self.sizes.tobytes()).hexdigest()
-
-    @property
-    def in_section(self) -> Grading:
-        """The same lengths whatever z is."""
-        return Grading(self.points * [1.0, 1.0, 0.0], self.sizes)
 
     def at(self, points: Float, rate: float) -> Float:
         """Return the edge length (n,) mm at points (n, d), at the mirror images of the part too."""

@@ -111,8 +111,7 @@ def _layout(design: Design, options: MeshSizes, zone: Zone, dim: int) -> tuple[G
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")
         raise Finger3dError(f"{what}: {design.name} is {lacks_section(design)}; allowed: {allowed}")
     low, high = folded_zone(zone, section.half_length_mm)
-    grading = options.grading.in_section if options.grading else None
-    return rows(section, Sizes(options.size_mm, options.base_size_mm, low, high, grading)), section
+    return rows(section, Sizes(options.size_mm, options.base_size_mm, low, high)), section
 
 
 def _with_parts(mesh: Mesh, section: Section, part: Int) -> Mesh:

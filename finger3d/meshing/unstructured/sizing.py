@@ -35,7 +35,7 @@ class Sizing:
     low, high : (3,) corners of the box around the meshed body, mm
     zone : (n, 3) points of the contact surface in the zone, mm
     step : spacing of the background grid, mm
-    grading : edge lengths inside the body, if they are prescribed
+    grading : shorter edges inside the body
     """
 
     size_mm: float
@@ -120,7 +120,7 @@ def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Flo
     points = points[np.isfinite(points[:, 1])]
     if x1 < x0 or z1 < z0 or not len(points):
         raise Finger3dError(f"{design.name}: the predicted contact zone {zone} mm lies outside the meshed part")
-    return Sizing(options.size_mm, options.base_size_mm, low, high, points, step, options.grading)
+    return Sizing(options.size_mm, options.base_size_mm, low, high, points, step)
 
 
 def count_cells(design: Design, field: Sizing, samples: int = 40) -> float:
