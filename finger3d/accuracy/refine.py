@@ -51,7 +51,7 @@ _FINER = 2.0
 where cells are bisected."""
 
 _FASTEST = 2.0
-"""Order with which an error falls at most from round to round: a bar that is small by chance must not end the rounds."""
+"""Order with which an error falls at most from round to round: a bar that is small by chance shall not end them."""
 
 _SAFETY = 0.9  # of the tolerance, so that the last round does not just miss it
 
