@@ -68,6 +68,8 @@ depth_mm = 10.0
 steps = 10
 """
 SECTION = f"""{SCENE}
+[effects]
+auto = false
 [model]
 domain = "plane-strain"
 [mesh]
@@ -75,11 +77,32 @@ size_mm = 0.3
 base_size_mm = 1.0
 """  # 26 000 unknowns
 SOLID = f"""{SCENE}
+[effects]
+auto = false
 [mesh]
 mesher = "swept"
 size_mm = {MIDDLE}
 base_size_mm = {4.0 * MIDDLE}
 """
+
+BALL_ON_GEL = """
+[finger]
+geometry = "block"
+half_length_mm = 12.625
+height_mm = 4.0
+width_mm = 20.75
+[material]
+E_MPa = 0.1
+nu = 0.49
+[object]
+shape = "sphere"
+radius_mm = 3.0
+[friction]
+mu = 0.5
+[press]
+depth_mm = 0.8
+"""
+"""The gel pad under a ball that irisxu02/gelsight_ansys_sim presses in ANSYS, in 130 s on eight cores."""
 
 FIVE_AGAINST_ONE = {"in ten increments": 1.6, "in increments chosen by their error": 2.6}
 """Bounds on the time of five presses of a body over that of one; choosing the increments of a press takes up to 0.4 of
@@ -181,6 +204,31 @@ def _press_overhead(repeats: int) -> float:
     return min(found)
 
 
+def _default_presses(quick: bool) -> Iterator[Row]:
+    """Yield the time of presses with error bars and the effects that scenes call for, over that in small strain."""
+    fig9_20_wide = (Path(__file__).parents[1] / "geometries" / "fig9.toml").read_text(encoding="utf-8")
+    small, section = ("--set", "effects.auto=false"), ("--set", "model.domain=plane-strain")
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as folder:
+
+        def seconds(text: str, *keys: str) -> float:
+            scene = Path(folder, "scene.toml")
+            scene.write_text(text, encoding="utf-8")
+            press = [sys.executable, "-m", "finger3d", "press", str(scene), "--no-figures"]
+            found = []
+            for _ in range(2):  # the second takes the mesh from the cache
+                begin = time.perf_counter()
+                _run([*press, "--out", str(Path(folder, "out")), *keys])
+                found.append(time.perf_counter() - begin)
+            return found[-1]
+
+        for name, text, ratio in (("Fig. 9", fig9_20_wide, 3.0), ("a ball on a gel pad", BALL_ON_GEL, 4.0))[quick:]:
+            large = seconds(text)
+            what = f"press of {name}, effects that it calls for, {large:.1f} s, over small strain"
+            yield _row(what, ratio, large / seconds(text, *small))
+        what = "press of the section of Fig. 9, effects that it calls for, s"
+        yield _row(what, 1.5, seconds(fig9_20_wide, *section))
+
+
 def _five_against_one(scene: str, repeats: int) -> float:
     """Wall time of `finger3d sweep` of all of MUS over that of one, all of Python and output included.
 
@@ -229,6 +277,8 @@ def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     report.stage("finger3d press of a section")
     overhead = _press_overhead(repeats)
     yield [_row("finger3d press --no-error of a section, less its solve, s", 3.5, overhead)]
+    report.stage("default presses")
+    yield list(_default_presses(quick))
     report.stage("sweeps of five values of mu")
     yield _sweeps(quick)
     if not quick:

@@ -44,6 +44,9 @@ _GRADED_FACTOR = 3.0
 """Edge length of a swept companion of an unstructured mesh, if at `FACTOR` it has as many unknowns: a swept mesh is
 fine along the whole of x and z."""
 
+_MOST_SWEPT = 0.85
+"""Most unknowns of a swept companion of an unstructured mesh over those of the mesh, times the ratio of edges."""
+
 _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
 """Unknowns below which an unstructured mesh is not coarsened: pytetwild needs nearly as many for any curved body."""
 
@@ -76,6 +79,19 @@ def coarser(model: Model, factor: float = FACTOR) -> Model:
     borders = _scaled(options, factor)
     longer = replace(options, size_mm=size, base_size_mm=base, mesher=mesher, layers=1, borders=borders)
     return replace(model, mesh=longer)
+
+
+def _coarser_options(problem: Problem, factor: float) -> MeshOptions:
+    """Return the options of a coarser mesh, swept unless it then had too many unknowns.
+
+    A swept mesh is fine along the whole of x and z, an unstructured one at the contact only.
+    """
+    model, options = problem.model, coarser(problem.model, factor).mesh
+    if model.domain != "solid" or options.mesher == model.mesh.mesher:
+        return options
+    swept = mesh_solid(model.design, options, model.first_contact.contact_box, symmetry(model))[0]
+    few = swept.points.size <= _MOST_SWEPT / factor * problem.mesh.points.size
+    return options if few else replace(options, mesher=model.mesh.mesher)
 
 
 def _scaled(options: MeshOptions, factor: float) -> SizedPlaces | None:
@@ -116,7 +132,7 @@ def coarse_companions(
         sizes.add(known.mesh.points.size)
         yield ratios[0], replace(known, model=replace(known.model, legs=model.legs))
     for factor in _FACTORS[1:] if known else _FACTORS:
-        options = coarser(model, factor).mesh
+        options = _coarser_options(problem, factor)
         ratio = options.size_mm / model.mesh.size_mm
         least = 0 if options.mesher == "swept" else _LEAST_UNSTRUCTURED_UNKNOWNS * (factor / FACTOR) ** 3
         alike = any(max(ratio / r, r / ratio) < _APART for r in ratios)
