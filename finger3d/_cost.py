@@ -29,8 +29,8 @@ GAUGE_S, GAUGE_CELL_S = 3e-3, 7e-7
 AUTOMATIC_S = 4.0
 """Seconds that automatic increments may take in addition to those of the condensation."""
 
-LARGE_DEFORMATION_S = 10.0
-"""Largest cost of a coarse press at large deformation; 30 % of a press of a million unknowns would hold 4 GB."""
+JUDGEMENT_S, JUDGEMENT_SHARE = 1.0, 0.1
+"""Seconds that the judgement of effects may take in any case, and over those of the press."""
 
 CALIBRATION_S, CALIBRATION_PRESSES = 60.0, 40.0
 """Forecast time of a calibration beyond which a finer mesh is recommended but not used, and its time over that of a

@@ -17,7 +17,8 @@ from finger3d._cost import (
     FIGURES_S,
     GAUGE_CELL_S,
     GAUGE_S,
-    LARGE_DEFORMATION_S,
+    JUDGEMENT_S,
+    JUDGEMENT_SHARE,
     START_S,
     PressSize,
     meshing_s,
@@ -27,7 +28,7 @@ from finger3d._cost import (
 from finger3d._types import Tree
 from finger3d.mechanics.discretise.build import WHOLE_FACE, candidate_points, poses
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
-from finger3d.mechanics.discretise.gauge_refinement import locally_refined
+from finger3d.mechanics.discretise.gauge_refinement import face_near_gauge, locally_refined
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.path import AUTO_START
@@ -44,13 +45,10 @@ _USUAL = 20
 _LATTICE = 100
 """Places along each side of a part at which the contact face of an unstructured mesh is counted."""
 
-_LEAST_BARS_S, _BARS_SHARE, _USUAL_SHARE = 0.7, 0.7, 0.15
-"""Seconds of the error bars of any press; others, over those of the press, twice as much with automatic increments; and
-those that the estimated effect of large deformation usually takes, over the largest."""
-
-_COMPANIONS = 0.7
-"""Seconds of three companions at large deformation, and of the runs that choose increments, over those of the press.
-They have 0.35, 0.13 and 0.02 of its unknowns in solids, and that with 0.13 runs twice."""
+_LEAST_BARS_S = 0.5
+_COMPANIONS, _BESIDE = 0.6, 0.45
+"""Seconds of the error bars of any press, and others over those of the press.  The companions have 0.35, 0.13 and 0.02
+of its unknowns in solids; at large deformation they are pressed beside it."""
 
 _SOLUTIONS = 5
 """Contact solutions of an increment in small strain under an object that is not flat, whose normals change.
@@ -65,6 +63,9 @@ _CONTACT = 0.7
 _BORDER_POINTS, _BORDER_UNKNOWNS = {True: 1.2, False: 2.1}, 105.0
 """Contact points added along one edge of the border of stick, over what its refinement asks for, of swept and other
 meshes; and unknowns for each of them."""
+
+_GAUGE_UNKNOWNS = 140.0
+"""Unknowns for each contact point added close to a gauge, those around the gauge included; of the finger of Fig. 9."""
 
 _FOIL_ROWS = {2: 16, 3: 96}
 """Condensed rows of a foil with its mirror images, by dimension."""
@@ -111,6 +112,8 @@ def press_cost(model: Model) -> PressCost:
     axes = symmetry(model)
     made, coarse = _size(model, axes)
     cells, size = _with_borders(model, axes, made, coarse)
+    finds_borders = size is not coarse
+    cells, size = _with_gauges(model, axes, cells, size)
     runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
     marched = len(runs) * fixed + sum(runs) * free
@@ -121,7 +124,7 @@ def press_cost(model: Model) -> PressCost:
         "assembly": size.assembly_s + len(model.gauges) * (GAUGE_S + GAUGE_CELL_S * cells),
         "condensation": size.condensation_s,
         "contact": marched * solutions * size.contact_s,
-        **({} if size is coarse else {"borders": _passes(model) * (coarse.assembly_s + coarse.press_s(AUTO_START))}),
+        **({"borders": _passes(model) * (coarse.assembly_s + coarse.press_s(AUTO_START))} if finds_borders else {}),
         "output": FIGURES_S[size.dim],
     }
     return PressCost(
@@ -172,10 +175,8 @@ def _error_bars_s(model: Model, seconds: dict[str, float], added_s: float) -> fl
     """Return the seconds of the error bars of a press from those of its stages, and of its effects."""
     solving = sum(seconds[stage] for stage in ("assembly", "condensation", "contact"))
     if model.finite_strain:
-        return _LEAST_BARS_S + _COMPANIONS * (solving + added_s)
-    share = _BARS_SHARE * (1 + any(leg.steps == "auto" for leg in model.legs))
-    estimated = not model.relaxation
-    return _LEAST_BARS_S + share * solving + LARGE_DEFORMATION_S * _USUAL_SHARE * estimated
+        return _LEAST_BARS_S + _BESIDE * (solving + added_s)
+    return _LEAST_BARS_S + _COMPANIONS * solving + max(JUDGEMENT_S, JUDGEMENT_SHARE * solving)
 
 
 def without_output_s(expected: Tree) -> float:
@@ -237,6 +238,25 @@ def _with_borders(model: Model, axes: tuple[str, ...], cells: int, size: PressSi
     finer = mesh.stick_refinement
     points = _BORDER_POINTS[mesh.mesher == "swept"] * (0.3 * finer**2 + finer - 1.0) * edges
     dofs = size.dofs + _BORDER_UNKNOWNS * points
+    return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
+
+
+def _with_gauges(model: Model, axes: tuple[str, ...], cells: int, size: PressSize) -> tuple[int, PressSize]:
+    """Return cells and size of a solid whose edges are shorter at the contact face close to its gauges."""
+    mesh = model.mesh
+    if size.dim == 2 or mesh.gauge_refinement == 1.0:
+        return cells, size
+    points = 0.0
+    for gauge in model.gauges:
+        x, y, z = gauge.middle
+        depth = float(model.design.top(np.array([x]), np.array([z]))[0] - y)
+        if not depth > 0.0 or (mesh.refined_gauges and gauge.name not in mesh.refined_gauges):
+            continue
+        reach, edge = face_near_gauge(depth, mesh.size_mm / mesh.gauge_refinement)
+        mirrored = sum(abs(at) < reach for axis, at in (("x", x), ("z", z)) if axis in axes)
+        face = min(math.pi * reach, 2.0 * model.design.width_mm) * reach / 2.0**mirrored
+        points += max(face / 0.866 * (edge**-2 - mesh.size_mm**-2), 0.0)
+    dofs = size.dofs + _GAUGE_UNKNOWNS * points
     return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
 
 

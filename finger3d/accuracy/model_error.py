@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from finger3d._cost import JUDGEMENT_S, JUDGEMENT_SHARE
 from finger3d._types import Float
 from finger3d.accuracy.advice import largest_principal_strain
 from finger3d.accuracy.changes import (
@@ -62,9 +63,6 @@ _FACTORS = (1.0, math.sqrt(2.0), 2.0, 2.0 * math.sqrt(2.0), 4.0, 4.0 * math.sqrt
 
 _SAFETY, _LEAST_ERROR = 1.5, 0.15
 """Error of a change over its difference between both meshes, and least error relative to the change."""
-
-_SHARE, _LEAST_S = 0.1, 1.0
-"""Seconds that a judgement may take over those of the press, and at least; by the forecast."""
 
 _NO_DIFFERENCE = 1.0 - 1e-12
 """Ratio of kinetic to static friction with which increments are as they are given, as at large deformation."""
@@ -148,9 +146,9 @@ class Judgement:
         """Return the edge lengths of the coarse mesh over those of the press; None if all cost too much."""
         everything = enriched(self.model, {name: self.effects[name] for name in effects})
         try:
-            budget = max(_SHARE * without_output_s(forecast(everything)), _LEAST_S)
+            budget = max(JUDGEMENT_SHARE * without_output_s(forecast(everything)), JUDGEMENT_S)
         except Finger3dError:  # more than the machine has; the press will say so
-            budget = _LEAST_S
+            budget = JUDGEMENT_S
         for factor in _FACTORS:
             try:
                 one = forecast(self._coarse(effects, factor, _STEPS[0]))

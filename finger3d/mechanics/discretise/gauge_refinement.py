@@ -90,12 +90,23 @@ def _places_on_face(mesh: Mesh, gauge: cKDTree, shortest: float) -> tuple[Float,
     facets = mesh.points[mesh.facets["contact"]]
     away = gauge.query(facets)[0].min(axis=1)
     depth = float(away.min())
-    reach, edge = max(_REACH * depth, _LEAST_REACH * shortest), max(shortest, depth / _EDGES_PER_DEPTH)
+    reach, edge = face_near_gauge(depth, shortest)
     facets = facets[away <= reach]
     diameter = float(np.linalg.norm(np.ptp(facets, axis=1), axis=1).max())
     places = mesh.facet_element.shape(_lattice(mesh.dim, math.ceil(diameter / edge))) @ facets
     places = places.reshape(-1, mesh.dim)
     return places[gauge.query(places)[0] <= reach], edge
+
+
+def face_near_gauge(depth: float, shortest: float) -> tuple[float, float]:
+    """Return how far from a gauge the contact face is refined, and the edge length there, mm.
+
+    Parameters
+    ----------
+    depth : of the gauge under the face, mm
+    shortest : length of the shortest edges, mm
+    """
+    return max(_REACH * depth, _LEAST_REACH * shortest), max(shortest, depth / _EDGES_PER_DEPTH)
 
 
 def _lattice(corners: int, count: int) -> Float:
