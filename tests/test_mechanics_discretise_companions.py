@@ -18,7 +18,7 @@ from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise import companions
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.companions import coarse_companions, coarser, companion
+from finger3d.mechanics.discretise.companions import coarse_companions, coarser, companion, finer_companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import last_step
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
@@ -95,9 +95,9 @@ def test_a_cached_mesh_without_its_companion_gets_one_and_pays_once(made: list[s
     assert made == ["lump", "lump"]
 
 
-def test_a_small_unstructured_mesh_is_judged_by_a_finer_one(made: list[str]) -> None:
+def test_a_finer_companion_has_half_the_edges(made: list[str]) -> None:
     problem, _ = run(unstructured())
-    found = companion(problem).model.mesh
+    found = finer_companion(problem).model.mesh
     assert (found.size_mm, found.base_size_mm) == (0.2, 0.5)
     assert made == ["lump", "lump"]
 
@@ -125,12 +125,11 @@ def test_companions_that_the_finger_makes_alike_are_left_out() -> None:
     assert len(ratios) < 3
 
 
+@pytest.mark.usefixtures("made")
 def test_a_finer_companion_at_large_deformation_is_not_so_fine() -> None:
     model = unstructured()
     for large, size in ((model, 0.2), (LargeDeformation().apply(model), 0.28)):
-        coarse, (finer, _) = companions.companions(large, 2000)
-        assert not coarse
-        assert finer.size_mm == pytest.approx(size)
+        assert finer_companion(build(large)).model.mesh.size_mm == pytest.approx(size)
 
 
 def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: list[str], monkeypatch: Any) -> None:
@@ -144,7 +143,7 @@ def test_a_body_meshed_finer_than_asked_for_is_judged_by_one_still_finer(made: l
     model = replace(unstructured(), mesh=MeshOptions(0.8, 2.0, "ftetwild"))
     monkeypatch.setattr(companions, "build", no_coarser_than)
     problem = replace(no_coarser_than(model), model=model)
-    assert companion(problem).mesh.points.size > 1.5 * problem.mesh.points.size
+    assert finer_companion(problem).mesh.points.size > 1.5 * problem.mesh.points.size
     assert asked == [0.8, 0.4, 0.2]
 
 
@@ -161,15 +160,15 @@ def test_an_elastic_ball_is_meshed_anew_for_the_companion_and_kept(made: list[st
     assert len(made) == meshed
 
 
-def test_a_swept_companion_that_is_no_coarser_gets_longer_edges(made: list[str]) -> None:
-    # below a ball pytetwild is fine where it touches, sweeping all along x and z of it: a swept mesh of edges of 0.6 mm
-    # stands in for an unstructured one of 0.4 mm, with about as many unknowns as a swept one of 0.8 mm has
+def test_a_companion_that_would_have_too_many_unknowns_swept_is_unstructured() -> None:
+    # below a ball pytetwild is fine where it touches, sweeping all along x and z of it
     block = designs()["block"](half_length_mm=6.0, height_mm=6.0, width_mm=12.0)
-    model = replace(unstructured(), design=block, mesh=MeshOptions(0.6, 4.5, "swept"))
-    problem, _ = run(model)
-    beside = companion(replace(problem, model=replace(model, mesh=MeshOptions(0.4, 3.0, "ftetwild"))))
-    assert (beside.model.mesh.mesher, beside.model.mesh.size_mm) == ("swept", pytest.approx(1.2))
-    assert made == []
+    problem = build(replace(unstructured(), design=block, mesh=MeshOptions(0.6, 4.5, "swept")))
+    found = {}
+    for size in (0.2, 0.5):  # as if this mesh were one by pytetwild
+        wild = replace(problem, model=replace(problem.model, mesh=MeshOptions(size, 4.5, "ftetwild")))
+        found[size] = companions._coarser_options(wild, 2.0).mesher
+    assert found == {0.2: "ftetwild", 0.5: "swept"}
 
 
 def rows_along_z(problem: Problem) -> int:

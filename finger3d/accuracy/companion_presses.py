@@ -12,7 +12,7 @@ import numpy as np
 
 from finger3d.contact.acceleration import one_thread
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.companions import coarse_companions, companion, edge_ratio
+from finger3d.mechanics.discretise.companions import coarse_companions, edge_ratio, finer_companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import FEW_CUTS, StepEstimate, last_step, rough_workspace
 from finger3d.mechanics.results.history import StepResult
@@ -48,7 +48,7 @@ def companion_presses(
         except FAILURES:
             continue
     if not found:
-        beside = companion(problem, report)
+        beside = finer_companion(problem, report)
         found.append(CompanionPress(edge_ratio(problem, beside), beside, _end_of(beside, None, cancel)))
     return found
 

@@ -8,7 +8,7 @@ object is meshed anew together with the finger, so that the estimate covers both
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -40,19 +40,11 @@ _FINER_FACTOR, _FINER_IF_FACTORED = 0.5, 0.7
 be meshed finer than requested.  In solids at finite strain, where every increment factorises the tangent, a companion
 at the first would take some forty times the time of the press."""
 
-_GRADED_FACTOR = 3.0
-"""Edge length of a swept companion of an unstructured mesh, if at `FACTOR` it has as many unknowns: a swept mesh is
-fine along the whole of x and z."""
-
 _MOST_SWEPT = 0.85
 """Most unknowns of a swept companion of an unstructured mesh over those of the mesh, times the ratio of edges."""
 
 _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
 """Unknowns below which an unstructured mesh is not coarsened: pytetwild needs nearly as many for any curved body."""
-
-_FINITE_STRAIN_FACTOR = 2.5
-"""Edge length of the companion of a section at finite strain, where every increment factorises the tangent: at `FACTOR`
-the companion would take half the time of the press."""
 
 _BISECTIONS = ((0.5, 18.0), (0.75, 6.5))
 """Edge lengths of a bisected companion over those of the mesh, and its unknowns over those of the mesh, measured; the
@@ -100,20 +92,34 @@ def _scaled(options: MeshOptions, factor: float) -> SizedPlaces | None:
 
 
 def companion(problem: Problem, report: Progress = QUIET) -> Problem:
-    """Return the condensed problem on the companion mesh: coarser, or finer where no coarser mesh can be made.
+    """Return the first condensed companion of a problem: a coarser one, or a finer one where there is none.
 
     Unstructured meshes are kept in the cache of meshes.
 
     Raises
     ------
     Finger3dError
-        Where neither mesh can be made, or none differs enough for an estimate.
+        Where no mesh can be made, or none differs enough for an estimate.
     """
-    coarse, fine = companions(problem.model, problem.mesh.points.size)
-    for chosen, enough in ((coarse, lambda r: r >= LEAST_RATIO), (fine, lambda r: r <= 1.0 / LEAST_RATIO)):
-        for options in chosen:
-            if beside := _built_if(problem, replace(problem.model, mesh=options), enough, report):
-                return beside
+    coarse = next((beside for _, beside in coarse_companions(problem, report)), None)
+    return coarse or finer_companion(problem, report)
+
+
+def finer_companion(problem: Problem, report: Progress = QUIET) -> Problem:
+    """Return the condensed problem on a finer mesh; raises Finger3dError if none differs enough for an estimate."""
+    model, own = problem.model, problem.model.mesh
+    if isinstance(model.design, GivenMesh):
+        candidates = [_bisected(own, problem.mesh.points.size)]
+    else:
+        factor = _FINER_IF_FACTORED if model.domain == "solid" and model.finite_strain else _FINER_FACTOR
+        candidates = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (factor, factor**2)]
+    for options in candidates:
+        try:
+            beside = built_like(problem, replace(model, mesh=options), report if is_unstructured(model) else QUIET)
+        except UnresolvedError:
+            continue
+        if edge_ratio(problem, beside) <= 1.0 / LEAST_RATIO:
+            return beside
     raise Finger3dError("no other mesh differs enough from this one for an estimate; change mesh.size_mm")
 
 
@@ -148,22 +154,6 @@ def coarse_companions(
             yield ratio, beside
 
 
-def companions(model: Model, unknowns: float) -> tuple[list[MeshOptions], list[MeshOptions]]:
-    """Return the candidate companions, coarser and finer, of a mesh of so many unknowns; the preferred one first."""
-    if isinstance(model.design, GivenMesh):
-        return [], [_bisected(model.mesh, unknowns)]
-    own, enough = model.mesh, unknowns >= _LEAST_UNSTRUCTURED_UNKNOWNS
-    costly = model.domain != "solid" and model.finite_strain
-    longer = coarser(model, _FINITE_STRAIN_FACTOR if costly else FACTOR).mesh
-    chosen = [longer] if longer.mesher == "swept" or enough else []
-    if model.domain == "solid" and own.mesher != longer.mesher:
-        chosen.append(coarser(model, _GRADED_FACTOR).mesh)
-        chosen += [replace(longer, mesher=own.mesher)] if enough else []
-    factor = _FINER_IF_FACTORED if model.domain == "solid" and model.finite_strain else _FINER_FACTOR
-    finer = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (factor, factor**2)]
-    return chosen, finer
-
-
 def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
     """Return the options of the companion of a mesh that was given: its cells are halved, and cannot be joined.
 
@@ -182,23 +172,6 @@ def _bisected(own: MeshOptions, unknowns: float) -> MeshOptions:
 
 def _bisected_by(own: MeshOptions, f: float) -> MeshOptions:
     return replace(own, size_mm=f * own.size_mm, base_size_mm=f * own.base_size_mm, borders=_scaled(own, f))
-
-
-def _built_if(problem: Problem, model: Model, enough: Callable[[float], bool], report: Progress) -> Problem | None:
-    """Return a condensed companion if the ratio of edge lengths is enough and its points resolve the contact.
-
-    A structured mesh is counted before it is condensed.
-    """
-    if model.domain != "solid" or model.mesh.mesher == "swept":
-        made = mesh_solid if model.domain == "solid" else mesh_section
-        mesh = made(model.design, model.mesh, model.first_contact.contact_box, symmetry(model))[0]
-        if not enough((problem.mesh.points.size / mesh.points.size) ** (1.0 / problem.dim)):
-            return None
-    try:
-        beside = built_like(problem, model, report if is_unstructured(model) else QUIET)
-    except UnresolvedError:
-        return None
-    return beside if enough(edge_ratio(problem, beside)) else None
 
 
 def built_like(problem: Problem, model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
