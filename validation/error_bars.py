@@ -61,11 +61,9 @@ STEPS, TRUE_STEPS = (5, 10, 20, 40, 80), 1280
 DRAWN_STEPS = 20
 """Increments of drawn scenes: the error of fewer, which is another on each mesh, would count as one of the mesh."""
 
-SECTIONS, SOLIDS = 64, 32
+SECTIONS, SOLIDS = 40, 20
 LARGE_SECTIONS, LARGE_SOLIDS = 32, 16
-"""Drawn scenes of a full run, in small strain and at large deformation.  Of 16 on two meshes each, a share that is .95
-in the long run is below .9 in one of ten
-runs or more, and there are some twenty such shares; of 64, in one of a hundred."""
+"""Drawn scenes of a full run, in small strain, on two meshes each, and at large deformation."""
 
 STEP_KINDS = ("normal_force_N", "friction_sum_N", "stick_half_length_mm", "gauge", "external_work_mJ", "dissipation_mJ")
 MET = {

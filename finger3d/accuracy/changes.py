@@ -127,9 +127,9 @@ def natural_scales(model: Model, depth_mm: float, numbers: Mapping[str, float]) 
         match kinds[name]:
             case Kind.FRICTION_SUM:
                 return max(abs(numbers[name]), model.friction.largest * force)
-            case Kind.HALF_LENGTH:
+            case Kind.CONTACT_LENGTH | Kind.STICK_LENGTH:
                 return abs(numbers["contact_half_length_mm"])
-            case Kind.AREA:
+            case Kind.CONTACT_AREA | Kind.STICK_AREA:
                 return abs(numbers["contact_area_mm2"])
             case Kind.STRAIN:
                 return max(largest(numbers, kinds, Kind.STRAIN), depth_mm / design.height_mm)

@@ -153,7 +153,7 @@ class Judgement:
             try:
                 one = forecast(self._coarse(effects, factor, _STEPS[0]))
                 seconds = without_output_s(one) - (float(one["mesh_s"]) if factor == 1.0 else 0.0)
-                if (1 + len(effects)) * seconds <= budget:
+                if (1 + len(effects)) * seconds <= len(effects) * budget:
                     self._press(frozenset(), False, factor)
                     return factor
             except FAILURES:
