@@ -17,7 +17,7 @@ from ._corner import extrapolated, observed
 from ._cost import QUANTITIES, Case
 
 LENGTHS = {"contact_length": 0.04, "stick_length": 0.2}
-"""Error of the place of an end over the distance of the points, as finger3d.accuracy.point_resolution has it."""
+"""Error of the place of an end over the distance of the points."""
 
 Runs = Mapping[Case, dict[str, Any]]
 

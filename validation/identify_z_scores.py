@@ -126,9 +126,9 @@ def case(kind: str, random: np.random.Generator) -> Iterator[Fitted]:
 
 
 def run(quick: bool) -> Result:
-    """Quick: six drawn sections."""
+    """Quick: twelve drawn sections."""
     random = np.random.default_rng(20261126)
-    counts = {"drawn": 6} if quick else CASES
+    counts = {"drawn": 12} if quick else CASES
     found = [one for domain, count in counts.items() for _ in range(count) for one in case(domain, random)]
     rows = list(_rows(found, quick))
     table = columns(" ".join(Fitted._fields), found)
