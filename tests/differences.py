@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.sensitivity import Numbers, derivatives, tangents

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Sphere

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import Element, quadrature
 from finger3d.fem.mesh.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.solvers import mumps, pardiso
 from finger3d.fem.surface.traces import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame

@@ -15,7 +15,7 @@ from finger3d.accuracy.cost import AddedCost, forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

@@ -17,7 +17,7 @@ from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
-from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

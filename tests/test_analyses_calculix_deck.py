@@ -24,9 +24,9 @@ from finger3d.analyses.calculix.deck import (
 )
 from finger3d.errors import MissingError
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import FACETS, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
-from finger3d.fem.solids.material import Isotropic
 from tests.given_meshes import cube, refused
 
 MATERIAL = Isotropic(3.0, 0.4)

@@ -11,7 +11,7 @@ from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import MIXED_FROM, Isotropic
+from finger3d.fem.laws.material import MIXED_FROM, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

@@ -96,7 +96,7 @@ def test_a_twisted_column_has_the_torque_of_its_polar_moment(tmp_path: Path) -> 
     from build123d import Cylinder, Rot
 
     from finger3d.contact.friction import Coulomb
-    from finger3d.fem.solids.material import Isotropic
+    from finger3d.fem.laws.material import Isotropic
     from finger3d.mechanics.model import Leg, MeshOptions, Model
     from tests.models import run
 

@@ -16,7 +16,7 @@ import finger3d.effects
 from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.effects import effect_names, effect_type, fill, warn
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of

@@ -11,8 +11,8 @@ from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Outcome
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import FREE_FACES
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of

@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from finger3d.fem.assembly import _CELLS_IN_CACHE, stiffness
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.solids.material import Elasticity
 from tests.meshes import body_load, edge_load, error_norms, full, grid, mapped
 
 PI = np.pi

@@ -12,12 +12,12 @@ from scipy.sparse.linalg import spsolve
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import MooneyRivlin, NeoHooke
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.parts import ElasticityByPart, elasticity_of
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.recovery.recover import strain_and_stress
 from finger3d.fem.solids.deformed import nodal_fields
 from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from tests.meshes import full, grid
 
 SOFT, STIFF = Isotropic(1.0, 0.3), Isotropic(7.0, 0.1)

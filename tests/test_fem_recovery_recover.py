@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 import pytest
 
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import quadratic
 from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
-from finger3d.fem.solids.material import Isotropic
 from tests.meshes import grid
 
 

@@ -12,9 +12,9 @@ from scipy.sparse.linalg import splu
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.tensors import InvertedError, determinant
 from tests.meshes import edge_load, full, grid, mapped
 

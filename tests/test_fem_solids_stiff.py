@@ -7,8 +7,8 @@ import pytest
 
 from finger3d._types import Float
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing
-from finger3d.fem.solids.material import Isotropic
 
 
 @pytest.mark.parametrize("law", [NeoHooke(1.0), MooneyRivlin(0.4, 0.3), Ogden(1.0, ((0.7, 2.0), (0.3, -2.0)))])

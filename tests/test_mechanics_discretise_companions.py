@@ -13,8 +13,8 @@ from finger3d.accuracy import companion_presses
 from finger3d.accuracy.estimate import estimate, main_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise import companions
 from finger3d.mechanics.discretise.build import build

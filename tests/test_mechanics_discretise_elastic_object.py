@@ -10,7 +10,7 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import measure

@@ -14,8 +14,8 @@ from finger3d.cli import main
 from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.assembly import Stiffness
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
-from finger3d.fem.solids.material import Isotropic
 from finger3d.fem.solvers.condense import condense, spring_forces, stiffened
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.foils import discretised_foils

@@ -10,8 +10,8 @@ import pytest
 from finger3d._types import Float
 from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import CONTACT
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion, edge_ratio

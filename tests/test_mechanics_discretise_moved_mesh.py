@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise import build as building
 from finger3d.mechanics.discretise.build import build, mesh_part

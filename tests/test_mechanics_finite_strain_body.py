@@ -8,8 +8,8 @@ import scipy.sparse as sp
 
 from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.fem.laws import NeoHooke, Yeoh
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
-from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.model import Gauge, MeshOptions

@@ -9,7 +9,7 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.tensors import InvertedError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build

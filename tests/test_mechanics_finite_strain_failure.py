@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.failure import cause_of_failure

@@ -12,9 +12,9 @@ import trimesh
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws import NeoHooke
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.quality import most_distorted
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build

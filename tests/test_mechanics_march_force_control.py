@@ -20,7 +20,7 @@ from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement

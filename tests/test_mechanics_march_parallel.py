@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulation import Workspace

@@ -10,7 +10,7 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.sensitivity import held_normals
 from finger3d.mechanics.model import Leg, MeshOptions

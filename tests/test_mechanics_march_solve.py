@@ -13,7 +13,7 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of

@@ -14,7 +14,7 @@ from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.contact.rules import RULES
 from finger3d.errors import Outcome
 from finger3d.fem.laws import NeoHooke
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march

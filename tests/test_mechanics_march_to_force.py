@@ -9,7 +9,7 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws import NeoHooke
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.parts import Substep
 from finger3d.mechanics.march.solve import march

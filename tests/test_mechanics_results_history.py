@@ -10,7 +10,7 @@ import pytest
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

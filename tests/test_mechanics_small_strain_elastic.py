@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Plane

@@ -12,7 +12,7 @@ from finger3d.contact import events
 from finger3d.contact.friction import OPEN, Coulomb, TwoCoefficients
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model

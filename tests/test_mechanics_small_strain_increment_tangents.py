@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Branch, Coulomb, TwoCoefficients
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Isotropic
 from finger3d.mechanics.discretise import elastic_object
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.moved_mesh import stretched_object

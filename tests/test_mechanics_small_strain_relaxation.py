@@ -7,7 +7,7 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.small_strain.relaxation import Relaxation

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.mechanics.discretise import elastic_object
 from finger3d.mechanics.discretise.build import build

@@ -16,7 +16,7 @@ from finger3d.effects.viscosity import (
     Effect,
 )
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import TwoCoefficients
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions
 from finger3d.mechanics.readings.gauges import Gauge

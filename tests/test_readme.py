@@ -106,7 +106,7 @@ def test_the_python_example_runs(root: Path, folder: Path) -> None:
 
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
-    from finger3d.fem.solids.material import Isotropic
+    from finger3d.fem.laws.material import Isotropic
     from finger3d.mechanics.discretise.build import build
     from finger3d.mechanics.march.solve import march
     from finger3d.mechanics.model import Leg, MeshOptions, Model

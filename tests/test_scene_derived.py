@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import RIGID_RATIO, Isotropic
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.materials.elastic import elastic_constants
 from finger3d.materials.modulus import SPREAD_A, modulus_of_shore_A
 from finger3d.mechanics.model import Leg

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import Plane
 from finger3d.scene import load, parse

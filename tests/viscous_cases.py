@@ -8,7 +8,7 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOptions, Model

@@ -31,7 +31,7 @@ from finger3d._machine import cores
 from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles

@@ -17,9 +17,9 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs

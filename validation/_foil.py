@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.fem.surface.traces import displacement_row
 from finger3d.mechanics.discretise.foils import discretised_foils

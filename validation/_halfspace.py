@@ -13,8 +13,8 @@ from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import quadratic
-from finger3d.fem.solids.material import Elasticity
 from finger3d.objects import Sphere
 
 from ._common import Body, body, box, graded, held_at

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Elasticity
 
 from ._common import box, convergence, held_at, mapped, nodes_of, solve
 from ._corner import clamped_free, extrapolated, observed

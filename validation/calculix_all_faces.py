@@ -21,7 +21,7 @@ import numpy as np
 from finger3d.analyses.calculix.deck import Contact, program
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build

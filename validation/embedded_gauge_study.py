@@ -21,7 +21,7 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.laws.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row

@@ -20,7 +20,7 @@ from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

@@ -25,7 +25,7 @@ from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Marker

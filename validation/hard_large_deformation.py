@@ -25,9 +25,9 @@ from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles

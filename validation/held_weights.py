@@ -34,7 +34,7 @@ from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.laws.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
 from ._rows import Result, Row

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

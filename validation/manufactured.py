@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import quadratic
-from finger3d.fem.solids.material import Elasticity
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
 from ._rows import Result, Row

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from finger3d.fem.solids.material import Elasticity
+from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row

@@ -22,9 +22,9 @@ from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh, unfold
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import strain_row
 from finger3d.geometry.registry import designs

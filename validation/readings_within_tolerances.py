@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN, Coulomb
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import FREE_FACES
-from finger3d.fem.solids.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build

@@ -19,7 +19,7 @@ import numpy as np
 
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 

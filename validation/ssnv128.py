@@ -22,8 +22,8 @@ from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import quadratic
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, surface
 

@@ -27,8 +27,8 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import local_rows, surface
 from finger3d.geometry.registry import designs

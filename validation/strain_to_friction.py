@@ -25,7 +25,7 @@ from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model

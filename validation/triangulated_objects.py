@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build

@@ -19,8 +19,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Elasticity
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import MeshOptions

@@ -28,9 +28,9 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.solids.bars import AddedStiffness
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.formulation import Formulation

@@ -25,7 +25,7 @@ import numpy as np
 from finger3d._cost import CHANGES
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Material
+from finger3d.fem.laws.material import Material
 from finger3d.mechanics.discretise.companions import built_like, coarser
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace

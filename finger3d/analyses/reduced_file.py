@@ -19,8 +19,8 @@ from finger3d._types import Array, Tree, TreeView
 from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.rules import RuleName
 from finger3d.errors import Finger3dError
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import FREE_FACES
-from finger3d.fem.solids.material import Isotropic
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import atomic, read_arrays

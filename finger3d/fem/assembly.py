@@ -14,9 +14,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
+from finger3d.fem.laws.material import LinearElasticity
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import LinearElasticity
 
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 

@@ -11,7 +11,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.solids.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from finger3d._types import TreeView
-from finger3d.fem.solids.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Leg, contact_path

@@ -12,7 +12,7 @@ from finger3d._types import Tree, TreeView
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import ElasticConstants

@@ -20,8 +20,8 @@ import numpy as np
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
+from finger3d.fem.laws.material import Material
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import Material
 
 MOST_TERMS = 3
 """Largest number of terms of Ogden's law in CalculiX."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.solids.material import MIXED_FROM, Isotropic, Material
+from finger3d.fem.laws.material import MIXED_FROM, Isotropic, Material
 from finger3d.fem.solvers.condense import stiffened
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points, under_pressure

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
+from finger3d.fem.laws.material import LinearElasticity, Material
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.solids.material import LinearElasticity, Material
 
 
 def elasticity_of(materials: Sequence[Material], mesh: Mesh, plane_stress: bool) -> LinearElasticity:
@@ -53,7 +53,7 @@ def contact_compliance(elastic: LinearElasticity, mesh: Mesh) -> Float:
 
 @dataclass(frozen=True)
 class ElasticityByPart:
-    """Linear elastic laws of a body of several parts; see `finger3d.fem.solids.material.LinearElasticity`.
+    """Linear elastic laws of a body of several parts; see `finger3d.fem.laws.material.LinearElasticity`.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class ElasticityByPart:
         return self.laws[part[0]] if len(part) and (part == part[0]).all() else ElasticityByPart(self.laws, part)
 
     def contract(self, outer: Float) -> Float:
-        """Return the element matrices of all cells; see `finger3d.fem.solids.material.LinearElasticity.contract`."""
+        """Return the element matrices of all cells; see `finger3d.fem.laws.material.LinearElasticity.contract`."""
         return _by_part(self.part, lambda number, values: self.laws[number].contract(values), outer)
 
     def stress(self, strain: Float) -> Float:

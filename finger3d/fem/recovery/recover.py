@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.fem.laws.material import LinearElasticity
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, MeshPart, signed_volumes
-from finger3d.fem.solids.material import LinearElasticity
 
 Across = Callable[[Float, Float], tuple[Float, Float]]
 

@@ -1,1 +1,1 @@
-"""Material laws of solids, and what is embedded in them."""
+"""Forces and stiffness of solids, and what is embedded in them."""

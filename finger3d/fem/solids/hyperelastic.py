@@ -21,10 +21,10 @@ from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.base import Inhomogeneous
+from finger3d.fem.laws.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.solids.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
 from finger3d.fem.solids.stiff import STIFF, hookean_stress
 from finger3d.fem.tensors import InvertedError, cofactor, determinant
 

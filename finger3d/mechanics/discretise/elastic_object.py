@@ -17,8 +17,8 @@ import scipy.sparse as sp
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness, stiffness
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh, axis_numbers, reflected
-from finger3d.fem.solids.material import Elasticity, Isotropic
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import facing_trace
 from finger3d.geometry.design import Design

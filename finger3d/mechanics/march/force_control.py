@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_touch

@@ -12,10 +12,10 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness, times
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.parts import ElasticityByPart
 from finger3d.fem.mesh.simplex import MeshPart
 from finger3d.fem.recovery.recover import averaged, displacement, nodal_pressure, nodal_strain
-from finger3d.fem.solids.material import Elasticity
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace

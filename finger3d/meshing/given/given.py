@@ -25,7 +25,7 @@ from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.refinement.bisection import TOO_LONG, refined
 from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.unstructured.sizing import RATE
+from finger3d.meshing.sizing import RATE
 
 if TYPE_CHECKING:
     from build123d import Solid

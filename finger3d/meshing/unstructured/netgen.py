@@ -20,8 +20,8 @@ from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone
+from finger3d.meshing.sizing import RATE, Sizing, sizing
 from finger3d.meshing.unstructured import _meshers
-from finger3d.meshing.unstructured.sizing import RATE, Sizing, sizing
 from finger3d.meshing.unstructured.solids import (
     box,
     check_volume,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.fem.solids.material import Isotropic
+from finger3d.fem.laws.material import Isotropic
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
