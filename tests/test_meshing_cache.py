@@ -14,7 +14,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.sizing import rounded_zone
+from finger3d.meshing.refinement.sizing import rounded_zone
 from finger3d.meshing.unstructured import tetwild
 from tests.commands import loaded
 from tests.designs import FIG9, OPTIONS, ZONE, make

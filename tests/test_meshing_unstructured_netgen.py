@@ -19,7 +19,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.sizing import sizing
+from finger3d.meshing.refinement.sizing import sizing
 from finger3d.meshing.structured.snap import UnusableMeshError
 from finger3d.meshing.unstructured import netgen
 from finger3d.meshing.unstructured.solids import box, glued_solids

@@ -8,7 +8,7 @@ import pytest
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing.sizing import sizing
+from finger3d.meshing.refinement.sizing import sizing
 from finger3d.meshing.structured.snap import UnusableMeshError
 from finger3d.meshing.unstructured.solids import (
     box,

@@ -36,7 +36,7 @@ from finger3d.mechanics.march.step_halving import automatic, limits
 from finger3d.mechanics.model import Model
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.meshing.limits import check_memory
-from finger3d.meshing.sizing import Sizing
+from finger3d.meshing.refinement.sizing import Sizing
 from finger3d.objects import PlacedObject
 
 _USUAL = 20
@@ -214,7 +214,7 @@ def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
         dofs = mesh.dim * report.points + (len(mesh.part_corners[0]) if model.mixed else 0)
         return report.cells, PressSize(mesh.dim, dofs, touching)
-    from finger3d.meshing.sizing import count_cells, sizing
+    from finger3d.meshing.refinement.sizing import count_cells, sizing
     from finger3d.meshing.unstructured.solids import box
 
     field = sizing(model.design, model.mesh, zone, *box(model.design, axes))

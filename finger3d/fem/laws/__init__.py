@@ -1,4 +1,4 @@
-"""Isochoric parts of hyperelastic energies."""
+"""Laws of materials: linear elasticity, and isochoric parts of hyperelastic energies."""
 
 from finger3d.fem.laws.base import IsochoricLaw
 from finger3d.fem.laws.invariants import MooneyRivlin, NeoHooke, Yeoh

@@ -24,8 +24,8 @@ from finger3d.meshing.limits import check_count
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.refinement.bisection import TOO_LONG, refined
 from finger3d.meshing.refinement.grading import SizedPlaces
+from finger3d.meshing.refinement.sizing import RATE
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.sizing import RATE
 
 if TYPE_CHECKING:
     from build123d import Solid

@@ -17,7 +17,7 @@ from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh, signed_volumes
 from finger3d.geometry.design import Design
 from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.sizing import Sizing
+from finger3d.meshing.refinement.sizing import Sizing
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued

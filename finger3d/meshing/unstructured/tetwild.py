@@ -21,7 +21,7 @@ from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.sizing import Sizing, sizing
+from finger3d.meshing.refinement.sizing import Sizing, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,

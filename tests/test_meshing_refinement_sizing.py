@@ -7,7 +7,7 @@ import pytest
 
 from finger3d.fem.mesh.simplex import Mesh, signed_volumes
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing.sizing import count_cells, sizing
+from finger3d.meshing.refinement.sizing import count_cells, sizing
 from tests.designs import FIG9
 
 
