@@ -35,7 +35,7 @@ from finger3d.accuracy.changes import (
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects import LARGE_DEFORMATION, fill
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.formulations import formulation_of
@@ -123,6 +123,7 @@ class Judgement:
     tolerance: float = 0.02
     _known: dict[tuple[bool, frozenset[str]], _Press] = field(default_factory=dict)
     _decides: bool = True
+    _is_resolved: bool = True
 
     def found(self, shortcut: bool = True) -> dict[str, Judged]:
         """Return what was found about every effect, by name.
@@ -156,6 +157,9 @@ class Judgement:
                 if (1 + len(effects)) * seconds <= len(effects) * budget:
                     self._press(frozenset(), False, factor)
                     return factor
+            except UnresolvedError:  # and longer edges resolve the object no better
+                self._is_resolved = False
+                return None
             except FAILURES:
                 continue
         return None
@@ -186,6 +190,8 @@ class Judgement:
 
     def _strain(self, factor: float | None) -> float | None:
         """Return the largest principal strain without large deformation; None if no press tells it."""
+        if not self._is_resolved:
+            return None
         without = frozenset[str]() if factor is None else frozenset(self.effects) - {LARGE_DEFORMATION}
         for chosen in (factor,) if factor else _FACTORS[::-1]:
             for effects in {without, frozenset[str]()}:
