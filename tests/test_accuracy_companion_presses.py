@@ -20,8 +20,8 @@ def large(size: float) -> Problem:
 
 
 def test_there_are_three_with_longer_edges_in_the_same_increments() -> None:
-    found = companion_presses(run(half_cylinder(0.15))[0])
-    assert [one.ratio for one in found] == pytest.approx([2.0, 2.0**0.5, 4.0])
+    found = companion_presses(run(half_cylinder(0.08))[0])
+    assert [one.ratio for one in found] == pytest.approx([2.0, 2.0**0.5, 4.0], rel=0.01)
     assert all(one.end.outcome.ok and one.end.target.depth_mm == 1.0 for one in found)
 
 
@@ -42,7 +42,7 @@ def test_those_of_another_mesh_are_pressed_anew(monkeypatch: pytest.MonkeyPatch)
     with CompanionThread() as thread:
         thread.begin(first)
         found = thread.of(second, None, QUIET)
-    assert found[0].problem.model.mesh.size_mm == pytest.approx(0.6)
+    assert found[0].problem.model.mesh.size_mm == pytest.approx(0.15)  # of few unknowns: finer
 
 
 def test_an_interruption_ends_them() -> None:

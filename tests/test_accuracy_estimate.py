@@ -93,7 +93,7 @@ def test_increments_under_a_curved_object_have_bars_however_many_there_are(
     # without a budget they are judged on a coarser mesh
     if not cheap:
         monkeypatch.setattr("finger3d.accuracy.estimate.INCREMENT_ERRORS", Budget(0.0, 0.0))
-    model = replace(half_cylinder(0.2, steps=20), object=Cylinder(radius_mm=6.0, axis="z"))
+    model = replace(half_cylinder(0.08, steps=20), object=Cylinder(radius_mm=6.0, axis="z"))
     problem, frames = run(model)
     found, told = estimate(problem, frames, numbers=press_numbers), press_numbers(problem, frames[-1])
     assert ("on the coarse mesh, order 1" in found.method) is not cheap
@@ -121,7 +121,7 @@ def test_increments_that_cannot_be_judged_leave_the_bars_of_the_mesh(monkeypatch
 
 
 def test_a_run_that_fails_is_replaced_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem, frames = run(barred(0.4, steps=4))
+    problem, frames = run(barred(0.08, steps=4))
 
     def only_half(problem: Problem, numbers: object, measurement: object, ratio: float) -> dict[str, float]:
         if ratio > 1.0 or len(problem.surface.nodes) < len(frames[-1].meshed_state.contact.gap):
@@ -192,7 +192,7 @@ def test_a_coarse_mesh_at_large_deformation_has_bars_that_hold() -> None:
     model = LargeDeformation().apply(replace(half_cylinder(3.0), mesh=MeshOptions(3.0, 5.0, "swept")))
     problem, frames = run(model)
     found = estimate(problem, frames)
-    assert re.search(r"structured, [0-9.]+ mm\) beside", found.method)
+    assert re.search(r"structured, [0-9., ]+ mm\) beside, finer", found.method)
     told = main_numbers(problem, frames[-1])
     truth = last_of(LargeDeformation().apply(half_cylinder(0.2)))
     assert set(found.discretisation) == set(told)
@@ -209,7 +209,7 @@ def test_a_gauges_error_at_several_coefficients_is_that_of_several_gauges() -> N
     found = reading_error(problem, beside, fine, coarse)
     # from the change, the ratio of edges and the order of strains, 1.5
     ratio = (problem.mesh.points.size / beside.mesh.points.size) ** 0.5
-    assert found == pytest.approx([0.01 / (ratio**1.5 - 1.0), 0.0], rel=1e-12)
+    assert found == pytest.approx([abs(0.01 / (ratio**1.5 - 1.0)), 0.0], rel=1e-12)
 
 
 def test_an_estimate_that_fails_spoils_nothing_and_says_why(

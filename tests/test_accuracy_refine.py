@@ -169,12 +169,12 @@ def test_the_time_stops_it_with_the_best_so_far() -> None:
 
 def test_too_large_a_mesh_stops_it_with_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
     # a machine of so little memory that the second round is refused by the forecast
-    model = section(0.4)
+    model = section(0.08)
     cells = len(build(model).mesh.cells)
     # 4.1 unknowns a triangle at 2 kB, 80 % of memory may be used (finger3d/meshing/limits.py)
     enough = int(2 * cells * 4.1 * 2e3 / 0.8)
     monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda: (enough, enough))
-    found = refine_mesh(model, 1e-4)
+    found = refine_mesh(model, 1e-6)
     assert found.rounds
     assert found.stopped.count("mesh.size_mm = ")
     assert "allowed" in found.warning

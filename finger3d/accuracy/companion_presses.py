@@ -12,7 +12,7 @@ import numpy as np
 
 from finger3d.contact.acceleration import one_thread
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.discretise.companions import coarse_companions, edge_ratio, finer_companion
+from finger3d.mechanics.discretise.companions import coarse_companions, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import FEW_CUTS, StepEstimate, last_step, rough_workspace
 from finger3d.mechanics.results.history import StepResult
@@ -35,7 +35,7 @@ def companion_presses(
 ) -> list[CompanionPress]:
     """Press the companions of a problem in the same increments, which are numbers; those that fail are left out.
 
-    They have coarser meshes; where there is none, there is one with a finer mesh.
+    They have coarser meshes; where there are none, finer ones.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def companion_presses(
         except FAILURES:
             continue
     if not found:
-        beside = finer_companion(problem, report)
-        found.append(CompanionPress(edge_ratio(problem, beside), beside, _end_of(beside, None, cancel)))
+        finer = finer_companions(problem, report)
+        found = [CompanionPress(ratio, beside, _end_of(beside, None, cancel)) for ratio, beside in finer]
     return found
 
 

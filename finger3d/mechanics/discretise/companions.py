@@ -43,6 +43,9 @@ at the first would take some forty times the time of the press."""
 _MOST_SWEPT = 0.85
 """Most unknowns of a swept companion of an unstructured mesh over those of the mesh, times the ratio of edges."""
 
+_LEAST_IN_SECTION = 2000
+"""Unknowns of a section below which companions are finer: coarser ones tell too little, finer ones cost nothing."""
+
 _LEAST_UNSTRUCTURED_UNKNOWNS = 15_000
 """Unknowns below which an unstructured mesh is not coarsened: pytetwild needs nearly as many for any curved body."""
 
@@ -102,25 +105,39 @@ def companion(problem: Problem, report: Progress = QUIET) -> Problem:
         Where no mesh can be made, or none differs enough for an estimate.
     """
     coarse = next((beside for _, beside in coarse_companions(problem, report)), None)
-    return coarse or finer_companion(problem, report)
+    return coarse or next(finer_companions(problem, report))[1]
 
 
-def finer_companion(problem: Problem, report: Progress = QUIET) -> Problem:
-    """Return the condensed problem on a finer mesh; raises Finger3dError if none differs enough for an estimate."""
-    model, own = problem.model, problem.model.mesh
+def finer_companions(problem: Problem, report: Progress = QUIET) -> Iterator[tuple[float, Problem]]:
+    """Yield the condensed problems on finer meshes, and their edge lengths over those of the mesh.
+
+    There is one of a solid or of a mesh that was given, and two of a section.
+
+    Raises
+    ------
+    Finger3dError
+        If none differs enough for an estimate.
+    """
+    model, own, found = problem.model, problem.model.mesh, 0
     if isinstance(model.design, GivenMesh):
         candidates = [_bisected(own, problem.mesh.points.size)]
     else:
         factor = _FINER_IF_FACTORED if model.domain == "solid" and model.finite_strain else _FINER_FACTOR
-        candidates = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in (factor, factor**2)]
+        factors = (factor, factor**2) if model.domain == "solid" else (factor, factor**0.5, factor**2)
+        candidates = [replace(_bisected_by(own, f), layers=round(own.layers / f)) for f in factors]
     for options in candidates:
         try:
             beside = built_like(problem, replace(model, mesh=options), report if is_unstructured(model) else QUIET)
         except UnresolvedError:
             continue
-        if edge_ratio(problem, beside) <= 1.0 / LEAST_RATIO:
-            return beside
-    raise Finger3dError("no other mesh differs enough from this one for an estimate; change mesh.size_mm")
+        ratio = edge_ratio(problem, beside)
+        if ratio <= 1.0 / LEAST_RATIO:
+            found += 1
+            yield ratio, beside
+        if found == (2 if problem.dim == 2 else 1):
+            return
+    if not found:
+        raise Finger3dError("no other mesh differs enough from this one for an estimate; change mesh.size_mm")
 
 
 def coarse_companions(
@@ -131,7 +148,7 @@ def coarse_companions(
     The first, with twice the edges, may be known.  Meshes that do not resolve the contact are left out.
     """
     model, ratios, sizes = problem.model, list[float](), {problem.mesh.points.size}
-    if isinstance(model.design, GivenMesh):
+    if isinstance(model.design, GivenMesh) or (problem.dim == 2 and problem.mesh.points.size < _LEAST_IN_SECTION):
         return
     if known:
         ratios.append(known.model.mesh.size_mm / model.mesh.size_mm)
