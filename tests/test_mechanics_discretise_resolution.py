@@ -240,7 +240,7 @@ def test_a_companion_that_does_not_see_the_object_is_none() -> None:
     from finger3d.mechanics.discretise.companions import companion
 
     problem = build(fig9(Plane(), 0.1, 4.0))
-    assert companion(problem).model.mesh.size_mm < 8.0
+    assert companion(problem).model.mesh.size_mm < 4.0
 
 
 def test_increments_without_contact_are_told(tmp_path: Path) -> None:

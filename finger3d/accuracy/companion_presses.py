@@ -8,18 +8,13 @@ from threading import Event
 from types import TracebackType
 from typing import NamedTuple, Self
 
-import numpy as np
-
+from finger3d.accuracy.changes import FAILURES
 from finger3d.contact.acceleration import one_thread
-from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.companions import coarse_companions, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import FEW_CUTS, StepEstimate, last_step, rough_workspace
 from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
-
-FAILURES = (Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError)
-"""Errors that end one part of an estimate, and no other."""
 
 
 class CompanionPress(NamedTuple):

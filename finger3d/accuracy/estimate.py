@@ -18,7 +18,8 @@ import numpy as np
 
 from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float
-from finger3d.accuracy.companion_presses import FAILURES, CompanionPress, companion_presses
+from finger3d.accuracy.changes import FAILURES
+from finger3d.accuracy.companion_presses import CompanionPress, companion_presses
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.richardson import gain, kinds_of, spacing, spread_error
 from finger3d.errors import Finger3dError
