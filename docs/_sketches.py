@@ -137,7 +137,7 @@ def errors(figure: Figure) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def derivatives(figure: Figure) -> None:
+def differences(figure: Figure) -> None:
     """Draw a reading along a press at two friction coefficients, and their difference; lines bend at events."""
     left, right = figure.subplots(1, 2)
     path = np.array([0.0, 0.25, 0.6, 1.0])
@@ -155,7 +155,7 @@ def derivatives(figure: Figure) -> None:
     )
     left.set_title("a reading", fontsize=10)
     right.plot(path, high - low, "o-", color=STICK, ms=4)
-    right.set_title("its derivative by \u03bc: the difference over d\u03bc", fontsize=10)
+    right.set_title("the effect of d\u03bc: the difference", fontsize=10)
     for axes in (left, right):
         axes.set(xlabel="depth", xticks=[], yticks=[], xlim=(0.0, 1.3), ylim=(0.0, 1.0))
         axes.spines[["top", "right"]].set_visible(False)
@@ -165,7 +165,7 @@ def derivatives(figure: Figure) -> None:
 SKETCHES: dict[str, tuple[float, Callable[[Figure], None]]] = {
     "contact": (2.8, contact), "condensation": (2.2, condensation), "gaps": (2.8, gaps), "parts": (2.2, parts),
     "large_deformation": (2.0, large_deformation), "relaxation": (2.0, relaxation), "errors": (2.6, errors),
-    "derivatives": (2.3, derivatives),
+    "differences": (2.3, differences),
 }  # fmt: skip
 """Page -> height of its sketch in inches, and the function that draws it."""
 

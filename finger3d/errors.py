@@ -33,6 +33,9 @@ class UnresolvedError(Finger3dError):
         self.size_mm = size_mm
 
 
+FAILURES = Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryError
+"""Errors of a press beside another one, which goes on without it."""
+
 OUT_OF_MEMORY = (
     "out of memory; finished increments are kept; `finger3d plan` forecasts the memory, a larger mesh.size_mm or fewer "
     "increments and gauges need less"

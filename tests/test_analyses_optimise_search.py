@@ -77,9 +77,3 @@ def test_keys_of_the_body_search_the_gauges_anew_in_every_body(problem, tmp_path
     found = find_best(replace(problem, free=free, budget=2), tmp_path)
     assert 2 <= found.bodies <= 3
     assert len(found.evaluations) > 50
-
-
-def test_annealing_stays_within_bounds_and_budget(problem, tmp_path) -> None:
-    found = find_best(replace(problem, method="dual-annealing"), tmp_path)
-    assert len(found.evaluations) <= problem.budget + 1
-    assert all(ANGLE.low <= e.values[0] <= ANGLE.high for e in found.evaluations)

@@ -90,7 +90,6 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) ->
         (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "gauge.0.x_mm"),
         (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "--gauge g9"),
         (["--free", "gauge.g36.x_mm=1:2", "--objective", "best"], "sensitivity"),
-        (["--free", "gauge.g36.x_mm=1:2", "--method", "luck"], "--method luck: "),
         (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "--budget 0"),
         (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
         (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "--noise 0"),

@@ -10,7 +10,7 @@ from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.finite_strain.formulation import FiniteStrain
+from finger3d.mechanics.finite_strain.formulation import Beginning, FiniteStrain, increments
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import targets
 from finger3d.objects import Move
@@ -26,7 +26,8 @@ def test_solutions_found_together_are_those_found_alone() -> None:
     several = [replace(problem, model=replace(problem.model, friction=Coulomb(mu))) for mu in MUS]
     rest, move = formulation.start(problem), Move(problem.origin, targets(problem.model.legs)[0])
     workspace = formulation.workspace()
-    together = formulation.increments(several, [(rest, None)] * len(MUS), move, workspace, leader=1)
+    beginnings = [Beginning(formulation, one, rest, None, move, workspace) for one in several]
+    together = increments(beginnings, leader=1)
     alone = 0
     for one, found in zip(several, together, strict=True):
         assert found is not None

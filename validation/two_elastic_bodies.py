@@ -191,7 +191,7 @@ def _third_law_rows() -> list[Row]:
     assert frame.outcome.ok
     forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
-    other, _ = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh()
+    other = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh().mesh
     axes = vertical_frame(2)
     ends, moved = [], np.zeros_like(force)
     for mesh, rows, (modulus, nu) in (

@@ -7,18 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
 
-import numpy as np
-
 from finger3d._types import Tree
 from finger3d.accuracy.richardson import Kind, kinds_of, largest, spacing
-from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
 from finger3d.mechanics.results.history import StepResult, measure
-
-FAILURES = Finger3dError, RuntimeError, ValueError, np.linalg.LinAlgError, MemoryError
-"""Errors of presses that an estimate makes, which then tells no changes."""
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""

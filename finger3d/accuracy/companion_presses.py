@@ -8,8 +8,8 @@ from threading import Event
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from finger3d.accuracy.changes import FAILURES
 from finger3d.contact.acceleration import one_thread
+from finger3d.errors import FAILURES
 from finger3d.mechanics.discretise.companions import coarse_companions, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import FEW_CUTS, StepEstimate, last_step, rough_workspace

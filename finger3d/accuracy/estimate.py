@@ -18,11 +18,10 @@ import numpy as np
 
 from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float
-from finger3d.accuracy.changes import FAILURES
 from finger3d.accuracy.companion_presses import CompanionPress, companion_presses
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.richardson import gain, kinds_of, spacing, spread_error
-from finger3d.errors import Finger3dError
+from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.discretise.companions import edge_ratio, is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START

@@ -24,7 +24,6 @@ from finger3d._cost import JUDGEMENT_S, JUDGEMENT_SHARE
 from finger3d._types import Float
 from finger3d.accuracy.advice import largest_principal_strain
 from finger3d.accuracy.changes import (
-    FAILURES,
     Change,
     ChangeEstimate,
     changing_numbers,
@@ -35,7 +34,7 @@ from finger3d.accuracy.changes import (
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects import LARGE_DEFORMATION, fill
-from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.errors import FAILURES, Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.formulations import formulation_of

@@ -133,9 +133,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float,
 
     def press_all(problem: Problem, before: PressRecord | None) -> tuple[PressRecord, list[StepResult]]:
         spent = before.all_factorizations if before else 0
-        # derivatives solve for an elastic object again, a press does not: its factor takes memory
-        light = replace(problem, system=replace(problem.system, object_body=None))
-        record = PressRecord(scene, light, started, refinement, spent)
+        record = PressRecord(scene, problem, started, refinement, spent)
         _march(record, writer, report, begun if problem.model.finite_strain else None)
         return record, record.converged_steps
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import pandas
     import pyvista
 
+    from finger3d.analyses.sensitivity import Effect
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -188,21 +190,20 @@ class PressResult:
             raise Finger3dError("to_dataframe('markers'): the scene has no [[marker]] and no [marker_grid]")
         return pandas.DataFrame(self._tables[table])
 
-    def derivatives(self, number: str, falling: bool = False) -> dict[str, float]:
-        """Return the derivatives of a number at the end of the press by the keys of its scene, per unit of each key.
+    def effects(self, number: str) -> dict[str, Effect]:
+        """Return what a change of each key of the scene does to a number at the end of the press, with its error.
 
-        They hold as keys grow, or as they fall; both differ where the press ends at a kink.
+        See `finger3d.analyses.sensitivity.sensitivity`, which presses the scene again for each key.
 
         Raises
         ------
         Finger3dError
-            If the press has no such number, or its numbers have no derivatives.
+            If the press has no such number.
         """
         from finger3d.analyses.sensitivity import sensitivity  # a press needs none of it
         from finger3d.scene.material import with_moduli_only
 
-        found = sensitivity(with_moduli_only(self._numbers["scene"]), [number])
-        return {**found.derivatives[number], **(found.falling.get(number, {}) if falling else {})}
+        return dict(sensitivity(with_moduli_only(self._numbers["scene"]), [number]).effects[number])
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction, its limit and the zones of stick and slip along x in the last good increment."""

@@ -1,97 +1,105 @@
-"""Derivatives of the numbers of a press by the keys of its scene, and the effect of the uncertainty of each key."""
+"""What a change of every key of a scene does to the numbers of its press: differences of presses, with their errors."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from finger3d._types import Tree, TreeView
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.accuracy.richardson import spread_error
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.companions import coarse_companions, coarser, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import stations
-from finger3d.mechanics.march.sensitivity import derivatives, held_normals, refusal, tangents
+from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import with_increments_of
-from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.results.history import table_row
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
-from finger3d.mechanics.small_strain.variations import Variation, VariedBody
+from finger3d.mechanics.march.variants import press_variants
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings.columns import Column, in_space
+from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
-from finger3d.scene import Source, scene_of, tree
+from finger3d.scene import Scene, Source, scene_of, tree
 from finger3d.scene.material import with_moduli_only
 
-_KEYS = re.compile(
-    r"friction\.mu|finger\.[a-z_]+_mm|material\.(E_MPa|nu)|parts\.[^.]+\.(E_MPa|nu)|press\.(leg\.\d+\.)?(depth_mm|force_([xz]_)?N|slide_[xz]_mm|turn_[xyz]_deg)"
-    r"|object\.(x_mm|z_mm|radius_mm|tilt_deg|tip_radius_mm|wavelength_mm|amplitude_mm)"
-    r"|gauge\.\d+\.(x_mm|y_mm|z_mm|angle_deg|length_mm)|marker\.\d+\.(x_mm|y_mm|z_mm)"
-    r"|effects\.(elastic_object\.(E_MPa|nu|height_mm)|embedded_gauge\.(E_MPa|thickness_mm|width_mm)|kinetic_friction\.ratio)"
-    r"|press\.(leg\.\d+\.)?duration_s|effects\.viscosity\.prony\.\d+\.[01]"
-)
-"""Keys that numbers have derivatives by; others change the mesh or the object."""
-
-_BREAKS = {
-    "slide_x_mm": "x", "slide_z_mm": "z", "force_x_N": "x", "force_z_N": "z",
-    "object.x_mm": "x", "object.z_mm": "z", "tilt_deg": "x",
-    "turn_x_deg": "z", "turn_y_deg": "xz", "turn_z_deg": "x",
-}  # fmt: skip
-"""Axes of the mirror symmetries that a key breaks, by its end."""
-
-_IN_SOLIDS = ("z_mm", "force_z_N", "turn_x_deg", "turn_y_deg")
-"""Ends of keys that sections do not have."""
-
-_STEP, _NU_STEP, _LEAST = 1e-6, 1e-5, 0.1
-"""Step of central differences over the value, or over `_LEAST` if that is larger; that of nu is larger, since the bulk
-modulus is bounded at nu = 0.5."""
-
-_SAME = 1e-6
-"""Relative difference of the derivatives as a key falls and grows that is none."""
+_SKIPPED = ("title", "mesh", "contact", "marker_grid", "effects.auto")
+"""Tables and keys that say how a press is computed, not what is pressed."""
 
 _PERCENT = 0.01
-"""Relative change of a key without a tolerance that the figure shows the effect of."""
+"""Relative change of a key without a tolerance; of the finger's height or of a radian for places and angles at zero."""
+
+_STIFFNESS, _SCALED = "material.E_MPa", ("_N", "_MPa", "_mJ", "_Nmm")
+"""Key that forces may be proportional to, and endings of the names of numbers that then are."""
+
+_READINGS = "gauges", "markers", "taxels"
+
+_WAYS = "falling", "growing"
+
+_UNSYMMETRIC = math.sqrt(2.0)
+"""Edge lengths of the press that keys are changed in which break its symmetry, over those of the press."""
+
+
+class Effect(NamedTuple):
+    """Changes of a number as a key falls and as it grows, with their errors; NaN if that press failed."""
+
+    falling: float
+    falling_error: float
+    growing: float
+    growing_error: float
+
+    def value(self, change: float) -> float:
+        """Return the change of the number per unit of the key, which changed by `change`."""
+        if math.isnan(self.falling) or math.isnan(self.growing):
+            return (self.growing if math.isnan(self.falling) else -self.falling) / change
+        return (self.growing - self.falling) / (2.0 * change)
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives of numbers at the end of a press.
+    """Effects of the keys of a scene on the numbers at the end of its press.
 
     Attributes
     ----------
     title : of the scene
     numbers : values of the numbers by name
     keys : values of the keys
-    tolerances : standard deviations of those keys that have one (`finger3d.analyses.calibrate.tolerance_table`)
-    derivatives : of each number by each key, per unit of the key, as the key grows
-    falling : the same as the key falls, for those that differ, since the press ends at a kink
-    without : keys of the scene that have no derivative, since they change the mesh or the object
-    held_normals : points in contact whose normals are held fixed at an edge of the object; derivatives are approximate
+    changes : of each key, by which it falls and grows
+    effects : of each key, on each number
+    failures : why a key has no effect as it falls or grows, in words
     """
 
     title: str
     numbers: Mapping[str, float]
     keys: Mapping[str, float]
-    tolerances: Mapping[str, float]
-    derivatives: Mapping[str, Mapping[str, float]]
-    falling: Mapping[str, Mapping[str, float]]
-    without: tuple[str, ...]
-    held_normals: int = 0
-
-    def change(self, key: str) -> float:
-        """Return the change of a key that effects are shown for: its tolerance, or 1 % of its value."""
-        return self.tolerances.get(key, _PERCENT * abs(self.keys[key]))
+    changes: Mapping[str, float]
+    effects: Mapping[str, Mapping[str, Effect]]
+    failures: Mapping[str, str]
 
     def as_dict(self) -> Tree:
         """Return what sensitivity.json holds."""
-        names = {"falling": "derivatives_falling", "without": "without_derivative"}
-        return {names.get(name, name): value for name, value in asdict(self).items()}
+        effects = {
+            name: {key: {"value": e.value(self.changes[key]), **e._asdict()} for key, e in by_key.items()}
+            for name, by_key in self.effects.items()
+        }
+        return {
+            "title": self.title,
+            "numbers": dict(self.numbers),
+            "keys": dict(self.keys),
+            "changes": dict(self.changes),
+            "effects": effects,
+            "failures": dict(self.failures),
+        }
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""
@@ -100,16 +108,25 @@ class Sensitivity:
                 "number": name,
                 "key": key,
                 "value": self.keys[key],
-                "derivative": slope,
-                "derivative_falling": self.falling.get(name, {}).get(key, slope),
-                "change": self.change(key),
-                "effect": slope * self.change(key),
+                "change": self.changes[key],
+                **effect._asdict(),
             }
-            for name, by_key in self.derivatives.items()
-            for key, slope in sorted(
-                by_key.items(), key=lambda item: -abs(np.nan_to_num(item[1]) * self.change(item[0]))
-            )
+            for name, by_key in self.effects.items()
+            for key, effect in sorted(by_key.items(), key=lambda item: -largest(item[1]))
         ]
+
+
+def largest(effect: Effect) -> float:
+    """Return the larger magnitude of an effect, 0 if it is not known."""
+    return max((abs(x) for x in (effect.falling, effect.growing) if not math.isnan(x)), default=0.0)
+
+
+class _Change(NamedTuple):
+    """A key with its value, and the models with it less and plus its change; the reason where there is none."""
+
+    value: float
+    change: float
+    ends: tuple[Model | str, Model | str]
 
 
 def sensitivity(
@@ -118,8 +135,13 @@ def sensitivity(
     out: str | Path | None = None,
     report: Progress = QUIET,
     overrides: Sequence[str] = (),
+    tolerances: Mapping[str, float] | None = None,
 ) -> Sensitivity:
-    """Differentiate numbers at the end of a press by the keys of its scene.
+    """Change every key of a scene by its tolerance, to both sides, and press it again.
+
+    All presses have the increments and the mesh of the scene's own press; the mesh moves with the dimensions.  A key
+    that breaks the symmetry of the press is changed in a press without it, on a coarser mesh.  The errors follow from
+    the same differences on companion meshes.  Keys at zero are left out unless they have a tolerance.
 
     Parameters
     ----------
@@ -128,6 +150,8 @@ def sensitivity(
     out : folder for sensitivity.json, sensitivity.csv and sensitivity.png
     report : receives the progress
     overrides : other keys to set, such as ``"friction.mu=0.5"``
+    tolerances : changes by key, such as ``{"friction.mu": 0.02}``; else that of a careful set-up where one is known
+        (`finger3d.analyses.calibrate.tolerance_table`), and 1 % of the value
 
     Returns
     -------
@@ -136,83 +160,172 @@ def sensitivity(
     Raises
     ------
     Finger3dError
-        If the press has no number of such a name, or its numbers have no derivatives.
+        If the press has no number of such a name, the scene no such key, or if its press fails.
     """
     scene, _ = settled(scene_of(scene, overrides), report)
     model, names = scene.model(), scene.check_numbers(of)
-    if text := refusal(model):
-        raise Finger3dError(f"sensitivity: {text}")
     report.stage("meshing and pressing")
     body = PressedBody.with_refined_borders(model, report)
-    pressed = body.steps()
-    pressed[-1].check("sensitivity")
-    report.stage("differentiating")
-    problem = under(body.problem, legs=with_increments_of(body.problem.model.legs, len(pressed)))
-    given, varying, variations = with_moduli_only(scene.as_dict()), VariedBody(problem), dict[str, Variation]()
-    all_keys = dict(_numbers_of(given))
-    for key in all_keys:
-        with suppress(Finger3dError):  # such as dimensions that change the cells of the mesh; named with the result
-            variations[key] = varied(given, scene.path, varying, key)
-    titles, ways = {key: _named(key, given) for key in all_keys}, list(variations.values())
-    *_, (step, *both) = tangents(problem, ways, pressed)
-    falling = growing = derivatives(step, ways, both[0])
-    if both[1] is not both[0]:
-        falling, growing = (derivatives(step, ways, sides, way) for sides, way in zip(both, (-1, 1), strict=True))
-    of = tuple(of) or names
-    slopes, others = (
-        {n: {titles[key]: row.get(n, np.nan) for key, row in zip(variations, rows, strict=True)} for n in of}
-        for rows in (growing, falling)
-    )
-    kinks = {n: {key: s for key, s in row.items() if not _is_close(s, slopes[n][key])} for n, row in others.items()}
-    values, skipped = table_row(problem.points, step), ("mesh.", "contact.", "effects.")
-    found = Sensitivity(
+    steps = body.steps()
+    steps[-1].check("sensitivity")
+    legs = with_increments_of(body.problem.model.legs, len(steps))
+    problem = replace(body.problem, model=replace(body.problem.model, legs=legs))
+    changes = _changes(scene, problem.model, tolerances or {})
+    found, failures = _effects(problem, changes, report)
+    numbers = press_numbers(problem, steps[-1])
+    of, keys = tuple(of) or names, [key for key in changes if key in found]
+    result = Sensitivity(
         title=scene.title,
-        numbers={name: values[name] for name in of},
-        keys={titles[key]: all_keys[key] for key in variations},
-        tolerances={titles[key]: sd for key in variations if (sd := _tolerance(key, all_keys[key])) is not None},
-        derivatives=slopes,
-        falling={name: row for name, row in kinks.items() if row},
-        without=tuple(t for key, t in titles.items() if key not in variations and not t.startswith(skipped)),
-        held_normals=held_normals(problem, step),
+        numbers={name: numbers[name] for name in of},
+        keys={key: changes[key].value for key in keys},
+        changes={key: changes[key].change for key in keys},
+        effects={name: {key: found[key][name] for key in keys} for name in of},
+        failures=failures,
     )
     if out is not None:
-        _write(Path(out), found)
-    return found
+        _write(Path(out), result)
+    return result
 
 
-def varied(
-    given: TreeView,
-    path: Path | None,
-    body: VariedBody,
-    key: str,
-    legs: Callable[[Model], tuple[Leg, ...]] = lambda model: model.legs,
-) -> Variation:
-    """Return the variation of a condensed body with a key of its scene; one-sided where a bound is nearer than a step.
+def _changes(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[str, _Change]:
+    """Return the changes of all keys of a scene, by their names, in the mesh and the increments of a model."""
+    given = with_moduli_only(scene.as_dict())
+    wanted = {tree.numbered(key, given, "--tolerance"): change for key, change in tolerances.items()}
+    values = {key: value for key, value in _numbers_of(given) if not key.startswith(_SKIPPED)}
+    if unknown := next((key for key in wanted if key not in values), None):
+        raise Finger3dError(f"--tolerance {unknown}: the scene has no such number; it has {', '.join(values)}")
 
-    Parameters
-    ----------
-    given : tables of the scene, with moduli only (`finger3d.scene.material.with_moduli_only`)
-    path : of its file, if any
-    legs : path of a model of the scene; automatic increments are those of the body
-
-    Raises
-    ------
-    Finger3dError
-        If numbers have no derivative by the key.
-    """
-    own, value = body.problem.model, float(str(tree.value_at(given, key) or 0.0))
-    if not _has_derivative(key, value, body.problem):
-        raise Finger3dError(f"{key}: {refusal(own) or 'numbers have no derivative by it'}")
-    step = (_NU_STEP if key.endswith(".nu") else _STEP) * max(abs(value), _LEAST)
-    count, problems = len(stations(own.legs)), list[str]()
-    for low in (value - step, value, value - 2.0 * step):
+    def at(key: str, value: float) -> Model | str:
         try:
-            models = [scene_with(given, [key], [at], path).model() for at in (low, low + 2.0 * step)]
-            first, last = (replace(m, legs=with_increments_of(legs(m), count), mesh=own.mesh) for m in models)
-            return body.variation(first, last, step)
+            model = scene_with(given, [key], [value], scene.path).model()
         except Finger3dError as error:
-            problems.append(str(error))
-    raise Finger3dError(f"{key} = {value:g}: numbers have no derivative here: {problems[0]}")
+            return str(error)
+        count = sum(int(leg.steps) for leg in own.legs)
+        return replace(model, mesh=own.mesh, legs=with_increments_of(model.legs, count), warnings=own.warnings)
+
+    def change(key: str, value: float) -> _Change:
+        step = wanted.get(key) or _tolerance(key, value) or _PERCENT * (abs(value) or _natural(key, own))
+        return _Change(value, step, (at(key, value - step), at(key, value + step)))
+
+    told = {key: value for key, value in values.items() if value or key in wanted}
+    return {_named(key, given): change(key, value) for key, value in told.items()}
+
+
+def _effects(
+    problem: Problem, changes: Mapping[str, _Change], report: Progress
+) -> tuple[dict[str, dict[str, Effect]], dict[str, str]]:
+    """Return the effects on all numbers by key, and why there are none."""
+    by_axes = dict[tuple[str, ...], dict[str, _Change]]()
+    for key, one in changes.items():
+        kept = [set(symmetry(end)) for end in one.ends if isinstance(end, Model)]
+        axes = tuple(axis for axis in problem.axes if all(axis in some for some in kept))
+        by_axes.setdefault(axes, {})[key] = one
+    found, failures = dict[str, dict[str, Effect]](), dict[str, str]()
+    for axes, some in by_axes.items():
+        base = problem
+        if axes != problem.axes:
+            report.stage(f"pressing without symmetry: {', '.join(some)}")
+            mesh = coarser(problem.model, _UNSYMMETRIC).mesh
+            base = build(replace(problem.model, symmetry=axes, mesh=mesh))
+        report.stage(f"changing {', '.join(some)}")
+        own = _differences(base, some)
+        beside = list(coarse_companions(base)) or list(finer_companions(base))
+        others = []
+        for ratio, companion in beside:
+            report.stage(f"errors: the same changes on edges of {companion.model.mesh.size_mm:.3g} mm")
+            others.append((ratio, _differences(companion, some)))
+        for key, sides in own.changed.items():
+            told = [f"{way}: {side}" for way, side in zip(_WAYS, sides, strict=True) if isinstance(side, str)]
+            failures |= {key: "; ".join(told)} if told else {}
+            if len(told) < len(sides):
+                errors = [
+                    _errors(own, [(ratio, other.changed[key][k]) for ratio, other in others], key, k) for k in (0, 1)
+                ]
+                found[key] = {name: _effect(sides, errors, name) for name in own.numbers}
+    return found, failures
+
+
+Side = dict[str, float] | str
+"""Changes of numbers by name, or the reason why they are not known."""
+
+
+class _Differences(NamedTuple):
+    """Numbers of a press, its readings, and the changes of the numbers as each key falls and grows."""
+
+    numbers: dict[str, float]
+    readings: list[Column]
+    changed: dict[str, tuple[Side, Side]]
+
+
+def _errors(own: _Differences, beside: Sequence[tuple[float, Side]], key: str, k: int) -> dict[str, float]:
+    """Return the errors of the changes by a key that falls (0) or grows (1), from those on other meshes."""
+    side = own.changed[key][k]
+    known = [(ratio, other) for ratio, other in beside if isinstance(other, dict)]
+    return spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
+
+
+def _effect(sides: tuple[Side, Side], errors: Sequence[Mapping[str, float]], name: str) -> Effect:
+    told = [side.get(name, math.nan) if isinstance(side, dict) else math.nan for side in sides]
+    return Effect(told[0], errors[0].get(name, math.nan), told[1], errors[1].get(name, math.nan))
+
+
+def _differences(problem: Problem, changes: Mapping[str, _Change]) -> _Differences:
+    """Press a problem and its variants; those that change readings only are read in the problem's own press."""
+    own, mesh = problem.model, problem.model.mesh
+    ends = {
+        (key, side): replace(end, mesh=mesh, symmetry=own.symmetry)
+        for key, one in changes.items()
+        for side, end in enumerate(one.ends)
+        if isinstance(end, Model)
+    }
+    scaled = {at for at in ends if at[0] == _STIFFNESS and own.forces_scale_with_modulus}
+    read = {at for at, end in ends.items() if _changes_readings_only(own, end)}
+    pressed = [at for at in ends if at not in read | scaled]
+    base, *variants = press_variants(problem, [own, *(ends[at] for at in pressed)], _kept)
+    if base.found is None:
+        raise Finger3dError(f"sensitivity: {base.failure}")
+    numbers, last = base.found
+    sides: dict[tuple[str, int], Side] = {}
+    for at, variant in zip(pressed, variants, strict=True):
+        sides[at] = _less(variant.found[0], numbers) if variant.found else variant.failure
+    for at in read:
+        sides[at] = _less(_read_anew(problem, last, ends[at]), numbers)
+    for key, side in scaled:
+        ratio = (2 * side - 1) * changes[key].change / changes[key].value
+        sides[key, side] = {n: ratio * x if n.endswith(_SCALED) else 0.0 for n, x in numbers.items()}
+
+    def side_of(key: str, k: int) -> Side:
+        end = changes[key].ends[k]
+        return end if isinstance(end, str) else sides[key, k]
+
+    changed = {key: (side_of(key, 0), side_of(key, 1)) for key in changes}
+    return _Differences(numbers, list(in_space(last.readings)), changed)
+
+
+def _kept(problem: Problem, steps: Sequence[StepResult]) -> tuple[dict[str, float], StepResult]:
+    return press_numbers(problem, steps[-1]), steps[-1]
+
+
+def _less(numbers: Mapping[str, float], own: Mapping[str, float]) -> dict[str, float]:
+    return {name: numbers[name] - value for name, value in own.items() if name in numbers}
+
+
+def _changes_readings_only(own: Model, other: Model) -> bool:
+    kept = {name: getattr(own, name) for name in _READINGS}
+    return own.inclusions is None and own.relaxation is None and replace(other, **kept) == own
+
+
+def _read_anew(problem: Problem, step: StepResult, model: Model) -> dict[str, float]:
+    """Return the numbers of an increment with the readings of another model."""
+    other, state, formulation = replace(problem, model=model), step.meshed_state, formulation_of(model)
+    if model.finite_strain:
+        readings = formulation.readings(other, state)
+    else:
+        (unknowns,) = formulation.unknowns(problem, [state])
+        rows = [reading.rows(other.meshed_body) for reading in model.readings]
+        values = np.concatenate([row @ unknowns[: row.shape[1]] for row in rows])
+        readings = dict(zip(model.columns, map(float, values), strict=True))
+    return press_numbers(other, replace(step, readings=readings))
 
 
 def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
@@ -223,25 +336,6 @@ def _numbers_of(node: object, place: str = "") -> Iterator[tuple[str, float]]:
         node = dict(enumerate(node))
     for key, child in node.items() if isinstance(node, Mapping) else ():
         yield from _numbers_of(child, f"{place}.{key}" if place else str(key))
-
-
-def _has_derivative(key: str, value: float, problem: Problem) -> bool:
-    """Whether numbers have a derivative by a key; what is zero in a mirrored press would break its symmetry."""
-    model = problem.model
-    flat, exact = model.object.is_flat and not key.endswith("tilt_deg"), has_exact_path(model)
-    excluded = (
-        problem.dim == 2 and key.endswith(_IN_SOLIDS),
-        key.endswith("turn_z_deg") and exact,  # beside the path there are increments
-        key.endswith("duration_s") and model.relaxation is None,
-        key.startswith("object.") and (exact or flat),
-        key.endswith("length_mm") and value == 0.0,
-        any(key.endswith(name) and set(axes) & set(problem.axes) for name, axes in _BREAKS.items()),
-    )
-    return not refusal(model) and bool(_KEYS.fullmatch(key)) and not any(excluded)
-
-
-def _is_close(one: float, other: float) -> bool:
-    return abs(one - other) <= _SAME * max(abs(one), abs(other))
 
 
 def _named(key: str, given: TreeView) -> str:
@@ -259,6 +353,13 @@ def _tolerance(key: str, value: float) -> float | None:
         return TOLERANCES["E_percent"][0] / 100.0 * value
     name = GAUGE_PLACES.get(last, last) if table == "gauge" else last
     return TOLERANCES[name][0] if name in TOLERANCES and table != "marker" else None
+
+
+def _natural(key: str, model: Model) -> float:
+    """Return what a key at zero is changed relative to, in its unit."""
+    if key.endswith("_mm"):
+        return model.design.height_mm
+    return math.degrees(1.0) if key.endswith("_deg") else 1.0
 
 
 def _write(out: Path, found: Sensitivity) -> None:

@@ -18,7 +18,7 @@ from finger3d._machine import made_with
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
-from finger3d.errors import Finger3dError, Outcome
+from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
@@ -39,9 +39,6 @@ _FREE = ("title", "friction", "press", "contact", "gauge")
 """Tables of the scene that do not change the compliance."""
 
 _SIZES = ("size_mm", "base_size_mm")
-
-TROUBLE = (Finger3dError, ArithmeticError, ValueError, RuntimeError, MemoryError)
-"""Errors that end one press, or one body, and leave the others of a sweep running."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +138,7 @@ class SharedBody(PressedBody):
         Raises
         ------
         Exception
-            The reason why the press failed, one of `TROUBLE`.
+            The reason why the press failed, one of `FAILURES`.
         """
         found = next(self.presses([variant]))
         if isinstance(found, Exception):
@@ -192,7 +189,7 @@ class SharedBody(PressedBody):
                     if not covered:
                         try:
                             self.widen()
-                        except TROUBLE as error:
+                        except FAILURES as error:
                             checked = replace(run, frames=error.with_traceback(None))
                         else:
                             break  # and press the variants that are left on the new body
@@ -205,7 +202,7 @@ class SharedBody(PressedBody):
         try:
             problem = under(self.problem, variant.friction, variant.legs, variant.rule)
             frames = march_automatic(problem, workspace, cancel)[0]
-        except TROUBLE as error:
+        except FAILURES as error:
             frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
         return _Run(self.problem, frames, time.perf_counter() - start)
 
@@ -228,7 +225,7 @@ class _Run:
         start = time.perf_counter()
         try:
             (check,) = check_surface(self.problem, self.frames[-1:])
-        except TROUBLE as error:
+        except FAILURES as error:
             return replace(self, frames=error.with_traceback(None)), True
         last = replace(self.frames[-1], penetration_mm=check.penetration_mm)
         seconds = self.seconds + time.perf_counter() - start

@@ -49,9 +49,6 @@ def optimise(
     budget: Annotated[
         int, Parameter(help="Number of designs; of bodies, if keys of gauges are optimised for each body.")
     ] = 60,
-    method: Annotated[
-        str, Parameter(help="differential-evolution, dual-annealing, or gradient: along derivatives from the start.")
-    ] = "differential-evolution",
     seed: Annotated[int, Parameter(help="Seed of the random number generator.")] = 0,
     set_: Set = None,
     json_: Json = False,
@@ -76,7 +73,7 @@ def optimise(
     kept = f"every evaluated design is kept in {out}; the same command continues"
     mus = _mus(mu) if mu else None
     with job(json_, lambda _: kept) as report:
-        result = run(scene, free or (), out, objective, gauge, mus, noise, budget, method, seed, set_ or (), report)
+        result = run(scene, free or (), out, objective, gauge, mus, noise, budget, seed, set_ or (), report)
     _print_design(result, out, json_)
 
 

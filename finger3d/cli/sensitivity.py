@@ -1,4 +1,4 @@
-"""Command ``sensitivity``: derivatives of the numbers of a press by the keys of its scene."""
+"""Command ``sensitivity``: what a change of each key of the scene does to the numbers of its press."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from finger3d.accuracy.error_bars import with_error
 from finger3d.cli.common import Json, Set, app, check_writable, job, print_columns, print_json
+from finger3d.cli.tolerances import parsed_tolerances
 
 
 @app.command
@@ -17,10 +19,18 @@ def sensitivity(
     *,
     of: Annotated[str, Parameter(help="Numbers of the press, separated by commas, such as gauge_g36,stick_area_mm2.")],
     out: Annotated[Path, Parameter(help="Folder for sensitivity.json, sensitivity.csv and sensitivity.png.")],
+    tolerance: Annotated[
+        list[str] | None,
+        Parameter(
+            negative=(),
+            help="Change of a key, for instance friction.mu=0.02; may be repeated. Unless given, that of a careful "
+            "set-up where one is known, else 1 % of the value.",
+        ),
+    ] = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
-    """Differentiate readings and other numbers at the end of a press by the keys of the scene.
+    """Change every key of the scene by its tolerance, to both sides, and tell what this does to readings and forces.
 
     Example: finger3d sensitivity scene.toml --of gauge_g36,stick_area_mm2 --out out
 
@@ -32,26 +42,27 @@ def sensitivity(
     from finger3d.analyses.sensitivity import sensitivity as run
 
     check_writable(out, scene)
-    with job(json_, lambda _: "derivatives are written together at the end") as report:
-        found = run(scene, [name.strip() for name in of.split(",")], out, report, set_ or ())
+    with job(json_, lambda _: "effects are written together at the end") as report:
+        names = [name.strip() for name in of.split(",")]
+        found = run(scene, names, out, report, set_ or (), parsed_tolerances(tolerance))
     if json_:
         print_json(found.as_dict())
         return
-    rows = found.rows()
-    head = [name for name in rows[0] if found.falling or name != "derivative_falling"]
-    print_columns(head, [[_text(row[name]) for name in head] for row in rows])
-    print("change: standard deviation of the key in a careful set-up where one is known, else 1 % of its value")
-    if found.falling:
-        print("the press ends at a kink, so that some derivatives differ as the key grows and as it falls")
-    if found.without:
-        print(f"keys without a derivative, since they change mesh, object or symmetry: {', '.join(found.without)}")
-    if found.held_normals:
-        print(
-            f"approximate: normals of {found.held_normals} contact points are held fixed at an edge of the object; "
-            "a smaller mesh.size_mm resolves it"
-        )
+    head = ["number", "key", "value", "change", "as it falls", "as it grows"]
+    print_columns(
+        head,
+        [
+            [
+                *(row["number"], row["key"], f"{row['value']:.5g}", f"{row['change']:.3g}"),
+                *(_effect(row[way], row[f"{way}_error"]) for way in ("falling", "growing")),
+            ]
+            for row in found.rows()
+        ],
+    )
+    for key, reason in found.failures.items():
+        print(f"{key}: {reason}")
     print(f"results: {out}")
 
 
-def _text(value: object) -> str:
-    return f"{value:.5g}" if isinstance(value, float) else str(value)
+def _effect(value: float, error: float) -> str:
+    return "" if value != value else with_error(value, error)

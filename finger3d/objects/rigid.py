@@ -60,8 +60,9 @@ class HeldBody:
         freeze_arrays(self)
 
     def to_design(self, points: Float) -> Float:
-        """Return points (n, 3) of the scene in the coordinates of the design."""
-        return (points - self.place) @ self.turn + self.origin
+        """Return points (n, d) of the scene in the coordinates of the design; those of a section lie in its plane."""
+        d = points.shape[1]
+        return np.asarray((points - self.place[:d]) @ self.turn[:d, :d] + self.origin[:d])
 
     def to_scene(self, points: Float) -> Float:
         """Return points (n, d) of the design in the scene; those of a section lie in its plane."""

@@ -70,15 +70,11 @@ class Scale:
 Residuals = Callable[[Float], Float]
 """Residuals (n,) over their standard deviations for values (k,); raises Finger3dError if a press fails."""
 
-Slopes = Callable[[Float], "Float | None"]
-"""Derivatives (n, k) of the residuals by the values; None where they are not known."""
-
 
 def fit(
     scales: Sequence[Scale],
     start: Float,
     residuals: Residuals,
-    slopes: Slopes,
     announce: Callable[[Float], None],
 ) -> Float:
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
@@ -91,7 +87,7 @@ def fit(
     now = residuals(values_at(scales, shares))
     for _ in range(_MOST):
         announce(values_at(scales, shares))
-        derivative, cost, gain = jacobian(scales, shares, residuals, slopes), float(now @ now), -1.0
+        derivative, cost, gain = jacobian(scales, shares, residuals), float(now @ now), -1.0
         while gain < LEAST_GAIN:
             step, left = _step(derivative, now, shares, box)
             if box < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
@@ -123,39 +119,26 @@ def values_at(scales: Sequence[Scale], shares: Float) -> Float:
     return np.array([scale.value(float(share)) for scale, share in zip(scales, shares, strict=True)])
 
 
-def _slopes(scales: Sequence[Scale], shares: Float) -> Float:
-    """Return the derivatives (k,) of values by shares."""
-    return np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
+def foretold(scales: Sequence[Scale], shares: Float, residuals: Residuals) -> float:
+    """Return the sum of squares after a step from `shares`, by the derivatives there."""
+    now = residuals(values_at(scales, shares))
+    return _step(jacobian(scales, shares, residuals), now, shares)[1]
 
 
-def foretold(scales: Sequence[Scale], shares: Float, residuals: Residuals, slopes: Slopes) -> float:
-    """Return the sum of squares after a step from `shares`, by the derivatives there; that before where not known."""
-    values = values_at(scales, shares)
-    now, known = residuals(values), slopes(values)
-    if known is None:
-        return float(now @ now)
-    return _step(known * _slopes(scales, shares), now, shares)[1]
-
-
-def jacobian(
-    scales: Sequence[Scale], shares: Float, residuals: Residuals, slopes: Slopes, without: int | None = None
-) -> Float:
-    """Return the derivatives (n, k) of residuals by shares; central differences where those by values are not known.
+def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, without: int | None = None) -> Float:
+    """Return the derivatives (n, k) of residuals by shares, as differences to the side with more room.
 
     Parameters
     ----------
     without : number of a share whose derivatives are left out: (n, k - 1)
     """
-    wanted = [i for i in range(len(scales)) if i != without]
-    known = slopes(values_at(scales, shares))
-    if known is not None:
-        return (known * _slopes(scales, shares))[:, wanted]
-    columns = []
-    for i in wanted:
-        ends = [float(np.clip(shares[i] + step, 0.0, 1.0)) for step in (-_STEP, _STEP)]
-        low, high = (residuals(values_at(scales, np.where(np.arange(len(scales)) == i, end, shares))) for end in ends)
-        columns.append((high - low) / (ends[1] - ends[0]))
-    return np.array(columns).reshape(len(wanted), -1).T
+    now, columns = residuals(values_at(scales, shares)), []
+    for i in range(len(scales)):
+        if i != without:
+            step = _STEP if shares[i] <= 0.5 else -_STEP
+            other = residuals(values_at(scales, shares + step * (np.arange(len(scales)) == i)))
+            columns.append((other - now) / step)
+    return np.array(columns).reshape(-1, len(now)).T
 
 
 def misfit_text(reduced: float) -> str:

@@ -224,16 +224,9 @@ class _Misfit:
     def residuals(self, values: Float) -> Float:
         return self.of_curve(self.simulation.at(values, self.data))
 
-    def slopes(self, values: Float) -> Float | None:
-        found = self.simulation.slopes(values, self.data)
-        if found is None:
-            return None
-        plain = [found[n] / self.stds[n][:, None] for n in self.data.columns]
-        return np.asarray(solve_triangular(self.root, np.concatenate(plain), lower=True))
-
     def jacobian(self, shares: Float, without: int | None = None) -> Float:
         """Return the derivatives by shares, without those by one of them."""
-        return jacobian(self.scales, shares, self.residuals, self.slopes, without)
+        return jacobian(self.scales, shares, self.residuals, without)
 
     def fit(self, shares: Float) -> Float:
         """Return the shares with the least sum of squares, from those given."""
@@ -242,7 +235,7 @@ class _Misfit:
             named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.simulation.free, values, strict=True))
             self.report.stage(f"fitting, {self.simulation.solved} presses: {named}")
 
-        return fit(self.scales, shares, self.residuals, self.slopes, announce)
+        return fit(self.scales, shares, self.residuals, announce)
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
@@ -305,7 +298,7 @@ def _first(misfit: _Misfit, start: Float) -> Float:
     best = [trials[number] for trials, number in zip(tried, least, strict=True)]
     if len(best) == 1:
         return best[0]
-    return min(best, key=lambda shares: foretold(scales, shares, misfit.residuals, misfit.slopes))
+    return min(best, key=lambda shares: foretold(scales, shares, misfit.residuals))
 
 
 def _friction(free: Sequence[FreeKey]) -> int | None:

@@ -19,23 +19,19 @@ from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
-from finger3d.analyses.sensitivity import varied
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
-from finger3d.mechanics.discretise.build import with_material
+from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import ending_at, stations, targets
-from finger3d.mechanics.march.sensitivity import derivatives, tangents
 from finger3d.mechanics.march.step_halving import automatic, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.small_strain.variations import VariedBody
 from finger3d.results.journal import Journal
 from finger3d.results.summary import PressStep
 from finger3d.scene import Scene
-from finger3d.scene.material import with_moduli_only
 
 OFFSET = "depth_offset_mm"
 """Key that is added to the measured depth; it needs no solution of its own."""
@@ -63,9 +59,6 @@ _ZONES = ("contact_", "stick_")
 """First words of the names of lengths and areas of zones."""
 
 _MAX_STORED = 4  # bodies, and presses
-
-_STEP, _LEAST = 1e-5, 0.1
-"""Step of central differences of interpolated curves, over the value or over `_LEAST` if that is larger."""
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -102,7 +95,6 @@ class Simulation:
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
     _bodies: dict[str, PressedBody] = field(default_factory=dict)
     _presses: dict[tuple[float, ...], tuple[Problem, list[StepResult]]] = field(default_factory=dict)
-    _slopes: dict[tuple[float, ...], list[Curve] | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take over the solutions of an earlier run."""
@@ -177,34 +169,6 @@ class Simulation:
         _check_range(measured, offset, curve[measured.index])
         return dict(_scaled(_at_rows(curve, measured, offset), factor))
 
-    def slopes(self, values: Float, measured: MeasuredPress) -> dict[str, Float] | None:
-        """Return the derivatives (n, k) of the simulated values by the free keys.
-
-        They are None where numbers have no derivative by a key of the scene.
-        """
-        curve, (point, factor) = self.curve(values), self._point(values)
-        costly = [f for f in self.free if f.key != OFFSET and not (f.key in MODULI and self.scales_with_modulus)]
-        if point not in self._slopes:
-            self._slopes[point] = self._derivatives(point, [f.numbered(self.given) for f in costly])
-        if (known := self._slopes[point]) is None:
-            return None
-        by_key = dict(zip((f.key for f in costly), known, strict=True))
-        out = {name: np.zeros((len(measured.at), len(self.free))) for name in measured.columns}
-        for k, free in enumerate(self.free):
-            h = _STEP * max(abs(float(values[k])), _LEAST)
-            ends = []
-            for t in (-h, h):
-                moved = values + t * (np.arange(len(values)) == k)
-                if free.key in by_key:
-                    slope = _scaled(by_key[free.key], factor)
-                    changed: Curve = {n: v + t * slope[n] if n in slope else v for n, v in curve.items()}
-                else:
-                    changed = self.curve(moved)
-                ends.append(_at_rows(changed, measured, self._offset(moved, measured)))
-            for name, column in out.items():
-                column[:, k] = (ends[1][name] - ends[0][name]) / (2.0 * h)
-        return out
-
     def _offset(self, values: Sequence[float] | Float, measured: MeasuredPress) -> float:
         """Return what is added to the measured depths, mm."""
         offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
@@ -248,27 +212,8 @@ class Simulation:
         for problem in (body.problem for body in self._bodies.values()):
             own = replace(problem.model, material=model.material, parts=model.parts, friction=model.friction)
             if own == model:
-                return with_material(problem, model)
+                return changed(problem, model)
         return None
-
-    def _derivatives(self, point: tuple[float, ...], keys: Sequence[str]) -> list[Curve] | None:
-        """Return the derivatives of a solved curve by keys of the scene; None where one has none."""
-        if not keys:
-            return []
-        scene, (problem, steps) = self.scene(point), self._pressed(point)
-        problem = under(problem, legs=with_increments_of(problem.model.legs, len(steps)))
-        given, body = with_moduli_only(scene.as_dict()), VariedBody(problem)
-        try:
-            variations = [varied(given, scene.path, body, key, self._legs) for key in keys]
-            rows = [
-                derivatives(step, variations, sides, with_zones=self.with_zones)
-                for step, _, sides in tangents(problem, variations, steps)
-            ]
-        except Finger3dError:  # such as of forces that jump, which have differences of presses
-            return None
-        if not all(all(row) for row in rows):  # of a side of a kink that is not known
-            return None
-        return [{n: np.array([0.0, *(row[k][n] for row in rows)]) for n in rows[0][k]} for k in range(len(keys))]
 
     def _solve(self, point: tuple[float, ...]) -> Tree:
         try:

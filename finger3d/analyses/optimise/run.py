@@ -10,7 +10,6 @@ from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, free_keys
 from finger3d.analyses.optimise.search import Search
 from finger3d.analyses.optimise.task import (
-    METHODS,
     MUS,
     Evaluation,
     OptimisationProblem,
@@ -52,7 +51,6 @@ def optimise(
     mus: Sequence[float] | None = None,
     noise: float = 1.5e-4,
     budget: int = 60,
-    method: str = METHODS[0],
     seed: int = 0,
     overrides: Sequence[str] = (),
     report: Progress | None = None,
@@ -70,7 +68,6 @@ def optimise(
     mus : friction coefficients, ascending; None: nine from 0.05 to 1
     noise : standard deviation of a strain reading
     budget : number of designs, or of bodies if gauges are searched in each
-    method : "differential-evolution", "dual-annealing", or "gradient", which follows derivatives from the start
     seed : of the random numbers
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     report : receives the progress at every design
@@ -96,7 +93,6 @@ def optimise(
         mus=MUS if mus is None else tuple(mus),
         noise=noise,
         budget=budget,
-        method=method,
         seed=seed,
     )
     return find_best(problem, out, report)

@@ -10,25 +10,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import qmc
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.gradient import LinearTable, climb, slopes_of
-from finger3d.analyses.optimise.task import (
-    GRADIENT,
-    METHODS,
-    Evaluation,
-    Objective,
-    ObjectiveTable,
-    OptimisationProblem,
-)
+from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
-from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import automatic, with_steps
@@ -48,15 +38,11 @@ _MAX_STORED = 4  # bodies with their increments
 
 @dataclass(frozen=True)
 class _PressedDesign:
-    """Increments of a body for every mu, which gauges are read from, or the reason why there are none.
-
-    The body itself is kept where it is differentiated.
-    """
+    """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
 
     steps: tuple[dict[str, float], ...] = ()
     read: Callable[[Gauge], Float] | None = None
     outcome: str = "converged"
-    problem: Problem | None = None
 
 
 def _gauges_need_own_press(model: Model) -> bool:
@@ -67,8 +53,8 @@ def _gauges_need_own_press(model: Model) -> bool:
 class _DesignBody(PressedBody):
     """Body of a design, built once and pressed with several values of mu."""
 
-    def __init__(self, model: Model, report: Progress, own_press: bool = False) -> None:
-        self._own_press = own_press or _gauges_need_own_press(model)
+    def __init__(self, model: Model, report: Progress) -> None:
+        self._own_press = _gauges_need_own_press(model)
         super().__init__(model if self._own_press else replace(model, gauges=()), report)
 
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
@@ -134,19 +120,10 @@ class Search:
         gauge = self.problem.gauge or next(iter(strain))
         return ObjectiveTable(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
 
-    def _linear(self, values: Float) -> LinearTable:
-        """Return what the objective reads of a design that converged, linearised by the free keys."""
-        scene = self.problem.scene(values.tolist())
-        pressed = self._press(scene)
-        table = self._table(scene, pressed)
-        assert table is not None
-        assert pressed.problem is not None
-        return LinearTable(table, slopes_of(scene, pressed.problem, self.problem.mus, self.problem.keys()))
-
     def _press(self, scene: Scene) -> _PressedDesign:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
-        if self._by_gradient or _gauges_need_own_press(model):
+        if _gauges_need_own_press(model):
             key += repr(model.gauges)
         if key not in self._stored:
             while len(self._stored) >= _MAX_STORED:
@@ -158,7 +135,7 @@ class Search:
     def _press_body(self, model: Model) -> _PressedDesign:
         mus = self.problem.mus
         try:
-            body = _DesignBody(model, self.report, self._by_gradient)
+            body = _DesignBody(model, self.report)
             legs = self._legs(body, model)
             ends = body.ends(mus, legs)
         except Finger3dError as error:
@@ -167,12 +144,7 @@ class Search:
             if not frame.outcome.ok:
                 return _PressedDesign(outcome=f"mu = {mu:g}: {frame.failure}")
         steps = tuple(measure(body.problem.points, frame) for frame in ends)
-        kept = with_steps(under(body.problem, legs=legs), AUTO_START) if self._by_gradient else None
-        return _PressedDesign(steps, body.reader(ends), problem=kept)
-
-    @property
-    def _by_gradient(self) -> bool:
-        return self.problem.method == GRADIENT
+        return _PressedDesign(steps, body.reader(ends))
 
     def _gauge(self, model: Model) -> Gauge | None:
         """Return the gauge that is optimised, if the scene has one."""
@@ -195,7 +167,7 @@ class Search:
         try:
             model = self.problem.scene(start).model()
             if automatic(model):
-                self._legs(_DesignBody(model, self.report, self._by_gradient), model)
+                self._legs(_DesignBody(model, self.report), model)
         except Finger3dError:
             pass  # as in a new search, the increments are chosen at the first design that can be built
 
@@ -205,7 +177,7 @@ class Search:
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
         if gauge is None or has_exact_path(model):
             return {}
-        body = _DesignBody(model, self.report, self._by_gradient)
+        body = _DesignBody(model, self.report)
         problem = with_steps(under(body.problem, legs=self._legs(body, model)), AUTO_START)
 
         def strain(other: Any) -> Float:
@@ -237,8 +209,7 @@ class Search:
         p = self.problem
         gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
         body = [i for i in range(len(p.free)) if i not in gauges]
-        both = bool(body and gauges) and not self._by_gradient
-        outer, inner = (body, gauges) if both else (list(range(len(p.free))), [])
+        outer, inner = (body, gauges) if body and gauges else (list(range(len(p.free))), [])
         x = np.array(start)
 
         def cost(values: Float) -> float:
@@ -254,35 +225,9 @@ class Search:
             return -value if math.isfinite(value) else _INFEASIBLE
 
         try:
-            if self._by_gradient:
-                self._climb(x, lambda values: -cost(values))
-            else:
-                _minimise(p.method, cost, [p.free[i] for i in outer], x[outer], p.seed)
+            _minimise(cost, [p.free[i] for i in outer], x[outer], p.seed)
         except _BudgetExhausted:
             pass
-
-    def _climb(self, start: Float, value_at: Callable[[Float], float]) -> None:
-        """Follow the derivatives from the best of the start and a few designs spread over the bounds."""
-        free, bounds = self.problem.free, np.array([[f.low, f.high] for f in self.problem.free]).T
-        spread = qmc.Halton(len(free), rng=self.problem.seed).random(2 * len(free))
-        designs = [start, *(bounds[0] + spread * (bounds[1] - bounds[0]))]
-        values = [value_at(design) for design in designs]
-        best = int(np.argmax(values))
-
-        def largest(function: Callable[[Float], float], low: Float, high: Float) -> Float:
-            tried = dict[tuple[float, ...], float]()
-
-            def cost(values: Float) -> float:
-                value = function(values)
-                tried[tuple(values.tolist())] = value = value if math.isfinite(value) else -_INFEASIBLE
-                return -value
-
-            box = [FreeKey(f.key, *ends) for f, ends in zip(free, np.stack([low, high], axis=1).tolist(), strict=True)]
-            _minimise(METHODS[0], cost, box, 0.5 * (low + high), self.problem.seed)
-            return np.array(max(tried, key=tried.__getitem__))
-
-        if values[best] > -_INFEASIBLE:
-            climb(designs[best], values[best], (bounds[0], bounds[1]), value_at, self._linear, self.objective, largest)
 
     def _search_gauges(self, here: Float, inner: list[int]) -> float:
         """Return the largest objective over the keys of gauges on one body."""
@@ -301,7 +246,7 @@ class Search:
 
         try:
             free = [self.problem.free[i] for i in inner]
-            _minimise(METHODS[0], cost, free, here[inner], self.problem.seed)
+            _minimise(cost, free, here[inner], self.problem.seed)
         except _BudgetExhausted:
             pass
         best = max(values)
@@ -313,11 +258,8 @@ def _first_middle_last(mus: Sequence[float]) -> tuple[float, ...]:
     return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
 
 
-def _minimise(method: str, cost: Callable[[Float], float], free: Sequence[FreeKey], start: Float, seed: int) -> None:
+def _minimise(cost: Callable[[Float], float], free: Sequence[FreeKey], start: Float, seed: int) -> None:
     from scipy import optimize
 
     bounds = [(f.low, f.high) for f in free]
-    if method == "dual-annealing":
-        optimize.dual_annealing(cost, bounds, x0=start, rng=seed, no_local_search=True, maxiter=10**4)
-    else:
-        optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)
+    optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)

@@ -20,8 +20,6 @@ from finger3d.sensor.curve import LARGEST_STRAIN
 Objective = Callable[["ObjectiveTable"], float]
 
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
-GRADIENT = "gradient"
-METHODS = ("differential-evolution", "dual-annealing", GRADIENT)
 _OBJECTIVE_ERRORS = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 
 
@@ -108,7 +106,6 @@ class OptimisationProblem:
     mus: tuple[float, ...] = MUS
     noise: float = 1.5e-4
     budget: int = 60
-    method: str = METHODS[0]
     seed: int = 0
 
     def keys(self) -> tuple[str, ...]:
@@ -131,15 +128,12 @@ class OptimisationProblem:
             "gauge": self.gauge,
             "mu": list(self.mus),
             "noise": self.noise,
-            "method": self.method,
             "seed": self.seed,
         }
 
 
 def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     """Return the values of the scene, or the middle of the bounds where they lie outside."""
-    if problem.method not in METHODS:
-        raise Finger3dError(f"--method {problem.method}: must be one of {', '.join(METHODS)}")
     if problem.budget < 1:
         raise Finger3dError(f"--budget {problem.budget}: must be at least 1")
     keys = problem.keys()

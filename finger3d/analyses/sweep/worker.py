@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from finger3d.analyses.shared_body import TROUBLE, SharedBody, VariantResult, body_key
+from finger3d.analyses.shared_body import SharedBody, VariantResult, body_key
 from finger3d.analyses.sweep.points import BodySpec, Point
-from finger3d.errors import Finger3dError
+from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.readings.columns import by_key
 from finger3d.results.journal import Row
 from finger3d.scene import parse
@@ -22,7 +22,7 @@ def rows(spec: BodySpec, points: Sequence[Point]) -> Iterator[Row]:
     """Condense a body and yield the row of each point as soon as it is pressed."""
     try:
         body = _build(spec)
-    except TROUBLE as error:
+    except FAILURES as error:
         yield from _failed(points, error)
         return
     yield from _pressed(body, points, None)
@@ -43,7 +43,7 @@ def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
                 )
             try:
                 _body[spec] = _build(spec)
-            except TROUBLE as error:
+            except FAILURES as error:
                 return _failed(points, error)
         return list(_pressed(_body[spec], points[:size], 1))
 

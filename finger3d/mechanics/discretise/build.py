@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,13 +15,15 @@ from scipy.spatial import cKDTree
 
 from finger3d._cost import PressSize, duration
 from finger3d._types import Float
+from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.mesh.parts import elasticity_of, moduli_of
 from finger3d.fem.mesh.simplex import CONTACT, Mesh
-from finger3d.fem.solvers.condense import condense, stiffened
+from finger3d.fem.solvers.condense import Condensation, condense, stiffened
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.discretise.contact_geometry import MARGIN, contact_geometry, may_touch
 from finger3d.mechanics.discretise.gauge_refinement import locally_refined
+from finger3d.mechanics.discretise.moved_mesh import stretched, with_points_of
 from finger3d.mechanics.discretise.problem import (
     CondensedBody,
     ContactSystem,
@@ -55,6 +58,13 @@ WHOLE_FACE = 0.95
 _LONG_S = 60.0
 """Forecast of a press from which it is said."""
 
+_OF_MESH = "mesh", "domain", "held_ends"
+_OF_BODY = (
+    *_OF_MESH, "design", "material", "parts", "markers", "taxels", "other_readings", "gauges", "inclusions",
+    "object_compliance",
+)  # fmt: skip
+"""Fields of a model that the cells of its mesh depend on, beside its dimensions, and that a condensed body does."""
+
 _MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
 
@@ -81,19 +91,78 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
     return _condensed(model, mesh, mesh_report, candidates, report)
 
 
-def with_material(problem: Problem, model: Model, report: Progress = QUIET) -> Problem:
-    """Return the problem of a model that differs from that of another one in materials and friction only.
+def changed(problem: Problem, model: Model) -> Problem:
+    """Return the problem of a changed model, with the cells and the contact points of another one.
 
-    It has the same mesh and candidate points.
+    Where only friction, path or a rigid object differ, the condensed body is shared.  The mesh moves with the
+    dimensions of the design.  At finite strain the condensation, which only begins the iteration, is that of the other
+    problem.
+
+    Raises
+    ------
+    Finger3dError
+        If the model needs other cells.
     """
-    return _condensed(model, problem.mesh, problem.body.report, problem.surface, report)
+    own = problem.model
+    if axes := set(problem.axes) - set(symmetry(model)):
+        raise Finger3dError(f"it breaks the symmetry about {' and '.join(sorted(axes))} = 0")
+    fields = _OF_BODY if own.object_compliance is None else (*_OF_BODY, "object")
+    if all(getattr(model, name) == getattr(own, name) for name in fields):
+        bare, system = problem.without_inclusions, problem.system
+        if model.object != own.object:
+            touch = model.first_contact
+            system = replace(system, first_contact_mm=touch.first_contact_mm, place_mm=touch.place)
+        return replace(problem, model=model, system=system, without_inclusions=changed(bare, model) if bare else None)
+    if any(getattr(model, name) != getattr(own, name) for name in _OF_MESH) or type(model.design) is not type(
+        own.design
+    ):
+        raise Finger3dError("it changes the mesh")
+    if model.mixed != own.mixed:
+        raise Finger3dError("it switches between elements for compressible and nearly incompressible materials")
+    mesh, candidates = problem.mesh, problem.surface
+    if model.design != own.design:
+        mesh = _moved(problem, model)
+        candidates = _same_points(problem, model, mesh)
+    inner = model.inclusions is not None or model.object_compliance is not None
+    known = problem.body.condensed if model.finite_strain and not inner else None
+    return _condensed(model, mesh, problem.body.report, candidates, QUIET, problem, known)
+
+
+def _moved(problem: Problem, model: Model) -> Mesh:
+    """Return the mesh of a problem with the dimensions of another model."""
+    own, mesh = problem.model, problem.mesh
+    if mesh.dim == 2 or model.mesh.mesher == "swept":
+        with suppress(Finger3dError):  # where a structured mesh of the other dimensions has other cells
+            return with_points_of(mesh, mesh_part(model, own.first_contact.contact_box, problem.axes)[0])
+    return stretched(mesh, own.design, model.design)
+
+
+def _same_points(problem: Problem, model: Model, mesh: Mesh) -> BoundarySurface:
+    """Return the contact points of a problem in a mesh that has moved."""
+    own = free_surface(problem.model, problem.mesh, problem.body.thickness)
+    free = free_surface(model, mesh, 1.0 if mesh.dim == 3 else model.design.width_mm)
+    place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}
+    face = problem.surface
+    return restrict(free, np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)]))
 
 
 def _condensed(
-    model: Model, mesh: Mesh, mesh_report: MeshReport, candidates: BoundarySurface, report: Progress
+    model: Model,
+    mesh: Mesh,
+    mesh_report: MeshReport,
+    candidates: BoundarySurface,
+    report: Progress,
+    like: Problem | None = None,
+    known: Condensation | None = None,
 ) -> Problem:
-    """Assemble and condense a mesh of a model to its candidate points."""
-    contact, axes = model.first_contact, symmetry(model)
+    """Assemble and condense a mesh of a model to its candidate points.
+
+    Parameters
+    ----------
+    like : problem on the same cells, whose symmetry and whose elastic object's cells it shares
+    known : condensation to use in place of its own
+    """
+    contact, axes = model.first_contact, like.axes if like else symmetry(model)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     report.say("assembling")
     start = time.perf_counter()
@@ -113,7 +182,7 @@ def _condensed(
         expected = f"about {duration(seconds)} and {size.press_gb(count):.2g} GB, without error bars"
         report.say(f"warning: mesh.size_mm = {model.mesh.size_mm:g} takes {expected}")
     fixed = held_dofs(mesh, axes, model.held_ends)
-    condensed = condense(matrix, fixed, rows)
+    condensed = known or condense(matrix, fixed, rows)
     delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
     mirrored, points = unfold_points(model, mesh, candidates, axes, elastic)
     problem = Problem(
@@ -139,7 +208,7 @@ def _condensed(
         ),
         seconds={**mesh_report.seconds, "assembly": assembly, "condensation": condensed.seconds},
     )
-    return with_elastic_object(with_bars(problem, bars) if bars else problem, report)
+    return with_elastic_object(with_bars(problem, bars) if bars else problem, report, like)
 
 
 def bars_of(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars | None:
@@ -171,15 +240,18 @@ def with_bars(problem: Problem, bars: EmbeddedBars) -> Problem:
     )
 
 
-def with_elastic_object(problem: Problem, report: Progress = QUIET) -> Problem:
-    """Return the problem of a finger with the compliance of its model's object, if that is elastic."""
+def with_elastic_object(problem: Problem, report: Progress = QUIET, like: Problem | None = None) -> Problem:
+    """Return the problem of a finger with the compliance of its model's object, if that is elastic.
+
+    Its mesh is that of a problem that it is `like`, moved with the dimensions of both bodies.
+    """
     model, body = problem.model, problem.without_inclusions or problem
     if model.object_compliance is None:
         return problem
     # a press imports only what its scene names
     from finger3d.mechanics.discretise.elastic_object import object_response
 
-    response = object_response(body, model.object_compliance, model.first_contact.contact_box, report)
+    response = object_response(body, model.object_compliance, model.first_contact.contact_box, report, like)
     return with_object_compliance(problem, response)
 
 
@@ -195,13 +267,13 @@ def with_object_compliance(problem: Problem, response: ObjectResponse) -> Proble
             problem.system,
             points=replace(points, compliance=softer),
             delassus=problem.system.delassus + response.compliance,
-            object_factorizations=response.body.condensed.factorizations if response.body else 0,
+            object_factorizations=response.factorizations,
             object_compliance=response.compliance,
             object_share=share,
-            object_body=response.body,
+            object_mesh=response.mesh,
         ),
         seconds=problem.seconds | response.seconds,
-        without_inclusions=with_object_compliance(body, replace(response, body=None)) if body else None,
+        without_inclusions=with_object_compliance(body, response) if body else None,
     )
 
 

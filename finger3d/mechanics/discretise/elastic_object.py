@@ -10,27 +10,30 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, freeze_arrays
-from finger3d.fem.assembly import Pattern, Stiffness, stiffness
-from finger3d.fem.laws.material import Elasticity, Isotropic
+from finger3d.errors import Finger3dError
+from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import Mesh, axis_numbers, reflected
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.problem import CondensedObject, Problem
+from finger3d.mechanics.discretise.moved_mesh import stretched_object, with_points_of
+from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.options import Mesher
 from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
-from finger3d.progress import Progress
+from finger3d.progress import QUIET, Progress
 
 Zone = tuple[float, float, float, float]
 _SURFACE = 401  # places along x and z where the highest point of a wedge or wave is looked for
@@ -53,19 +56,23 @@ class ObjectResponse:
     ----------
     compliance : (c, d, c, d) array, mm/N
         Zero in the directions that symmetry holds.
-    body : the object, if this is the response of its own mesh
+    mesh : of the object, if this is the response of its own mesh
+    factorizations : of the object
     seconds : time of each stage by name
     """
 
     compliance: Float
-    body: CondensedObject | None
+    mesh: MeshedObject | None
+    factorizations: int
     seconds: dict[str, float]
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
 
-def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> ObjectResponse:
+def object_response(
+    problem: Problem, thing: ElasticObject, zone: Zone, report: Progress, like: Problem | None = None
+) -> ObjectResponse:
     """Mesh and condense an elastic object; return its compliance at the contact points of the finger.
 
     Parameters
@@ -73,9 +80,12 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: 
     zone : (x_min, x_max, z_min, z_max), mm
         Where the object touches the finger; its mesh is fine there.
     report : receives the messages
+    like : problem whose object has the same cells, if there is one
     """
     start = time.perf_counter()
-    mesh, whole = object_mesh(problem, thing, zone, report)
+    own = like.system.object_mesh if like else None
+    body = _moved(like, own, problem, thing) if like and own else object_mesh(problem, thing, zone, report)
+    mesh, whole = body.mesh, body.is_whole
     meshing = time.perf_counter() - start
     report.say(f"condensing the object's {mesh.points.size} unknowns")
     held = held_dofs(mesh, () if whole else problem.axes, problem.model.held_ends)
@@ -85,33 +95,40 @@ def object_response(problem: Problem, thing: ElasticObject, zone: Zone, report: 
     out = np.zeros((c * d, c * d))
     out[np.ix_(active, active)] = condensed.compliance
     seconds = {"object_mesh": meshing, "object_condensation": condensed.seconds}
-    return ObjectResponse(out.reshape(c, d, c, d), CondensedObject(mesh, whole, condensed), seconds)
+    return ObjectResponse(out.reshape(c, d, c, d), body, condensed.factorizations, seconds)
 
 
-def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> tuple[Mesh, bool]:
-    """Return the mesh of an elastic object, and whether it is whole although only a part of the finger is meshed."""
+def object_mesh(problem: Problem, thing: ElasticObject, zone: Zone, report: Progress) -> MeshedObject:
+    """Return the mesh of an elastic object."""
     model = problem.model
     return ObjectBody(model, thing.height_mm or model.design.height_mm, zone, problem.axes, report).mesh()
 
 
-def law_of_object(model: Model, thing: ElasticObject) -> Elasticity:
-    """Return the small-strain law of an elastic object."""
-    return Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
+def _moved(like: Problem, body: MeshedObject, problem: Problem, thing: ElasticObject) -> MeshedObject:
+    """Return the elastic object of a problem, `like`, with the dimensions of both bodies of another one."""
+    own, model = like.model, problem.model
+    height = own.object_compliance.height_mm if own.object_compliance else None
+    if (model.design, model.object, thing.height_mm) == (own.design, own.object, height):
+        return body
+    held = own.object.held_body(own.design, body.mesh.dim == 3)
+    if held is None or held.mesher == "swept" or body.mesh.dim == 2:
+        with suppress(Finger3dError):  # where a structured mesh of the other dimensions has other cells
+            other = object_mesh(problem, thing, own.first_contact.contact_box, QUIET).mesh
+            return replace(body, mesh=with_points_of(body.mesh, other))
+    return replace(body, mesh=stretched_object(body.mesh, own, model))
 
 
 def assembled_object(
-    problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool, pattern: Pattern | None = None
+    problem: Problem, thing: ElasticObject, mesh: Mesh, whole: bool
 ) -> tuple[Stiffness, sp.csr_matrix]:
-    """Return the stiffness of an elastic object, and the rows (r, n d) of the directions of contact points that move.
-
-    A known `pattern` of the stiffness saves time.
-    """
+    """Return the stiffness of an elastic object, and the rows (r, n d) of the contact directions that move."""
     model, axes, frame = problem.model, problem.axes, vertical_frame(problem.dim)
     if whole and axes:  # the body is meshed whole: all images of a point are pressed alike
         rows = _all_images(problem, mesh, frame) / math.sqrt(2 ** len(axes))
     else:
         rows = sp.kron(facing_trace(problem.surface, mesh, "contact"), frame, format="csr")
-    matrix = stiffness(mesh, law_of_object(model, thing), problem.body.thickness, pattern)
+    law = Isotropic(thing.E_MPa, thing.nu).elasticity(model.domain == "plane-stress")
+    matrix = stiffness(mesh, law, problem.body.thickness)
     return matrix, rows[problem.system.active_dofs]
 
 
@@ -141,10 +158,10 @@ class ObjectBody:
     axes: tuple[str, ...]
     report: Progress
 
-    def mesh(self) -> tuple[Mesh, bool]:
-        """Return the mesh, and whether it is a whole object although only a part of the finger is meshed."""
+    def mesh(self) -> MeshedObject:
+        """Return the mesh."""
         held = self.model.object.held_body(self.model.design, self.model.domain == "solid")
-        return (self._block(), False) if held is None else (self._held(held), held.is_whole)
+        return MeshedObject(self._block(), False) if held is None else MeshedObject(self._held(held), held.is_whole)
 
     def _made(self, design: Design, zone: Zone, mesher: Mesher = "swept", axes: tuple[str, ...] | None = None) -> Mesh:
         """Return the mesh of a design with the edge lengths of the finger; its contact face is on top."""

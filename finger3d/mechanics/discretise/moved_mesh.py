@@ -52,7 +52,8 @@ def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
     Finger3dError
         If the body is not that between its base and its contact face, or has parts and no section.
     """
-    points = mesh.points * [other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm]
+    scale = other.half_length_mm / design.half_length_mm, 1.0, other.width_mm / design.width_mm
+    points = mesh.points * scale[: mesh.dim]
     if design.part_labels:
         size = design.half_length_mm / _CELLS_OF_SECTION
         zone = (-design.half_length_mm, design.half_length_mm, 0.0, 0.0)
@@ -61,22 +62,31 @@ def stretched(mesh: Mesh, design: Design, other: Design) -> Mesh:
         motion = (with_points_of(flat, end).points - flat.points)[flat.cells[cells]]
         points[:, :2] = mesh.points[:, :2] + np.einsum("pk,pkd->pd", flat.element.shape(places), motion)
     else:
-        heights = [one.top(*(_INSIDE * at[:, ::2]).T) for one, at in ((design, mesh.points), (other, points))]
+        ends = [_INSIDE * np.pad(at, ((0, 0), (0, 3 - mesh.dim))) for at in (mesh.points, points)]
+        heights = [one.top(at[:, 0], at[:, 2]) for one, at in zip((design, other), ends, strict=True)]
         stands = mesh.points[:, 1] > 0.0
         points[stands, 1] *= heights[1][stands] / heights[0][stands]
     moved = replace(mesh, points=points)
     growth = curved_volume(moved) / curved_volume(mesh) - 1.0
     wanted = other.volume_mm3 / design.volume_mm3 - 1.0
+    if mesh.dim == 2:
+        wanted = (1.0 + wanted) * design.width_mm / other.width_mm - 1.0
     if not math.isclose(growth, wanted, rel_tol=_VOLUME, abs_tol=_ROUND_OFF):
         raise Finger3dError("it changes the cells of the mesh")
     return moved
 
 
-def stretched_object(mesh: Mesh, model: Model, other: Model) -> Mesh | None:
-    """Return an unstructured mesh of the elastic object of a model with the dimensions of another; None for others."""
+def stretched_object(mesh: Mesh, model: Model, other: Model) -> Mesh:
+    """Return the mesh of the elastic object of a model with the dimensions of another one.
+
+    Raises
+    ------
+    Finger3dError
+        If it is not the mesh of a design.
+    """
     bodies = [one.object.held_body(one.design, mesh.dim == 3) for one in (model, other)]
-    if mesh.dim == 2 or bodies[0] is None or bodies[1] is None or bodies[0].mesher == "swept":
-        return None
+    if bodies[0] is None or bodies[1] is None:
+        raise Finger3dError("it changes the cells of the object")
     own = replace(mesh, points=bodies[0].to_design(mesh.points))
     if bodies[0].design != bodies[1].design:
         own = stretched(own, bodies[0].design, bodies[1].design)

@@ -58,8 +58,8 @@ class CondensedBody:
 
 
 @dataclass(frozen=True)
-class CondensedObject:
-    """Elastic object, condensed to the directions of contact points that move.
+class MeshedObject:
+    """Mesh of an elastic object.
 
     Attributes
     ----------
@@ -68,7 +68,6 @@ class CondensedObject:
 
     mesh: Mesh
     is_whole: bool
-    condensed: Condensation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +86,7 @@ class ContactSystem:
     object_factorizations : factorisations of an elastic object
     object_compliance : (c, d, c, d) mm/N, the part of an elastic object in `delassus`; None if it is rigid
     object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
-    object_body : an elastic object, which derivatives need
+    object_mesh : of an elastic object
     """
 
     surface: BoundarySurface
@@ -100,7 +99,7 @@ class ContactSystem:
     object_factorizations: int = 0
     object_compliance: Float | None = None
     object_share: Float | None = None
-    object_body: CondensedObject | None = None
+    object_mesh: MeshedObject | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)

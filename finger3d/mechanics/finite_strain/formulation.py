@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,7 +93,7 @@ class FiniteStrain:
         if _moves_too_far(problem, state, move):
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
         increment = self.equations(problem, state, move, workspace)
-        return self._kept_outside(increment, self._remembered(increment, increment.solve(guess)))
+        return self.accepted(increment, increment.solve(guess))
 
     def increment_to_force(
         self,
@@ -111,34 +112,6 @@ class FiniteStrain:
         solution = self._kept_outside(replace(plain, move=move), self._remembered(plain, solution))
         return (move, solution) if solution.outcome.ok else None
 
-    def increments(
-        self,
-        problems: Sequence[Problem],
-        starts: Sequence[tuple[State[DeformedBody], Float | None]],
-        move: Move,
-        workspace: FiniteStrainWorkspace,
-        leader: int,
-    ) -> list[ContactSolution[State[DeformedBody]] | None]:
-        """Advance several presses of one body at once, from their states and with their guesses of the forces.
-
-        Returns
-        -------
-        Solution of each press; None where it is to be solved by itself, see
-        `finger3d.mechanics.finite_strain.together.solve_together`.
-        """
-        if any(_moves_too_far(problem, state, move) for problem, (state, _) in zip(problems, starts, strict=True)):
-            return [None] * len(problems)
-        increments = [
-            self.equations(problem, state, move, workspace)
-            for problem, (state, _) in zip(problems, starts, strict=True)
-        ]
-        solutions = solve_together(increments, [guess for _, guess in starts], leader)
-        accepted = [
-            one and self._kept_outside(increment, self._remembered(increment, one))
-            for increment, one in zip(increments, solutions, strict=True)
-        ]
-        return [one if one is not None and one.outcome.ok else None for one in accepted]
-
     def equations(
         self,
         problem: Problem,
@@ -152,6 +125,12 @@ class FiniteStrain:
         if self.relaxation is not None and memory is not None:
             body = body.over(self.relaxation, memory, move.duration_s)
         return FiniteIncrement(problem, body, state, move, workspace)
+
+    def accepted(
+        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
+    ) -> ContactSolution[State[DeformedBody]]:
+        """Return a solution with its internal variables, unless finger or object passed through the other."""
+        return self._kept_outside(increment, self._remembered(increment, solution))
 
     def _kept_outside(
         self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
@@ -234,6 +213,42 @@ class FiniteStrain:
             nodal = extrapolated(problem.mesh, lost[: 9 * body.points].reshape(-1, 3, 3))
             cauchy = cauchy + f @ nodal @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
         return displacement(problem.mesh, x), strain, cauchy
+
+
+class Beginning(NamedTuple):
+    """An increment of one of several presses that are solved at once: the press, its state, and where it goes.
+
+    Attributes
+    ----------
+    guess : (c, d) contact forces where the iteration begins, N; those of the state if None
+    workspace : its own, with linearisations that all presses share
+    """
+
+    formulation: FiniteStrain
+    problem: Problem
+    state: State[DeformedBody]
+    guess: Float | None
+    move: Move
+    workspace: FiniteStrainWorkspace
+
+
+def increments(several: Sequence[Beginning], leader: int) -> list[ContactSolution[State[DeformedBody]] | None]:
+    """Advance several presses at once, on bodies with the same unknowns and contact points.
+
+    Returns
+    -------
+    Solution of each press; None where it is to be solved by itself, see
+    `finger3d.mechanics.finite_strain.together.solve_together`.
+    """
+    if any(_moves_too_far(one.problem, one.state, one.move) for one in several):
+        return [None] * len(several)
+    equations = [one.formulation.equations(one.problem, one.state, one.move, one.workspace) for one in several]
+    solutions = solve_together(equations, [one.guess for one in several], leader)
+    accepted = [
+        found and one.formulation.accepted(increment, found)
+        for one, increment, found in zip(several, equations, solutions, strict=True)
+    ]
+    return [one if one is not None and one.outcome.ok else None for one in accepted]
 
 
 def _moved_points(problem: Problem, state: State[DeformedBody]) -> Float:

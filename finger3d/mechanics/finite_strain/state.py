@@ -16,7 +16,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.small_strain.relaxation import InternalVariables
-from finger3d.objects import Move, ObjectPose
+from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 TARGET_RESIDUAL = 5e-9
 """Residual at which the iteration ends; where round-off prevents it, one up to the tolerance that no longer falls."""
@@ -88,6 +88,10 @@ class FiniteStrainWorkspace(Workspace):
     target: float = TARGET_RESIDUAL
     bodies: dict[bool, FiniteBody] = field(default_factory=dict)
     linearisations: dict[bool, Linearisation] = field(default_factory=dict)
+
+    def beside(self) -> Self:
+        """Return a workspace for another body, with the same linearisations."""
+        return replace(self, factorizations=0, tracker=DistanceTracker(), bodies={})
 
     def rough(self) -> Self:
         """Return a workspace for solutions near which others begin, with the same factors and a count of its own."""

@@ -1,0 +1,114 @@
+"""Presses of changed scenes beside the press that they vary: what a change is worth is the difference of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from threading import Event
+from typing import Generic, TypeVar
+
+from finger3d._machine import cores
+from finger3d.contact.acceleration import one_thread
+from finger3d.errors import FAILURES, Finger3dError
+from finger3d.mechanics.discretise.build import build, changed
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Model
+from finger3d.mechanics.results.history import StepResult
+
+T = TypeVar("T")
+
+Read = Callable[[Problem, Sequence[StepResult]], T]
+"""Returns what is kept of a press: of its problem and its increments, all converged."""
+
+
+@dataclass(frozen=True)
+class Variant(Generic[T]):
+    """Press of a changed scene, in the same increments.
+
+    Attributes
+    ----------
+    model : what was pressed
+    found : what was kept of the press; None if it failed
+    failure : why it failed, in words
+    is_meshed_anew : whether it has other cells, so that a difference contains the error of both meshes
+    """
+
+    model: Model
+    found: T | None
+    failure: str = ""
+    is_meshed_anew: bool = False
+
+
+def press_variants(
+    problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None = None
+) -> list[Variant[T]]:
+    """Press changed models beside a problem, each in as many increments.
+
+    A variant shares the condensed body where only friction, path or a rigid object differ, and else the cells of the
+    mesh, which move with the dimensions.  At finite strain all variants share the tangents of the problem, which is
+    pressed with them; in small strain they are pressed at once on all cores.
+
+    Parameters
+    ----------
+    problem : its increments are numbers
+    models : their legs have as many increments
+    read : of each press
+    """
+    if problem.model.finite_strain:
+        return _share_tangents(problem, models, read, cancel)
+
+    def pressed(model: Model) -> Variant[T]:
+        try:
+            own, is_new = _problem(problem, model)
+            return _variant(own, is_new, list(march(own, cancel=cancel)), read)
+        except FAILURES as error:
+            return _failed(model, error)
+
+    with one_thread(), ThreadPoolExecutor(cores()) as pool:
+        return list(pool.map(pressed, models))
+
+
+def _problem(problem: Problem, model: Model) -> tuple[Problem, bool]:
+    """Return the problem of a changed model, and whether it is meshed anew."""
+    try:
+        return changed(problem, model), False
+    except Finger3dError:
+        return build(model), True
+
+
+def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None) -> list[Variant[T]]:
+    from finger3d.mechanics.march.groups import march_in_groups  # a press in small strain needs none of it
+
+    variants: dict[int, Variant[T]] = {}
+    alike, others = dict[int, Problem](), dict[int, Problem]()
+    for number, model in enumerate(models):
+        try:
+            own, is_new = _problem(problem, model)
+        except FAILURES as error:
+            variants[number] = _failed(model, error)
+        else:
+            (others if is_new else alike)[number] = own
+    numbers = [*list(alike)[: len(alike) // 2], None, *list(alike)[len(alike) // 2 :]]
+    several = [problem if number is None else alike[number] for number in numbers]
+    for place, steps in march_in_groups(several, formulation_of(problem.model).workspace(), cancel or Event()):
+        own_number = numbers[place]
+        if own_number is not None:
+            variants[own_number] = _variant(alike[own_number], False, steps, read)
+    for place, own in others.items():
+        variants[place] = _variant(own, True, list(march(own, cancel=cancel)), read)
+    return [variants[number] for number in range(len(models))]
+
+
+def _variant(problem: Problem, is_new: bool, steps: Sequence[StepResult], read: Read[T]) -> Variant[T]:
+    try:
+        steps[-1].check("a variant")
+        return Variant(problem.model, read(problem, steps), is_meshed_anew=is_new)
+    except FAILURES as error:
+        return replace(_failed(problem.model, error), is_meshed_anew=is_new)
+
+
+def _failed(model: Model, error: Exception) -> Variant[T]:
+    return Variant(model, None, str(error) or type(error).__name__)
