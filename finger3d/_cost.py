@@ -73,8 +73,8 @@ class Budget:
         return max(self.share * press_s, self.least_s)
 
 
-INCREMENT_ERRORS, CHANGES = Budget(0.15, 0.2), Budget(0.3, 1.0)
-"""Of the errors due to the increments, and of the changes by a better model."""
+INCREMENT_ERRORS = Budget(0.15, 0.2)
+"""Of the errors due to the increments."""
 
 
 _LEAST_TETS = 1600.0

@@ -179,7 +179,7 @@ def test_press_prints_error_bars_and_keeps_them(tmp_path: Path, capsys: pytest.C
     scene.write_text(changed(SCENE, size_mm=0.2), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "a"), "--no-figures"]) == 0
     bars = json.loads((tmp_path / "a" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
-    assert set(bars) == {"discretisation", "steps", "modulus", "method", "seconds", "third"}
+    assert set(bars) == {"discretisation", "steps", "modulus", "method", "seconds"}
     assert "gauge_g" in bars["discretisation"]
     line = next(t for t in capsys.readouterr().out.splitlines() if "normal force" in t)
     assert " +- " in line

@@ -56,7 +56,8 @@ def test_errors_of_the_mesh_do_not_depend_on_the_bounds_of_the_modulus(tmp_path:
     for number, bounds in enumerate(((0.05, 5.0), (0.3, 0.5))):
         free = FREE | {"material.E_MPa": bounds}
         found.append(finger3d.identify(scene_file, measured, free, tmp_path / f"out{number}").fitted.numerical)
-    assert found[1] == pytest.approx(found[0], rel=0.02)
+    # derivatives are differences over a hundredth of the range, which is another in either case
+    assert found[1] == pytest.approx(found[0], rel=0.05)
 
 
 @pytest.mark.slow
@@ -80,8 +81,8 @@ def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> 
     assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
 
 
-def test_derivatives_need_no_press(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four points with noise: twelve presses to fit, and some along friction, of which most share a body."""
+def test_presses_are_few_and_share_bodies(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four points with noise: half of the presses are those of the fit, the others those along friction."""
     counted = {"bodies": 0, "presses": 0}
     built, pressed = PressedBody._built, PressedBody.steps
 
@@ -99,8 +100,8 @@ def test_derivatives_need_no_press(tmp_path: Path, scene_file: Path, monkeypatch
     measured.write_text("\n".join([lines[0], *lines[2::2]]) + "\n")
     found = finger3d.identify(scene_file, measured, FREE | {"material.nu": (0.3, 0.495)}, tmp_path / "out")
     assert found.measured.count == 2 * 4
-    assert found.presses == counted["presses"] <= 30
-    assert counted["bodies"] <= 8  # of one body all friction that is tried at first
+    assert found.presses == counted["presses"] <= 40
+    assert counted["bodies"] <= 16  # of one body all friction that is tried at first
     for value, std, true in zip(found.fitted.values, found.fitted.stds, [*TRUE.values(), 0.45], strict=True):
         assert value == pytest.approx(true, abs=4.0 * std)
 

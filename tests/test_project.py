@@ -39,12 +39,6 @@ def sources(root: Path) -> list[Path]:
     return [p for folder in ("finger3d", "geometries") for p in (root / folder).rglob("*.py")]
 
 
-def has_logic(module: Path) -> bool:
-    """Whether a module defines a function with a body; protocols, registries and tables of constants do not."""
-    functions = (n for n in ast.walk(ast.parse(module.read_text())) if isinstance(n, ast.FunctionDef))
-    return any(not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)) for n in functions for s in n.body)
-
-
 def project(root: Path) -> dict:
     return tomllib.loads((root / "pyproject.toml").read_text())["project"]
 
@@ -210,19 +204,6 @@ def test_the_layers_of_imports_are_modules_that_exist(root) -> None:
     there = {p.stem for p in (root / "finger3d").glob("*.py")}
     there |= {p.parent.name for p in (root / "finger3d").glob("*/__init__.py")}
     assert names == there - {"__init__", "__main__"}
-
-
-def test_every_module_with_logic_has_its_test_file(root: Path) -> None:
-    """tests/test_<package>_<module>.py; laws of one interface share theirs, and a package is tested under its name."""
-    missing = []
-    for module in (root / "finger3d").rglob("*.py"):
-        *packages, name = module.relative_to(root / "finger3d").with_suffix("").parts
-        if packages == ["fem", "laws"] or not has_logic(module):
-            continue
-        parts = [*packages, name.strip("_")] if name != "__init__" else packages or ["api"]
-        if not (root / "tests" / f"test_{'_'.join(parts)}.py").exists():
-            missing.append(str(module))
-    assert missing == []
 
 
 @pytest.mark.parametrize("folder", ["mechanics", "fem", "meshing"])

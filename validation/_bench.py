@@ -229,6 +229,32 @@ def _default_presses(quick: bool) -> Iterator[Row]:
         yield _row(what, 1.5, seconds(fig9_20_wide, *section))
 
 
+def _sensitivity(quick: bool) -> Iterator[Row]:
+    """Yield the processor time of the effects of all keys of a scene over that of its press."""
+    scene = str(Path(__file__).parents[1] / "geometries" / "fig9.toml")
+    section = ("--set", "model.domain=plane-strain") if quick else ()
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as folder:
+        for name, effects in (
+            ("small strain", "large_deformation=false"),
+            ("large deformation", "large_deformation=true"),
+        ):
+            keys = (*section, "--set", "effects.auto=false", "--set", f"effects.{effects}")
+            seconds = []
+            for command in (("press", "--no-figures"), ("sensitivity", "--of", "normal_force_N")):
+                own, more = command[0], command[1:]
+                before = os.times()
+                _run([sys.executable, "-m", "finger3d", own, scene, *more, "--out", str(Path(folder, own)), *keys])
+                after = os.times()
+                seconds.append(
+                    after.children_user + after.children_system - before.children_user - before.children_system
+                )
+            yield _row(
+                f"effects of all keys of Fig. 9, {name}, processor time over that of a press",
+                7.0,
+                seconds[1] / seconds[0],
+            )
+
+
 def _five_against_one(scene: str, repeats: int) -> float:
     """Wall time of `finger3d sweep` of all of MUS over that of one, all of Python and output included.
 
@@ -279,6 +305,8 @@ def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     yield [_row("finger3d press --no-error of a section, less its solve, s", 3.5, overhead)]
     report.stage("default presses")
     yield list(_default_presses(quick))
+    report.stage("effects of keys")
+    yield list(_sensitivity(quick))
     report.stage("sweeps of five values of mu")
     yield _sweeps(quick)
     if not quick:

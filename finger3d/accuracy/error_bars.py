@@ -24,7 +24,6 @@ class ErrorBars:
     modulus : error due to the spread of Young's modulus, not part of `total`
     method : one line that says how the errors were estimated, or ``no estimate: ...``
     seconds : wall time of the estimate
-    third : price of a third of these bars in words; empty if it is not known
     """
 
     discretisation: Mapping[str, float] = field(default_factory=dict)
@@ -32,7 +31,6 @@ class ErrorBars:
     modulus: Mapping[str, float] = field(default_factory=dict)
     method: str = ""
     seconds: float = 0.0
-    third: str = ""
 
     @classmethod
     def of_summary(cls, summary: TreeView) -> Self:
@@ -43,8 +41,7 @@ class ErrorBars:
             for part in ("discretisation", "steps", "modulus")
         )
         method, seconds = str(known.get("method", "")), float(known.get("seconds") or 0.0)
-        third = str(known.get("third") or "")
-        return cls(discretisation=mesh, steps=steps, modulus=modulus, method=method, seconds=seconds, third=third)
+        return cls(discretisation=mesh, steps=steps, modulus=modulus, method=method, seconds=seconds)
 
     @property
     def covered(self) -> str:
@@ -69,7 +66,6 @@ class ErrorBars:
             "modulus": dict(self.modulus),
             "method": self.method,
             "seconds": self.seconds,
-            "third": self.third,
         }
 
 

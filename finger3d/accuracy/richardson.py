@@ -62,6 +62,12 @@ class Kind(Enum):
         return self in (Kind.CONTACT_LENGTH, Kind.CONTACT_AREA, Kind.STICK_LENGTH, Kind.STICK_AREA)
 
     @property
+    def is_stress(self) -> bool:
+        """Return whether the number is proportional to the stresses."""
+        geometric = (Kind.STRAIN, Kind.DISPLACEMENT, Kind.OTHER_READING, Kind.DEPTH)
+        return not self.is_zone and self not in geometric
+
+    @property
     def order(self) -> float:
         """Order of convergence with the edge length."""
         return 1.5 if self in (Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT) else ORDER

@@ -260,7 +260,6 @@ def _estimate_errors(record: PressRecord, report: Progress, companions: Companio
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, estimate_with_grid, press_numbers
     from finger3d.accuracy.modulus import modulus_errors
-    from finger3d.accuracy.price import price_of_a_third
     from finger3d.scene.derived import spreads
 
     report.stage("estimating the error")
@@ -272,14 +271,10 @@ def _estimate_errors(record: PressRecord, report: Progress, companions: Companio
             record.problem, record.steps, grid, report, record.step_estimate, companions.of
         )
     record.marker_errors = found.totals() | of_grid
-    known = spreads(record.scene.tables)
-    by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers, record.workspace)
+    known = spreads(record.scene.tables) if record.steps and record.steps[-1].outcome.ok else {}
+    by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers)
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
-    third = ""
-    if found.discretisation:
-        solving = sum(record.seconds[stage] for stage in ("assembly", "condensation", "contact"))
-        third = price_of_a_third(record.problem, len(record.steps), solving + found.seconds)
-    record.error_estimate = replace(found, modulus=by_modulus, method=method, third=third)
+    record.error_estimate = replace(found, modulus=by_modulus, method=method)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.richardson import spread_error
+from finger3d.accuracy.richardson import kinds_of, spread_error
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with
@@ -39,8 +39,8 @@ _SKIPPED = ("title", "mesh", "contact", "marker_grid", "effects.auto")
 _PERCENT = 0.01
 """Relative change of a key without a tolerance; of the finger's height or of a radian for places and angles at zero."""
 
-_STIFFNESS, _SCALED = "material.E_MPa", ("_N", "_MPa", "_mJ", "_Nmm")
-"""Key that forces may be proportional to, and endings of the names of numbers that then are."""
+_STIFFNESS = "material.E_MPa"
+"""Key that forces may be proportional to."""
 
 _READINGS = "gauges", "markers", "taxels"
 
@@ -121,7 +121,7 @@ def largest(effect: Effect) -> float:
     return max((abs(x) for x in (effect.falling, effect.growing) if not math.isnan(x)), default=0.0)
 
 
-class _Change(NamedTuple):
+class Change(NamedTuple):
     """A key with its value, and the models with it less and plus its change; the reason where there is none."""
 
     value: float
@@ -170,8 +170,8 @@ def sensitivity(
     steps[-1].check("sensitivity")
     legs = with_increments_of(body.problem.model.legs, len(steps))
     problem = replace(body.problem, model=replace(body.problem.model, legs=legs))
-    changes = _changes(scene, problem.model, tolerances or {})
-    found, failures = _effects(problem, changes, report)
+    changes = changes_of(scene, problem.model, tolerances or {})
+    found, failures = effects_on(problem, changes, report)
     numbers = press_numbers(problem, steps[-1])
     of, keys = tuple(of) or names, [key for key in changes if key in found]
     result = Sensitivity(
@@ -187,7 +187,7 @@ def sensitivity(
     return result
 
 
-def _changes(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[str, _Change]:
+def changes_of(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[str, Change]:
     """Return the changes of all keys of a scene, by their names, in the mesh and the increments of a model."""
     given = with_moduli_only(scene.as_dict())
     wanted = {tree.numbered(key, given, "--tolerance"): change for key, change in tolerances.items()}
@@ -203,19 +203,19 @@ def _changes(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[
         count = sum(int(leg.steps) for leg in own.legs)
         return replace(model, mesh=own.mesh, legs=with_increments_of(model.legs, count), warnings=own.warnings)
 
-    def change(key: str, value: float) -> _Change:
+    def change(key: str, value: float) -> Change:
         step = wanted.get(key) or _tolerance(key, value) or _PERCENT * (abs(value) or _natural(key, own))
-        return _Change(value, step, (at(key, value - step), at(key, value + step)))
+        return Change(value, step, (at(key, value - step), at(key, value + step)))
 
     told = {key: value for key, value in values.items() if value or key in wanted}
     return {_named(key, given): change(key, value) for key, value in told.items()}
 
 
-def _effects(
-    problem: Problem, changes: Mapping[str, _Change], report: Progress
+def effects_on(
+    problem: Problem, changes: Mapping[str, Change], report: Progress
 ) -> tuple[dict[str, dict[str, Effect]], dict[str, str]]:
     """Return the effects on all numbers by key, and why there are none."""
-    by_axes = dict[tuple[str, ...], dict[str, _Change]]()
+    by_axes = dict[tuple[str, ...], dict[str, Change]]()
     for key, one in changes.items():
         kept = [set(symmetry(end)) for end in one.ends if isinstance(end, Model)]
         axes = tuple(axis for axis in problem.axes if all(axis in some for some in kept))
@@ -228,12 +228,12 @@ def _effects(
             mesh = coarser(problem.model, _UNSYMMETRIC).mesh
             base = build(replace(problem.model, symmetry=axes, mesh=mesh))
         report.stage(f"changing {', '.join(some)}")
-        own = _differences(base, some)
+        own = differences(base, some)
         beside = list(coarse_companions(base)) or list(finer_companions(base))
         others = []
         for ratio, companion in beside:
             report.stage(f"errors: the same changes on edges of {companion.model.mesh.size_mm:.3g} mm")
-            others.append((ratio, _differences(companion, some)))
+            others.append((ratio, differences(companion, some)))
         for key, sides in own.changed.items():
             told = [f"{way}: {side}" for way, side in zip(_WAYS, sides, strict=True) if isinstance(side, str)]
             failures |= {key: "; ".join(told)} if told else {}
@@ -249,7 +249,7 @@ Side = dict[str, float] | str
 """Changes of numbers by name, or the reason why they are not known."""
 
 
-class _Differences(NamedTuple):
+class Differences(NamedTuple):
     """Numbers of a press, its readings, and the changes of the numbers as each key falls and grows."""
 
     numbers: dict[str, float]
@@ -257,7 +257,7 @@ class _Differences(NamedTuple):
     changed: dict[str, tuple[Side, Side]]
 
 
-def _errors(own: _Differences, beside: Sequence[tuple[float, Side]], key: str, k: int) -> dict[str, float]:
+def _errors(own: Differences, beside: Sequence[tuple[float, Side]], key: str, k: int) -> dict[str, float]:
     """Return the errors of the changes by a key that falls (0) or grows (1), from those on other meshes."""
     side = own.changed[key][k]
     known = [(ratio, other) for ratio, other in beside if isinstance(other, dict)]
@@ -269,7 +269,7 @@ def _effect(sides: tuple[Side, Side], errors: Sequence[Mapping[str, float]], nam
     return Effect(told[0], errors[0].get(name, math.nan), told[1], errors[1].get(name, math.nan))
 
 
-def _differences(problem: Problem, changes: Mapping[str, _Change]) -> _Differences:
+def differences(problem: Problem, changes: Mapping[str, Change]) -> Differences:
     """Press a problem and its variants; those that change readings only are read in the problem's own press."""
     own, mesh = problem.model, problem.model.mesh
     ends = {
@@ -290,16 +290,17 @@ def _differences(problem: Problem, changes: Mapping[str, _Change]) -> _Differenc
         sides[at] = _less(variant.found[0], numbers) if variant.found else variant.failure
     for at in read:
         sides[at] = _less(_read_anew(problem, last, ends[at]), numbers)
+    kinds = kinds_of(last.readings)
     for key, side in scaled:
         ratio = (2 * side - 1) * changes[key].change / changes[key].value
-        sides[key, side] = {n: ratio * x if n.endswith(_SCALED) else 0.0 for n, x in numbers.items()}
+        sides[key, side] = {name: ratio * x if kinds[name].is_stress else 0.0 for name, x in numbers.items()}
 
     def side_of(key: str, k: int) -> Side:
         end = changes[key].ends[k]
         return end if isinstance(end, str) else sides[key, k]
 
     changed = {key: (side_of(key, 0), side_of(key, 1)) for key in changes}
-    return _Differences(numbers, list(in_space(last.readings)), changed)
+    return Differences(numbers, list(in_space(last.readings)), changed)
 
 
 def _kept(problem: Problem, steps: Sequence[StepResult]) -> tuple[dict[str, float], StepResult]:

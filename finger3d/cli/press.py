@@ -136,9 +136,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
             if len(columns) > 1 and any(by_modulus):
                 yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f"{unit} by the modulus"
     if bars.discretisation:
-        yield "+-", f"{bars.covered}, not of the model; estimated in {bars.seconds:.1f} s; --no-error skips it"
-    if bars.third:
-        yield "a third of +-", f"{bars.third}; of one number alone: mesh.tolerance and mesh.goal"
+        yield "+-", f"{bars.covered}, not of the model; estimated in {bars.seconds:.1f} s; smaller ones: finger3d cost"
     if estimate and not (bars.discretisation and bars.steps):
         yield "error", bars.method
     yield "time", f"{seconds:.1f} s, with imports, pictures and page"

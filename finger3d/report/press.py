@@ -180,8 +180,6 @@ def _error_bars(bars: ErrorBars) -> PageSection:
     said = "The number after ± is the sum of the errors of mesh and increments. "
     if bars.modulus:
         said += "The error of the modulus, one standard deviation, stands apart. "
-    if bars.third:
-        said += f"A third of these errors would take {bars.third}. "
     return PageSection("Error bars", [f"{said}Method: {bars.method}", *table])
 
 

@@ -25,9 +25,10 @@ from finger3d.analyses.calibrate.increments import Increments, error_of_incremen
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import CalibratedReading
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus, with_plane
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
@@ -189,8 +190,8 @@ def tolerance_of(name: str, sd: float, effects: list[Effect]) -> Tolerance:
     """Return a tolerance from the change of a reading at one step, or the parabola through those at two."""
     step, change = effects[0]
     slope, curvature = change / step, np.zeros(len(change))
-    for other, changed in effects[1:]:
-        curvature = 2.0 * (change / step - changed / other) / (step - other)
+    for other, changes in effects[1:]:
+        curvature = 2.0 * (change / step - changes / other) / (step - other)
         slope = slope - 0.5 * curvature * step
     return Tolerance(name=name, unit=TOLERANCES[name][1], sd=sd, slope=slope, curvature=curvature)
 
@@ -269,7 +270,8 @@ def _vary_tilt(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: f
         symmetry=None,
     )
     planes = (replace(plane, tilt=plane.tilt + turn) for turn in (step, 0.0, -step))
-    away, own, back = (read(with_plane(tilted, one), body.names, body.mu) for one in planes)
+    models = [replace(tilted.model, object=one) for one in planes]
+    away, own, back = (read(changed(tilted, model), body.names, body.mu) for model in models)
     yield node, away - own
     yield -node, back - own
 

@@ -6,14 +6,11 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from finger3d.fem.laws.material import MIXED_FROM, Isotropic, Material
-from finger3d.fem.solvers.condense import stiffened
-from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem, object_share, scatter_to_points, under_pressure
+from finger3d.accuracy.modulus import times_modulus
+from finger3d.fem.laws.material import MIXED_FROM
+from finger3d.mechanics.discretise.build import changed
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.objects import Plane
 
 _TILTED_POINTS = {2: 100, 3: 500}
 """Contact points, by dimension, that the mesh of a tilted body has about."""
@@ -35,44 +32,10 @@ def poisson_steps(nu: float, step: float) -> tuple[float, float]:
 
 
 def with_modulus(problem: Problem, factor: float) -> Problem:
-    """Return the problem with Young's moduli of all parts multiplied; in small strain the condensation is reused."""
+    """Return the problem with Young's moduli of all parts multiplied."""
     model = problem.model
-    if not model.is_linear_elastic:
-        parts = tuple((label, _stiffer(material, factor)) for label, material in model.parts)
-        return build(replace(model, material=_stiffer(model.material, factor), parts=parts))
-    c, d = problem.delassus.shape[:2]
-
-    def scaled(one: Problem) -> Problem:
-        own = stiffened(one.body.condensed.compliance, one.inclusions.bar_stiffness)
-        active, readings = one.system.active_dofs, len(one.system.reading_rows)
-        of_object = one.delassus - scatter_to_points(own, active, c, d)
-        changed = stiffened(one.body.condensed.compliance / factor, one.inclusions.bar_stiffness)
-        rows = np.zeros_like(one.system.reading_rows)
-        rows[:, active] = changed[len(active) : len(active) + readings, : len(active)]
-        rows[len(rows) - len(model.gauges) - len(model.taxels) : len(rows) - len(model.gauges)] *= factor  # of forces
-        finger = scatter_to_points(changed, active, c, d)
-        both = [under_pressure(one.surface, compliance) for compliance in (finger, of_object)]
-        share = None if one.system.object_share is None else object_share(*both)
-        system = replace(one.system, delassus=finger + of_object, reading_rows=rows, object_share=share)
-        return replace(one, system=system)
-
-    changed, bare = scaled(problem), problem.without_inclusions
-    return replace(changed, without_inclusions=scaled(bare)) if bare else changed
-
-
-def _stiffer(material: Material, factor: float) -> Isotropic:
-    isotropic = material.isotropic("the tolerance of E_MPa")
-    return replace(isotropic, E_MPa=isotropic.E_MPa * factor)
-
-
-def with_plane(problem: Problem, plane: Plane) -> Problem:
-    """Return the problem under another plane; under a rigid one its body is kept."""
-    model, bare = replace(problem.model, object=plane), problem.without_inclusions
-    if model.object_compliance is not None:
-        return build(model)
-    touch = model.first_contact
-    system = replace(problem.system, first_contact_mm=touch.first_contact_mm, place_mm=touch.place)
-    return replace(problem, model=model, system=system, without_inclusions=with_plane(bare, plane) if bare else None)
+    parts = tuple((label, times_modulus(material, factor)) for label, material in model.parts)
+    return changed(problem, replace(model, material=times_modulus(model.material, factor), parts=parts))
 
 
 def tilted_mesh(problem: Problem) -> MeshOptions:

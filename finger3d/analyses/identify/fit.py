@@ -2,8 +2,7 @@
 
 Values are fitted as shares of their range, on a logarithmic scale where the bounds differ by more than a decade.
 
-Each step solves the linear least-squares problem within the bounds and a box around the values.  Of several first
-values the fit takes those from which such a step would leave the least sum of squares.
+Each step solves the linear least-squares problem within the bounds and a box around the values.
 """
 
 from __future__ import annotations
@@ -76,29 +75,44 @@ def fit(
     start: Float,
     residuals: Residuals,
     announce: Callable[[Float], None],
+    free: Sequence[int] = (),
 ) -> Float:
     """Return the shares (k,) with the least sum of squared residuals, from those of `start`.
 
     Each step is the solution of the linear problem within the bounds and within a box, which shrinks where the sum of
     squares falls less than foretold: where all of the contact sticks nothing tells friction, so that a fit does not
-    return from there.  `announce` is called with the values of each iteration.
+    return from there.  The derivatives follow the steps by Broyden's update, and are taken anew where a step gains less
+    than foretold.  `announce` is called with the values of each iteration.
+
+    Parameters
+    ----------
+    free : numbers of the shares whose derivatives need no press, and are taken anew in every step
     """
-    shares, box = np.clip(start, 0.0, 1.0), FIRST_BOX
-    now = residuals(values_at(scales, shares))
+    shares, box, is_new = np.clip(start, 0.0, 1.0), FIRST_BOX, True
+    now, derivative = residuals(values_at(scales, shares)), jacobian(scales, shares, residuals)
     for _ in range(_MOST):
         announce(values_at(scales, shares))
-        derivative, cost, gain = jacobian(scales, shares, residuals), float(now @ now), -1.0
-        while gain < LEAST_GAIN:
-            step, left = _step(derivative, now, shares, box)
-            if box < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
+        cost, gain = float(now @ now), -1.0
+        step, left = _step(derivative, now, shares, box)
+        if box < _SHARE_CHANGE or cost - left <= _COST_CHANGE * (1.0 + left):
+            if is_new:
                 return shares
-            try:
-                after = residuals(values_at(scales, shares + step))
-            except Finger3dError:
-                after = np.full(len(now), np.inf)
-            gain = (cost - float(after @ after)) / (cost - left)
-            box = next_box(box, float(np.abs(step).max()), gain)
-        shares, now = shares + step, after
+            derivative, is_new = jacobian(scales, shares, residuals), True
+            continue
+        try:
+            after = residuals(values_at(scales, shares + step))
+        except Finger3dError:
+            after = np.full(len(now), np.inf)
+        gain = (cost - float(after @ after)) / (cost - left)
+        if gain < LEAST_GAIN:
+            box = next_box(box, float(np.abs(step).max()), gain) if is_new else box
+            derivative, is_new = (derivative if is_new else jacobian(scales, shares, residuals)), True
+            continue
+        box = next_box(box, float(np.abs(step).max()), gain)
+        derivative = derivative + np.outer(after - now - derivative @ step, step) / float(step @ step)
+        shares, now, is_new = shares + step, after, False
+        if free:
+            derivative[:, free] = jacobian(scales, shares, residuals, free)
     return shares
 
 
@@ -119,25 +133,20 @@ def values_at(scales: Sequence[Scale], shares: Float) -> Float:
     return np.array([scale.value(float(share)) for scale, share in zip(scales, shares, strict=True)])
 
 
-def foretold(scales: Sequence[Scale], shares: Float, residuals: Residuals) -> float:
-    """Return the sum of squares after a step from `shares`, by the derivatives there."""
-    now = residuals(values_at(scales, shares))
-    return _step(jacobian(scales, shares, residuals), now, shares)[1]
-
-
-def jacobian(scales: Sequence[Scale], shares: Float, residuals: Residuals, without: int | None = None) -> Float:
+def jacobian(
+    scales: Sequence[Scale], shares: Float, residuals: Residuals, wanted: Sequence[int] | None = None
+) -> Float:
     """Return the derivatives (n, k) of residuals by shares, as differences to the side with more room.
 
     Parameters
     ----------
-    without : number of a share whose derivatives are left out: (n, k - 1)
+    wanted : numbers of the shares; all unless given
     """
     now, columns = residuals(values_at(scales, shares)), []
-    for i in range(len(scales)):
-        if i != without:
-            step = _STEP if shares[i] <= 0.5 else -_STEP
-            other = residuals(values_at(scales, shares + step * (np.arange(len(scales)) == i)))
-            columns.append((other - now) / step)
+    for i in range(len(scales)) if wanted is None else wanted:
+        step = _STEP if shares[i] <= 0.5 else -_STEP
+        other = residuals(values_at(scales, shares + step * (np.arange(len(scales)) == i)))
+        columns.append((other - now) / step)
     return np.array(columns).reshape(-1, len(now)).T
 
 

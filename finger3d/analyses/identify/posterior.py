@@ -36,7 +36,7 @@ the fitted one, in standard deviations."""
 _APART = 1e-3
 """Least distance of coefficients that are pressed, in shares."""
 
-_ROUNDS, _STILL, _NEGLIGIBLE = 3, 0.02, 1e-4
+_ROUNDS, _STILL, _NEGLIGIBLE = 3, 0.05, 1e-2
 """Largest number of times that presses follow the other values; change of a share, and part of the largest likelihood,
 below which they need not."""
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import interp1d
 from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
-from finger3d.analyses.identify.fit import Scale, fit, foretold, jacobian, misfit_text, values_at
+from finger3d.analyses.identify.fit import Scale, fit, jacobian, misfit_text, values_at
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, Mixture, along_friction, fitted_values, normal
 from finger3d.analyses.identify.simulated import (
@@ -224,9 +226,15 @@ class _Misfit:
     def residuals(self, values: Float) -> Float:
         return self.of_curve(self.simulation.at(values, self.data))
 
-    def jacobian(self, shares: Float, without: int | None = None) -> Float:
-        """Return the derivatives by shares, without those by one of them."""
-        return jacobian(self.scales, shares, self.residuals, without)
+    def jacobian(self, shares: Float, wanted: Sequence[int] | None = None) -> Float:
+        """Return the derivatives by shares, by some of them if these are given."""
+        return jacobian(self.scales, shares, self.residuals, wanted)
+
+    @cached_property
+    def without_press(self) -> list[int]:
+        """Numbers of the shares whose change needs no press."""
+        scales = self.simulation.scales_with_modulus
+        return [i for i, f in enumerate(self.simulation.free) if f.key == OFFSET or (f.key in MODULI and scales)]
 
     def fit(self, shares: Float) -> Float:
         """Return the shares with the least sum of squares, from those given."""
@@ -235,7 +243,7 @@ class _Misfit:
             named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.simulation.free, values, strict=True))
             self.report.stage(f"fitting, {self.simulation.solved} presses: {named}")
 
-        return fit(self.scales, shares, self.residuals, announce)
+        return fit(self.scales, shares, self.residuals, announce, self.without_press)
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
@@ -296,9 +304,7 @@ def _first(misfit: _Misfit, start: Float) -> Float:
     _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
     least = [int(np.argmin([np.sum(misfit.of_curve(curve) ** 2) for curve in some])) for some in curves]
     best = [trials[number] for trials, number in zip(tried, least, strict=True)]
-    if len(best) == 1:
-        return best[0]
-    return min(best, key=lambda shares: foretold(scales, shares, misfit.residuals))
+    return min(best, key=lambda shares: float(np.sum(misfit.residuals(values_at(scales, shares)) ** 2)))
 
 
 def _friction(free: Sequence[FreeKey]) -> int | None:
@@ -313,20 +319,45 @@ def _likelihood(misfit: _Misfit, start: Float) -> tuple[Float, Mixture, Float]:
     """
     friction = _friction(misfit.simulation.free)
 
-    def press(shares: Float) -> tuple[Float, Float]:
-        return misfit.residuals(values_at(misfit.scales, shares)), misfit.jacobian(shares, friction)
-
     for _ in range(_FITS):
         shares = misfit.fit(start)
         derivative = misfit.jacobian(shares)
         if friction is None:
             return shares, normal(shares, derivative), derivative
         misfit.report.stage("likelihood of friction")
-        mixture = along_friction(shares, derivative, friction, press)
+        mixture = along_friction(shares, derivative, friction, _press_along(misfit, shares, friction))
         start = mixture.shares[np.argmax(mixture.density)]
         if np.interp(shares[friction], mixture.shares[:, friction], mixture.density) > _AS_LIKELY:
             break
     return shares, mixture, derivative
+
+
+def _press_along(misfit: _Misfit, shares: Float, friction: int) -> Callable[[Float], tuple[Float, Float]]:
+    """Return the function that `along_friction` presses with.
+
+    Derivatives that need presses change little along friction: they are interpolated between its bounds and the values
+    that were found.
+    """
+    scales, others = misfit.scales, [i for i in range(len(shares)) if i != friction]
+    pressed = [i for i in others if i not in misfit.without_press]
+    known: list[tuple[float, Float]] = []
+    for place in np.unique([0.0, shares[friction], 1.0]) if pressed else ():
+        with suppress(Finger3dError):  # a press that fails leaves the others
+            at = np.where(np.arange(len(shares)) == friction, place, shares)
+            known.append((float(place), misfit.jacobian(at, pressed)))
+
+    def press(at: Float) -> tuple[Float, Float]:
+        residual = misfit.residuals(values_at(scales, at))
+        slope = np.empty((len(residual), len(shares)))
+        slope[:, misfit.without_press] = misfit.jacobian(at, misfit.without_press)
+        if pressed:
+            places, columns = zip(*known, strict=True)
+            slope[:, pressed] = interp1d(places, np.array(columns), axis=0)(
+                np.clip(at[friction], places[0], places[-1])
+            )
+        return residual, slope[:, others]
+
+    return press
 
 
 def _check_columns(

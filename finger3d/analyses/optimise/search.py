@@ -45,16 +45,11 @@ class _PressedDesign:
     outcome: str = "converged"
 
 
-def _gauges_need_own_press(model: Model) -> bool:
-    """Return whether a displaced gauge needs a press of its own."""
-    return model.inclusions is not None or model.finite_strain
-
-
 class _DesignBody(PressedBody):
     """Body of a design, built once and pressed with several values of mu."""
 
     def __init__(self, model: Model, report: Progress) -> None:
-        self._own_press = _gauges_need_own_press(model)
+        self._own_press = model.inclusions is not None  # a gauge that stiffens the body
         super().__init__(model if self._own_press else replace(model, gauges=()), report)
 
     def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
@@ -64,6 +59,9 @@ class _DesignBody(PressedBody):
         mesh, axes = self.problem.mesh, self.problem.axes  # all that is kept of the body
         fields = formulation_of(self.problem.model).unknowns(self.problem, [end.meshed_state for end in ends])
         u = np.array([x[: mesh.points.size] for x in fields])
+        if self.problem.model.finite_strain:
+            body, none = self.problem.meshed_body, np.zeros((0, mesh.dim))
+            return lambda g: np.array([float(g.at_finite_strain(body, x.reshape(-1, mesh.dim), none)[0]) for x in u])
         return lambda g: np.asarray(g.row(mesh, axes)[:, : mesh.points.size] @ u.T).ravel()
 
     def strain(self, gauge: Gauge, mus: Sequence[float], legs: tuple[Leg, ...]) -> Float:
@@ -123,7 +121,7 @@ class Search:
     def _press(self, scene: Scene) -> _PressedDesign:
         key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
         model = scene.model()
-        if _gauges_need_own_press(model):
+        if model.inclusions is not None:
             key += repr(model.gauges)
         if key not in self._stored:
             while len(self._stored) >= _MAX_STORED:
