@@ -64,7 +64,7 @@ class Judged(NamedTuple):
 
 def drawn(sections: int, large: int, solids: int, seed: int) -> Iterator[tuple[str, Scene]]:
     """Names and scenes, those at large deformation after the other sections."""
-    for number, (name, scene) in enumerate(scenes(sections + large, solids, seed)):
+    for number, (name, scene) in enumerate(scenes(sections + large, solids, seed, longer=1.0)):
         is_large = sections <= number < sections + large
         tables: Tree = {key: value for key, value in scene.as_dict().items() if key != "effects"}
         effects: Tree = {"auto": False, **({"large_deformation": {}} if is_large else {})}

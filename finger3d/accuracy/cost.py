@@ -27,6 +27,7 @@ from finger3d._cost import (
 )
 from finger3d._types import Tree
 from finger3d.mechanics.discretise.build import WHOLE_FACE, candidate_points, poses
+from finger3d.mechanics.discretise.companions import LEAST_IN_SOLID
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.gauge_refinement import face_near_gauge, locally_refined
 from finger3d.mechanics.discretise.problem import free_surface
@@ -46,9 +47,9 @@ _LATTICE = 100
 """Places along each side of a part at which the contact face of an unstructured mesh is counted."""
 
 _LEAST_BARS_S = 0.5
-_COMPANIONS, _BESIDE = 0.6, 0.45
+_COMPANIONS, _BESIDE, _FINER = 0.6, 0.45, 3.5
 """Seconds of the error bars of any press, and others over those of the press.  The companions have 0.35, 0.13 and 0.02
-of its unknowns in solids; at large deformation they are pressed beside it."""
+of its unknowns in solids; at large deformation they are pressed beside it.  The finer one of a coarse solid has 2.9."""
 
 _SOLUTIONS = 5
 """Contact solutions of an increment in small strain under an object that is not flat, whose normals change.
@@ -149,7 +150,7 @@ def forecast(model: Model, bars: bool = False) -> Tree:
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
     if bars:
         added = sum(cost.seconds for cost in costs.values())
-        seconds = seconds | {"error_bars": _error_bars_s(model, seconds, added)}
+        seconds = seconds | {"error_bars": _error_bars_s(model, size, seconds, added)}
     memory = 1e3 * size.press_gb(len(model.gauges))
     memory += CAD_MB * _is_meshed_by_tetwild(model) + _states_mb(model, press, axes)
     check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
@@ -171,12 +172,13 @@ def forecast(model: Model, bars: bool = False) -> Tree:
     }
 
 
-def _error_bars_s(model: Model, seconds: dict[str, float], added_s: float) -> float:
+def _error_bars_s(model: Model, size: PressSize, seconds: dict[str, float], added_s: float) -> float:
     """Return the seconds of the error bars of a press from those of its stages, and of its effects."""
     solving = sum(seconds[stage] for stage in ("assembly", "condensation", "contact"))
+    more = _FINER if size.dim == 3 and size.dofs < LEAST_IN_SOLID else 0.0
     if model.finite_strain:
-        return _LEAST_BARS_S + _BESIDE * (solving + added_s)
-    return _LEAST_BARS_S + _COMPANIONS * solving + max(JUDGEMENT_S, JUDGEMENT_SHARE * solving)
+        return _LEAST_BARS_S + (_BESIDE + more) * (solving + added_s)
+    return _LEAST_BARS_S + (_COMPANIONS + more) * solving + max(JUDGEMENT_S, JUDGEMENT_SHARE * solving)
 
 
 def without_output_s(expected: Tree) -> float:

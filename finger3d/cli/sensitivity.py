@@ -65,4 +65,4 @@ def sensitivity(
 
 
 def _effect(value: float, error: float) -> str:
-    return "" if value != value else with_error(value, error)
+    return "" if value != value else with_error(value, error, sign="+-")

@@ -31,7 +31,7 @@ def draw(path: Path, title: str, numbers: Mapping[str, float], table: Sequence[T
         rows = [row for row in table if row["number"] == name][:count]
         largest = max(_size(row) for row in rows)
         shown = [row for row in rows if _size(row) > _LEAST * largest]
-        for way, sign, offset, colour in (("falling", "less", -0.2, _FALLS), ("growing", "more", 0.2, _GROWS)):
+        for way, sign, offset, colour in (("falling", "less", -0.2, _FALLS), ("growing", "plus", 0.2, _GROWS)):
             errors = np.nan_to_num([row[f"{way}_error"] for row in shown])
             places = np.arange(len(shown)) + offset
             values = np.nan_to_num([row[way] for row in shown])
