@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -160,22 +159,6 @@ def test_an_exact_path_is_foretold_with_one_run() -> None:
     told = forecast(replace(baseline("plane-strain"), legs=(Leg(10.0, steps="auto"),)))
     assert told["steps"] == 10
     assert "steps_of_all_runs" not in told
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-def test_large_deformation_takes_what_was_foretold(domain: Domain) -> None:
-    # processor time of this process; the forecast is meant to hold within a factor 2 either way
-    plain = baseline(domain)
-    large = effect_type("large_deformation")().apply(plain)
-    took = []
-    for model in (plain, large):
-        begin = time.process_time()
-        problem = build(model)
-        list(march(problem))
-        took.append(time.process_time() - begin)
-    foretold = forecast(large)["total_s"] - forecast(plain)["total_s"]
-    assert 0.5 < (took[1] - took[0]) / foretold < 2.0
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])

@@ -19,7 +19,7 @@ SLOW = (
     "meshers", "readings_within_tolerances", "friction_in_3d", "scaling", "advice_against_truth", "cost_of_accuracy",
     "hertz_line", "bonded_layer", "fig14_measured", "wide_finger_claims", "gelsight_mini", "effects_by_need",
     "cost_forecast", "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does",
-    "default_bars", "identify_z_scores", "increment_orders", "truth_cube", "random_presses",
+    "default_bars", "identify_z_scores", "increment_orders", "truth_cube", "random_presses", "effects_of_keys",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.accuracy.error_bars import with_error
 from finger3d.cli.common import Json, Set, app, check_writable, job, print_columns, print_json
 from finger3d.cli.tolerances import parsed_tolerances
 
@@ -65,4 +64,6 @@ def sensitivity(
 
 
 def _effect(value: float, error: float) -> str:
+    from finger3d.accuracy.error_bars import with_error
+
     return "" if value != value else with_error(value, error, sign="+-")

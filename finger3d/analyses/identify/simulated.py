@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -212,7 +213,8 @@ class Simulation:
         for problem in (body.problem for body in self._bodies.values()):
             own = replace(problem.model, material=model.material, parts=model.parts, friction=model.friction)
             if own == model:
-                return changed(problem, model)
+                with suppress(Finger3dError):  # where it needs other elements
+                    return changed(problem, model)
         return None
 
     def _solve(self, point: tuple[float, ...]) -> Tree:
