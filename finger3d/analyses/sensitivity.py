@@ -37,7 +37,7 @@ _SKIPPED = ("title", "mesh", "contact", "marker_grid", "effects.auto")
 """Tables and keys that say how a press is computed, not what is pressed."""
 
 _PERCENT = 0.01
-"""Relative change of a key without a tolerance; of the finger's height or of a radian for places and angles at zero."""
+"""Relative change of a key without a tolerance."""
 
 _STIFFNESS = "material.E_MPa"
 """Key that forces may be proportional to."""
@@ -204,7 +204,7 @@ def changes_of(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dic
         return replace(model, mesh=own.mesh, legs=with_increments_of(model.legs, count), warnings=own.warnings)
 
     def change(key: str, value: float) -> Change:
-        step = wanted.get(key) or _tolerance(key, value) or _PERCENT * (abs(value) or _natural(key, own))
+        step = wanted.get(key) or _tolerance(key, value) or _PERCENT * abs(value)
         return Change(value, step, (at(key, value - step), at(key, value + step)))
 
     told = {key: value for key, value in values.items() if value or key in wanted}
@@ -354,13 +354,6 @@ def _tolerance(key: str, value: float) -> float | None:
         return TOLERANCES["E_percent"][0] / 100.0 * value
     name = GAUGE_PLACES.get(last, last) if table == "gauge" else last
     return TOLERANCES[name][0] if name in TOLERANCES and table != "marker" else None
-
-
-def _natural(key: str, model: Model) -> float:
-    """Return what a key at zero is changed relative to, in its unit."""
-    if key.endswith("_mm"):
-        return model.design.height_mm
-    return math.degrees(1.0) if key.endswith("_deg") else 1.0
 
 
 def _write(out: Path, found: Sensitivity) -> None:
