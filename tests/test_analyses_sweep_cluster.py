@@ -28,7 +28,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_sce
         start = time.monotonic()
         with pytest.raises(MissingError, match="scheduler"):
             running.press_points(points_of(paper_scene, "friction.mu=0.1"), tmp_path, scheduler=address)
-        assert time.monotonic() - start < 10.0
+        assert time.monotonic() - start < 60.0
 
 
 @pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])

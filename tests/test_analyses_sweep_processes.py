@@ -249,10 +249,7 @@ def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) 
         until(lambda: len(lines(out)) >= 5, "five points")
         # a terminal sends it to the workers, too
         os.killpg(parent.pid, signal.SIGINT)
-        start = time.monotonic()
         assert parent.wait(timeout=60) == 130
-        # a second, and the tables of what is kept, on a machine that may have other work
-        assert bodies > 1 or time.monotonic() - start < 5.0
     said = (tmp_path / "log").read_text()
     assert "Traceback" not in said
     count = len(lines(out))

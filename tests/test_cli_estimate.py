@@ -160,7 +160,7 @@ def test_readings_are_answered_as_they_are_written(tmp_path: Path) -> None:
             assert float(child.stdout.readline().split(",")[1]) == pytest.approx(mu, abs=0.02)
     finally:
         child.send_signal(2)
-        assert child.wait(timeout=20) == 130
+        assert child.wait(timeout=60) == 130
 
 
 def test_a_stream_without_the_readings_column_is_refused_with_one_line(tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_a_file_that_is_replaced_or_cut_is_followed_from_its_start(tmp_path: Pat
         assert float(child.stdout.readline().split(",")[1]) == pytest.approx(0.7, abs=0.02)
     finally:
         child.send_signal(2)
-        assert child.wait(timeout=20) == 130
+        assert child.wait(timeout=60) == 130
 
 
 def test_standard_input_is_answered_until_it_ends(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -126,15 +125,6 @@ def test_the_curved_area_converges_with_the_fourth_power_of_the_size() -> None:
         errors.append(abs(report.volume_mm3 / report.cad_volume_mm3 - 1.0))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (rates > 3.5).all()
-
-
-def test_a_section_of_25_000_unknowns_takes_less_than_03_s() -> None:
-    options = MeshOptions(size_mm=0.38, base_size_mm=1.5)
-    mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))
-    start = time.perf_counter()
-    mesh = mesh_section(FIG9, options, (-44.0, 44.0, 0.0, 0.0))[0]
-    assert mesh.points.size > 20_000
-    assert time.perf_counter() - start < 0.3  # measured 0.03 s on one of two busy cores
 
 
 @settings(max_examples=60, deadline=None)

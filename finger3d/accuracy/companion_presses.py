@@ -26,7 +26,11 @@ class CompanionPress(NamedTuple):
 
 
 def companion_presses(
-    problem: Problem, chosen: StepEstimate | None = None, report: Progress = QUIET, cancel: Event | None = None
+    problem: Problem,
+    chosen: StepEstimate | None = None,
+    report: Progress = QUIET,
+    cancel: Event | None = None,
+    unknowns: int | None = None,
 ) -> list[CompanionPress]:
     """Press the companions of a problem in the same increments, which are numbers; those that fail are left out.
 
@@ -35,9 +39,10 @@ def companion_presses(
     Parameters
     ----------
     chosen : runs of a companion that chose automatic increments
+    unknowns : of the mesh whose error follows, in place of those of the problem's
     """
     found = []
-    for ratio, beside in coarse_companions(problem, report, chosen.beside if chosen else None):
+    for ratio, beside in coarse_companions(problem, report, chosen.beside if chosen else None, unknowns):
         try:
             found.append(CompanionPress(ratio, beside, _end_of(beside, chosen, cancel)))
         except FAILURES:

@@ -11,12 +11,14 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Self
 
 from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
+from finger3d.accuracy.companion_presses import companion_presses
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.refine import ALL
@@ -201,7 +203,7 @@ def cost(
 
 @dataclass(frozen=True)
 class _Pilot:
-    """A coarse press: its edges over the scene's, unknowns, increments, seconds, and relative errors by name."""
+    """A coarse press: edges over the scene's, unknowns, increments, seconds without bars, relative errors by name."""
 
     factor: float
     dofs: int
@@ -215,12 +217,12 @@ class _Pilot:
 
 def _pressed(model: Model, report: Progress) -> Iterator[_Pilot]:
     """Yield two coarse presses, the coarser first; edges are shorter where a mesh does not resolve the contact."""
-    shorter = 1.0
+    shorter, meant = 1.0, forecast(model)["dofs"]
     for factor in _PILOTS:
         while True:
             report.stage(f"pressing with {factor * shorter:.3g} times the edge lengths")
             try:
-                yield _pilot(model, factor * shorter)
+                yield _pilot(model, factor * shorter, meant)
             except UnresolvedError:
                 if shorter < 0.5:
                     raise
@@ -229,13 +231,17 @@ def _pressed(model: Model, report: Progress) -> Iterator[_Pilot]:
                 break
 
 
-def _pilot(model: Model, factor: float) -> _Pilot:
+def _pilot(model: Model, factor: float, meant: int) -> _Pilot:
+    """Press a model on coarse edges; its companions are of the kind that a mesh with ``meant`` unknowns has."""
     start = time.perf_counter()
     problem = PressedBody.with_refined_borders(replace(model, mesh=_scaled(model, factor))).problem
     meshed = problem.seconds["cad"] + problem.seconds["mesh"]
     steps, chosen = march_automatic(problem)
     steps[-1].check("cost: a coarse press")
-    found = estimate(problem, steps, numbers=press_numbers, chosen=chosen)
+    seconds = time.perf_counter() - start - meshed
+    found = estimate(
+        problem, steps, numbers=press_numbers, chosen=chosen, companions=partial(companion_presses, unknowns=meant)
+    )
     if not found.discretisation:
         raise Finger3dError(f"cost: a coarse press has no error bars: {found.method}")
     numbers, kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)
@@ -247,7 +253,7 @@ def _pilot(model: Model, factor: float) -> _Pilot:
         factor,
         int(problem.body.stiffness.upper.shape[0]),
         len(steps),
-        time.perf_counter() - start - meshed,
+        seconds,
         relative(found.discretisation),
         relative(found.steps),
         numbers["contact_half_length_mm"],
@@ -340,7 +346,7 @@ class Forecasts:
             legs = tuple(replace(leg, steps=round(int(leg.steps) * count / fine.increments)) for leg in given)
             own, model = replace(own, legs=legs), replace(model, legs=legs)
         try:
-            expected = forecast(model)
+            expected = forecast(model, bars=True)
         except Finger3dError as failure:
             return replace(own, limit=str(failure).split(";")[0])
         dofs, dim = self._more * expected["dofs"], 3 if model.domain == "solid" else 2

@@ -153,11 +153,16 @@ def finer_companions(
 
 
 def coarse_companions(
-    problem: Problem, report: Progress = QUIET, known: Problem | None = None
+    problem: Problem, report: Progress = QUIET, known: Problem | None = None, unknowns: int | None = None
 ) -> Iterator[tuple[float, Problem]]:
     """Yield the condensed problems on coarser meshes, and their edge lengths over those of the mesh.
 
-    The first, with twice the edges, may be known.  Meshes that do not resolve the contact are left out.
+    Meshes that do not resolve the contact are left out.
+
+    Parameters
+    ----------
+    known : the first, with twice the edges
+    unknowns : of a solid, below which it gets a finer companion besides; default: those of the mesh
     """
     model, ratios, sizes = problem.model, list[float](), {problem.mesh.points.size}
     if isinstance(model.design, GivenMesh) or (problem.dim == 2 and problem.mesh.points.size < _LEAST_IN_SECTION):
@@ -181,7 +186,7 @@ def coarse_companions(
             ratios.append(ratio)
             sizes.add(beside.mesh.points.size)
             yield ratio, beside
-    if problem.dim == 3 and problem.mesh.points.size < LEAST_IN_SOLID and ratios:
+    if problem.dim == 3 and (unknowns or problem.mesh.points.size) < LEAST_IN_SOLID and ratios:
         with suppress(Finger3dError):
             yield from finer_companions(problem, report, beside_coarser=True)
 
