@@ -90,9 +90,6 @@ class Outcome(Enum):
         "the object does not rest under the prescribed tangential force; prescribe its slide, more friction, or a "
         "larger normal force"
     )
-    EVENTS = (
-        "points change between open, stick and slip without end; try a finer mesh, or a smaller friction coefficient"
-    )
     INDEFINITE = "the compliance is not positive: the body is not held; fix its base, or check the mesh"
     PASSED_THROUGH = (
         "the object would pass through the finger's surface within an increment, or the surface through it; the "

@@ -155,12 +155,6 @@ def test_automatic_increments_are_foretold_with_all_the_runs_that_choose_them() 
     assert "steps_of_all_runs" not in forecast(large)
 
 
-def test_an_exact_path_is_foretold_with_one_run() -> None:
-    told = forecast(replace(baseline("plane-strain"), legs=(Leg(10.0, steps="auto"),)))
-    assert told["steps"] == 10
-    assert "steps_of_all_runs" not in told
-
-
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
 def test_a_mesh_that_needs_no_mesher_is_counted_exactly(domain: Domain) -> None:
     """Parts that meet count the pressures of their interface twice, and candidates lie beyond the overlap."""

@@ -48,9 +48,7 @@ def test_effects_the_scene_names_are_in_the_curve() -> None:
 def test_a_fast_viscous_press_reads_the_instantaneous_body_and_a_slow_one_the_relaxed(
     bulk: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # elastic presses are solved in the increments of viscous ones, and not cut where contact begins
-    for place in ("march.solve", "small_strain.exact_path"):
-        monkeypatch.setattr(f"finger3d.mechanics.{place}.has_exact_path", lambda model: False)
+    # elastic presses are not cut where contact begins, as viscous ones are not
     monkeypatch.setattr(Press, "moves_to", lambda press, pose: (Move(press.pose, pose),))
 
     def viscous(duration_s: float) -> Calibration:

@@ -41,16 +41,6 @@ def test_a_scene_without_steps_is_automatic(tmp_path: Path) -> None:
     assert len(summary["steps"]) == summary["step_estimate"]["steps"] >= 20
 
 
-def test_a_section_along_its_exact_path_writes_ten_results_and_has_no_error_of_increments(tmp_path: Path) -> None:
-    scene = written(tmp_path, changed(SECTION, steps="auto"))
-    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert len(summary["steps"]) == 10
-    assert summary["step_estimate"] is None
-    assert set(summary["error_estimate"]["steps"].values()) == {0.0}
-    assert summary["error_estimate"]["method"].endswith("steps: exact")
-
-
 def test_the_papers_rule_takes_a_fixed_number_of_increments(tmp_path: Path) -> None:
     scene = written(tmp_path, changed(SECTION, steps="auto"))
     keys = ["--set", "contact.rule=paper", "--set", "friction.mu=0.05", "--no-figures", "--no-error"]

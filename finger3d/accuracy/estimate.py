@@ -35,7 +35,6 @@ from finger3d.mechanics.march.step_halving import (
 from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, Column, by_key, in_space
 from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 
@@ -190,8 +189,6 @@ def _of_increments(
     mesh : a press that costs less, or None, what it differs in, in words, and its numbers if they are known
     chosen : runs that chose automatic increments
     """
-    if has_exact_path(own.model):
-        return dict.fromkeys(numbers(own, steps[-1]), 0.0), "exact"
     if chosen:
         runs = [(count, numbers(chosen.beside or own, results[-1])) for count, results in chosen.runs]
         *fewer, most = (str(count) for count, _ in runs)

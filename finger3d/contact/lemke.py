@@ -17,9 +17,6 @@ from finger3d.contact.friction import OPEN, SLIP, STICK
 
 _PIVOT = 1e-11
 
-_LARGEST_RATES = 1200
-"""Largest number of rows of the tableau of `rates_start`."""
-
 
 def directions(tangents: int, facets: int = 8) -> Float:
     """Unit directions (k, d - 1) that span the tangent plane: two in 2D, a regular polygon in 3D."""
@@ -103,62 +100,4 @@ def friction_start(
     status[points] = np.where(touching, np.where(slipping, SLIP, STICK), OPEN)
     direction = np.zeros((c, d - 1))
     direction[points] = tangent
-    return status, direction
-
-
-def rates_start(
-    problem: ContactProblem,
-    rate: Float,
-    points: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
-    sign: Float,
-    bordered: tuple[Float, float, Float] | None = None,
-) -> tuple[NDArray[np.int8], Float] | None:
-    """Return status (c,) and direction of friction (c,) that the rates of forces have in a section, or None.
-
-    Parameters
-    ----------
-    rate : (c, 2) mm, of the free motion
-    points : (c,) each
-        Points that stick, points at their friction limit, which stick or slip, and points without gap and force.
-    sign : (c,), direction of friction of points at their limit
-    bordered : (c, 2) weights, rate in N and (c, 2) motion in mm, of a resultant that is prescribed
-    """
-    stick, at_limit, at_apex = points
-    c, mu, w, q = len(sign), problem.friction, problem.delassus, rate.ravel()
-    apex, limit = np.flatnonzero(at_apex), np.flatnonzero(at_limit)
-    unit = np.eye(2 * c).reshape(c, 2, 2 * c)  # [point, direction] -> force of size 1
-    n, t = unit[:, 0], unit[:, 1]
-    bilateral = np.concatenate([n[stick], t[stick], (n + (sign * mu)[:, None] * t)[limit]])
-    zero = np.concatenate([n[stick], t[stick], n[limit]])  # displacements that vanish
-    forces = np.concatenate([-sign[limit, None] * t[limit], n[apex], t[apex], -t[apex]])
-    f, k, b = len(forces), len(apex), len(bilateral)
-    m = f + k
-    if m > _LARGEST_RATES:
-        return None
-    equations, right = zero @ w @ bilateral.T, zero @ np.column_stack([w @ forces.T, q])
-    into = forces @ np.column_stack([w @ bilateral.T, w @ forces.T, q])
-    if bordered is not None:
-        weights, change, motion = bordered[0].ravel(), bordered[1], bordered[2].ravel()
-        equations = np.block([[equations, (zero @ motion)[:, None]], [weights @ bilateral.T, np.zeros(1)]])
-        right = np.vstack([right, [*(weights @ forces.T), -change]])
-        into = np.column_stack([into[:, :b], forces @ motion, into[:, b:]])
-        b += 1
-    try:
-        reduced = into[:, b:] - into[:, :b] @ np.linalg.solve(equations, right)
-    except np.linalg.LinAlgError:
-        return None
-    matrix, load = np.zeros((m, m)), np.zeros(m)
-    matrix[:f, :f], load[:f] = reduced[:, :-1], reduced[:, -1]
-    normals, towards, away = (slice(f - (3 - i) * k, f - (2 - i) * k) for i in range(3))
-    matrix[towards, f:] = matrix[away, f:] = np.eye(k)
-    matrix[f:, normals], matrix[f:, towards], matrix[f:, away] = np.diag(mu[apex]), -np.eye(k), -np.eye(k)
-    matrix[:f, :f] /= np.abs(matrix[:f, :f]).max(initial=0.0) or 1.0
-    z = lemke(matrix, load / (np.abs(load).max(initial=0.0) or 1.0), 20 * m)
-    if z is None:
-        return None
-    status, direction = np.full(c, OPEN, dtype=np.int8), sign.copy()
-    status[stick] = STICK
-    status[limit] = np.where(z[: len(limit)] > 0.0, STICK, SLIP)
-    status[apex] = np.where(z[normals] > 0.0, np.where(z[f:] > 0.0, SLIP, STICK), OPEN)
-    direction[apex] = np.sign(z[towards] - z[away])
     return status, direction

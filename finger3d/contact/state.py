@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Generic, NamedTuple, TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,20 +75,6 @@ class ContactState:
             raise ValueError("the directions of the points are not known")
         return self.bases
 
-    def towards(self, other: ContactState, t: float) -> ContactState:
-        """Return the state at the share t of a straight way to another state, which has its status."""
-
-        def mean(one: Float, two: Float) -> Float:
-            return one + t * (two - one)
-
-        return replace(
-            other,
-            force=mean(self.force, other.force),
-            gap=mean(self.gap, other.gap),
-            tangential_displacement=mean(self.tangential_displacement, other.tangential_displacement),
-            accumulated_slip=mean(self.accumulated_slip, other.accumulated_slip),
-        )
-
     def of_points(self, points: NDArray[np.intp]) -> ContactState:
         """Return the state of some points (k,)."""
         return ContactState(
@@ -134,27 +120,6 @@ class ContactSolution(Generic[S]):
     def with_state(self, state: T) -> ContactSolution[T]:
         """Return the solution with another state, such as that of contact and body."""
         return ContactSolution(state, self.outcome, self.residual, self.iterations, self.method, self.detail)
-
-
-class Event(NamedTuple):
-    """Event on a path in two dimensions, followed exactly.
-
-    Attributes
-    ----------
-    share : of the path
-    amplitude : of the motion under a prescribed resultant
-    state : at the event; the status of a point is the one on the way from the event before
-    residual : largest violation of the contact conditions since the event before, dimensionless
-    systems : number of systems of equations that were solved on the path so far
-    is_increment : whether an increment led here from the event before, in which forces jump
-    """
-
-    share: float
-    amplitude: float
-    state: ContactState
-    residual: float
-    systems: int
-    is_increment: bool = False
 
 
 def pressure(force: Float, area: Float | None) -> Float:

@@ -26,7 +26,6 @@ from finger3d.io import claimed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import (
@@ -266,5 +265,5 @@ def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:
         "mesh_hash": problem.body.report.hash,
         "factorizations": curve.factorizations,
         "versions": versions(),
-        **({} if has_exact_path(problem.model) else {"increments": curve.increments.as_dict()}),
+        "increments": curve.increments.as_dict(),
     }

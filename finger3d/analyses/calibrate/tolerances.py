@@ -35,7 +35,6 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
@@ -163,8 +162,6 @@ def evaluate_tolerances(
         if name == "mesh":
             effects = [(sd, sd * _mesh_errors(body, coarse, readings))] if coarse else []
         elif name == "increments":
-            if has_exact_path(problem.model):
-                continue
             error = error_of_increments(problem, own, increments.chosen, lambda other: read(other, names, mu))
             effects = [(sd, sd * error)]
         elif name in GAUGE_PLACES.values() and not problem.model.inclusions:

@@ -26,7 +26,6 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene
@@ -170,10 +169,10 @@ class Search:
             pass  # as in a new search, the increments are chosen at the first design that can be built
 
     def increments(self, values: Sequence[float]) -> Tree:
-        """Return the increments of a design and the resulting error of its strain; none where the path is exact."""
+        """Return the increments of a design and the resulting error of its strain; none where no gauge is read."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
-        if gauge is None or has_exact_path(model):
+        if gauge is None:
             return {}
         body = _DesignBody(model, self.report)
         problem = with_steps(under(body.problem, legs=self._legs(body, model)), AUTO_START)

@@ -36,15 +36,11 @@ class Substep:
 
 @dataclass(frozen=True)
 class Advanced:
-    """End of an increment: its solution, the converged parts, and the pose that was reached.
-
-    `energies` are the work of the object and the dissipation (mJ) if they are known, else they follow from the parts.
-    """
+    """End of an increment: its solution, the converged parts, and the pose that was reached."""
 
     solution: ContactSolution[State[Any]]
     parts: list[Substep]
     pose: ObjectPose
-    energies: tuple[float, float] | None = None
 
 
 def solved_in_turn(

@@ -45,16 +45,12 @@ class Station:
     ----------
     pose : of the object
     load : the forces to which depth and slides are found, if any is prescribed
-    leg_end : pose at the end of the leg, by default that of the station
     share : of the leg that ends here
-    leg_shares : those of all stations of the leg
     """
 
     pose: ObjectPose
     load: Load | None = None
-    leg_end: ObjectPose | None = None
     share: float = 1.0
-    leg_shares: tuple[float, ...] = (1.0,)
 
 
 def stations(legs: tuple[Leg, ...]) -> list[Station]:
@@ -68,7 +64,7 @@ def stations(legs: tuple[Leg, ...]) -> list[Station]:
         for share in shares:
             pose = Move(start, end).at(share) if share < 1.0 else end
             load = Load(np.array(leg.forces, dtype=float), share, share == shares[0]) if leg.is_under_force else None
-            out.append(Station(pose, load, end, share, shares))
+            out.append(Station(pose, load, share))
         start = end
     return out
 

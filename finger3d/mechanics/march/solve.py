@@ -27,13 +27,11 @@ from finger3d.mechanics.march.to_force import (
     ToForceAtFiniteStrain,
     expected_depth,
     forces_on,
-    normal_force,
 )
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.slip_limit import largest_force
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.exact_path import ExactPath, NormalForce, has_exact_path, solve_path
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 
@@ -105,13 +103,10 @@ class Press:
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed, self._cancel, self._report = False, cancel, report
-        self._is_exact = has_exact_path(model)
         self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else cuts
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None
-        self._path: ExactPath | None = None
-        self._leg: tuple[ObjectPose, float | None] | None = None
-        self._share, self._work, self._dissipation = 1.0, 0.0, 0.0
+        self._work, self._dissipation = 0.0, 0.0
         self._station: Station | None = None
         self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
         self._left: Float = np.zeros(2)  # slides at the start of the leg, less those of the path
@@ -144,8 +139,6 @@ class Press:
             moves = self.moves_to(station.pose)
             parts = [Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
             end = Advanced(solutions[-1], parts, station.pose)
-        elif self._is_exact:
-            end = self._along_path(station)
         elif station.load is None:
             start = self.expected_force(move.end) if guess is None else guess
             end = self._to_pose(move.end, start)
@@ -167,7 +160,7 @@ class Press:
         self.state, self.pose = end.solution.state, end.pose
 
     def _add_energies(self, end: Advanced) -> None:
-        work, lost = end.energies or energies(self.problem, end.parts)
+        work, lost = energies(self.problem, end.parts)
         self._work += work
         self._dissipation += lost
 
@@ -241,20 +234,6 @@ class Press:
     def _deepest(self) -> float:
         model = self.problem.model
         return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
-
-    def _along_path(self, station: Station) -> Advanced:
-        """Advance on the exact path of a leg, which is followed to its end when its first station is asked for."""
-        problem, end, load = self.problem, station.leg_end or station.pose, station.load
-        path, leg = self._path, (end, None if load is None else float(load.forces[0]))
-        if path is None or self._leg != leg or self._share == 1.0:
-            now = normal_force(problem, self.state)
-            force = None if leg[1] is None else NormalForce(now, leg[1], self._deepest)
-            path = solve_path(problem, self.state, Move(self.pose, end), force, station.leg_shares)
-            self._path, self._leg, self._share = path, leg, 0.0
-        there = path.between(self._share, station.share)
-        self._share = station.share
-        part = Substep(self.state, there.solution.state, Move(self.pose, there.pose))
-        return Advanced(there.solution, [part], there.pose, there.energies)
 
     def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one; where contact begins, in parts."""
@@ -353,5 +332,4 @@ class Press:
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
             parts=tuple((part.move.end, part.after) for part in end.parts),
-            path=self._path,
         )

@@ -37,7 +37,6 @@ from finger3d.mechanics.march.solve import CUTS, march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, of_kind
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.small_strain.exact_path import has_exact_path
 
 Measurement = Callable[[Problem, StepResult], dict[str, float]]
 """Quantities by name, measured at the end of a press."""
@@ -132,7 +131,7 @@ def automatic(model: Model) -> bool:
     increments; there "auto" is a fixed number, `finger3d.mechanics.march.path.AUTO_START`.
     """
     depends_on_steps = model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps
-    return not (depends_on_steps or has_exact_path(model)) and any(leg.steps == "auto" for leg in model.legs)
+    return not depends_on_steps and any(leg.steps == "auto" for leg in model.legs)
 
 
 def with_steps(problem: Problem, steps: int) -> Problem:

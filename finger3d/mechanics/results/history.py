@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -155,8 +155,7 @@ class StepResult:
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface
     (`finger3d.mechanics.results.penetration`); `detail` describes a failure.  `parts` are the pose and the state of the
-    meshed part at the end of every part that the increment was solved in, the last one included; `path` is the exact
-    path of its leg (`finger3d.mechanics.small_strain.exact_path`), if it has one.
+    meshed part at the end of every part that the increment was solved in, the last one included.
     """
 
     target: ObjectPose
@@ -174,7 +173,6 @@ class StepResult:
     penetration_mm: float
     detail: str = ""
     parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
-    path: Any = field(default=None, repr=False)
 
     @property
     def failure(self) -> str:

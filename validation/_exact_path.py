@@ -1,4 +1,4 @@
-"""Frictional contact in two dimensions along a straight path, solved exactly from event to event.
+"""The press of a section by a flat object in small strain, exact from event to event: what increments approach.
 
 Let the free motion q be linear in the share s of a path.  As long as no point changes its status, the forces r and the
 relative displacements ``w = W r + q`` are linear in s, too, and their rates r', w' solve one system of equations::
@@ -15,13 +15,15 @@ problem, in which only points on the border of their set may change it (Klarbrin
 
 It is solved by changes of the active set, and by Lemke's method where active sets come back.  Rates need not exist if
 friction is large: forces then jump, and a short increment of the path is solved as such.
+
+Increments have a limit on such paths, since contact is piecewise linear in the motion; elsewhere there is no reference.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,10 +32,19 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
-from finger3d.contact.lemke import rates_start
+from finger3d.contact.lemke import lemke
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution, ContactState, Event, next_state
+from finger3d.contact.state import ContactState, next_state
 from finger3d.errors import Outcome
+from finger3d.fem.tensors import rotated_delassus
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import length_scale
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.linear_contact import LinearBody, transported
+from finger3d.objects import Move, ObjectPose, vertical_frame
 
 _ZERO = 1e-13
 """Gap over the length scale, and force over the largest, of points on the border of their set."""
@@ -50,6 +61,9 @@ _TOGETHER, _ONE_BY_ONE = 12, 60
 _LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
 """Largest number of events: a constant, and one for each contact point."""
 
+_LARGEST_RATES = 1200
+"""Largest number of rows of the tableau of `rates_start`."""
+
 _STRIDES = tuple(10.0**k for k in range(-9, 1))
 """Shares of the path that an increment over a jump is tried with, until there is a solution."""
 
@@ -58,23 +72,23 @@ _MANY_JUMPS = 20
 after the other, by the hundred with mu = 1e6 and nu = 0, would cost as many searches for the state after a jump."""
 
 
-@dataclass(frozen=True)
-class Resultant:
-    """A resultant of the contact forces that is prescribed; a motion of the object follows from it.
+class Event(NamedTuple):
+    """Event on a path.
 
     Attributes
     ----------
-    weights : (c, d), of the forces in the resultant
-    start, end : N, resultant at the ends of the path, between which it is linear
-    motion : (c, d) mm, free motion per unit of the amplitude
-    largest : amplitude at which the search for the resultant ends
+    share : of the path
+    state : at the event; the status of a point is the one on the way from the event before
+    residual : largest violation of the contact conditions since the event before, dimensionless
+    systems : number of systems of equations that were solved on the path so far
+    is_increment : whether an increment led here from the event before, in which forces jump
     """
 
-    weights: Float
-    start: float
-    end: float
-    motion: Float
-    largest: float
+    share: float
+    state: ContactState
+    residual: float
+    systems: int
+    is_increment: bool = False
 
 
 class _ActiveSet(NamedTuple):
@@ -85,41 +99,40 @@ class _ActiveSet(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """Forces (c, d), and their rates with those of displacements and amplitude, per share of the path."""
+    """Forces (c, d), and the rates of forces and displacements, per share of the path."""
 
     force: Float
-    amplitude: float
     force_rate: Float
     displacement_rate: Float
-    amplitude_rate: float
 
 
-def follow(
-    problem: ContactProblem, resultant: Resultant | None = None, stops: Sequence[float] = ()
-) -> tuple[ContactSolution[ContactState], list[Event]]:
-    """Solve contact along the path of an increment, during which the free motion changes in proportion.
+def follow(problem: ContactProblem, stops: Sequence[float] = ()) -> list[Event]:
+    """Return the events on the path of an increment, during which the free motion changes in proportion.
 
     Parameters
     ----------
     problem : ContactProblem
         In two dimensions; its coefficients of friction are kept.
-    resultant : Resultant, optional
-        Its motion is added to that of the problem.
     stops : sequence of float, optional
         Shares of the path, in order, that no increment over a jump goes past: between events forces are linear, within
         an increment they are not known.
 
     Returns
     -------
-    solution : at the end of the path; CONVERGED only if the contact conditions hold at every event
-    events : in order; the last one is the end of the path, or the place up to which it was followed
+    list of Event
+        In order; the last one is the end of the path.
+
+    Raises
+    ------
+    RuntimeError
+        If the path does not lead to its end.
     """
-    if problem.refusal:
-        return ContactSolution(problem.previous, problem.refusal, np.inf, 0, "none"), []
-    path = _Path(problem, resultant, stops)
-    outcome = path.followed()
-    state = path.state if outcome.ok else problem.previous
-    return ContactSolution(state, outcome, path.residual, path.systems, "events"), path.events
+    path = _Path(problem, stops)
+    for _ in range(_LEAST_EVENTS + _EVENTS_A_POINT * len(path.force)):
+        line = path.line()
+        if path.jump() if line is None else path.advance(line):
+            return path.events
+    raise RuntimeError("points change between open, stick and slip without end")
 
 
 class _Path:
@@ -127,16 +140,16 @@ class _Path:
 
     Attributes
     ----------
-    share, amplitude : reached
+    share : reached
     force : (c, d) N
     displacement : (c, d) mm, gap, and tangential displacement since the start of the path
     stops : shares that no increment over a jump goes past
     """
 
-    def __init__(self, problem: ContactProblem, resultant: Resultant | None, stops: Sequence[float]) -> None:
-        self.problem, self.resultant, self.state = problem, resultant, problem.previous
+    def __init__(self, problem: ContactProblem, stops: Sequence[float]) -> None:
+        self.problem, self.state = problem, problem.previous
         self.stops = [*stops, 1.0]
-        self.share = self.amplitude = self.residual = 0.0
+        self.share = 0.0
         self.systems, self.events = 0, list[Event]()
         self.force = self.state.force.copy()
         self.displacement = np.column_stack([self.state.gap, np.zeros(len(self.force))])
@@ -149,21 +162,9 @@ class _Path:
         # increments over jumps: their number, end and length of the last
         self._jumps, self._landed, self._stride = 0, -1.0, 0.0
 
-    def followed(self) -> Outcome:
-        """Go on to the end of the path, or to where it cannot be continued."""
-        most = _LEAST_EVENTS + _EVENTS_A_POINT * len(self.force)
-        if self.resultant and not self.force.any() and not self._touches(self.resultant):
-            return Outcome.FORCE_NOT_REACHED
-        for _ in range(most):
-            line = self._line()
-            outcome = self._jump() if line is None else self._advance(line)
-            if outcome:
-                return outcome
-        return Outcome.EVENTS
-
     # --- rates ----------------------------------------------------------------------------------------------------
 
-    def _line(self) -> _Line | None:
+    def line(self) -> _Line | None:
         """Return the line that forces and displacements follow from here; None if there is none."""
         normal, border = self.force[:, 0], _ZERO * float(np.abs(self.force).max(initial=0.0))
         at_apex = (normal <= border) & (self.displacement[:, 0] <= _ZERO * self.problem.length_scale)
@@ -172,8 +173,6 @@ class _Path:
         at_limit &= self.problem.friction > 0.0
         sign = np.where(at_limit, np.sign(self.force[:, 1]), self._set.sign)
         status = self._set.status
-        if self.resultant and not status.any():  # a force needs a point to act on
-            status = np.where(at_apex, self._first, OPEN).astype(np.int8)
         chosen = _ActiveSet(status, sign)
         line = self._improved(chosen, at_apex, at_limit, (True, False))
         return self._by_pivots(at_apex, at_limit, sign) if line is None else line
@@ -235,7 +234,7 @@ class _Path:
 
     def _solved(self, chosen: _ActiveSet) -> _Line | None:
         """Return the line with an active set; None if its equations are singular."""
-        (status, sign), problem, more = chosen, self.problem, self.resultant
+        (status, sign), problem = chosen, self.problem
         touching, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
         slip = np.flatnonzero(status == SLIP)
         rows = np.concatenate([2 * touching, 2 * stick + 1])
@@ -249,13 +248,6 @@ class _Path:
         free = self._start + self.share * self._rate
         target = np.column_stack([np.zeros(len(free)), self.displacement[:, 1]])
         right = np.stack([(target - free).ravel()[rows], -self._rate.ravel()[rows]], axis=1)
-        if more is not None:
-            weights = more.weights[touching]
-            row = np.concatenate([(weights[:, 0] + ratio[touching] * weights[:, 1]) * scale, more.weights[stick, 1]])
-            column = more.motion.ravel()[rows]
-            matrix = np.block([[matrix, column[:, None]], [row[None], np.zeros((1, 1))]])
-            change = more.end - more.start
-            right = np.vstack([right, [more.start + self.share * change, change]])
         self.systems += 1
         try:
             solved = np.linalg.solve(matrix, right)
@@ -265,44 +257,28 @@ class _Path:
         lines[:, touching, 0] = (solved[: len(touching)] * scale[:, None]).T
         lines[:, :, 1] = ratio * lines[:, :, 0]
         lines[:, stick, 1] = solved[len(touching) : len(rows)].T
-        amplitude, its_rate = (float(solved[-1, 0]), float(solved[-1, 1])) if more else (0.0, 0.0)
-        moved = self._through_body(lines[1]) + self._rate
-        if more is not None:
-            moved = moved + its_rate * more.motion
-        return _Line(lines[0], amplitude, lines[1], moved, its_rate)
+        return _Line(lines[0], lines[1], self._through_body(lines[1]) + self._rate)
 
     def _by_pivots(self, at_apex: NDArray[np.bool_], at_limit: NDArray[np.bool_], sign: Float) -> _Line | None:
         """Return the line by Lemke's method; None if there is none."""
-        more = self.resultant
-        bordered = None if more is None else (more.weights, more.end - more.start, more.motion)
         stick = (self._set.status != OPEN) & ~at_apex & ~at_limit
-        found = rates_start(self.problem, self._rate, (stick, at_limit, at_apex), sign, bordered)
+        found = rates_start(self.problem, self._rate, (stick, at_limit, at_apex), sign)
         return None if found is None else self._improved(_ActiveSet(*found), at_apex, at_limit, (False,))
 
     # --- from event to event --------------------------------------------------------------------------------------
 
-    def _advance(self, line: _Line) -> Outcome | None:
-        """Go along a line up to the next event; return the outcome if the path ends there."""
+    def advance(self, line: _Line) -> bool:
+        """Go along a line up to the next event; return whether the path ends there."""
         status, sign = self._set
         step, touch, limit, leave = self._next(line)
-        ends, more = self.share + step >= 1.0, self.resultant
-        too_far = more is not None and line.amplitude + step * line.amplitude_rate > more.largest
-        if more is not None and too_far:
-            step = max((more.largest - line.amplitude) / line.amplitude_rate, 0.0)
-            touch, limit, leave = (np.zeros_like(touch) for _ in range(3))
+        share = 1.0 if self.share + step >= 1.0 else self.share + step
         force = line.force + step * line.force_rate
         force[leave] = 0.0
-        share = 1.0 if ends and not too_far else self.share + step
-        amplitude = line.amplitude + step * line.amplitude_rate
         # from the forces, since rates would add up their round-off
         moved = self._through_body(force) + self._start + share * self._rate
-        if more is not None:
-            moved = moved + amplitude * more.motion
         moved[(status != OPEN) | touch, 0] = 0.0
-        if not self._record(force, moved, status, amplitude, share):  # rates without bound, but for round-off
-            return self._jump() if more is None else Outcome.NO_CONVERGENCE
-        if too_far:
-            return Outcome.FORCE_NOT_REACHED
+        if not self._record(force, moved, status, share):  # rates without bound, but for round-off
+            return self.jump()
         into = status.copy()
         into[touch] = self._set.status[self._touched].max(initial=self._first)
         into[limit] = SLIP
@@ -312,7 +288,7 @@ class _Path:
         self._set = _ActiveSet(into, towards)
         if touch.any():
             self._touched = touch
-        return Outcome.CONVERGED if ends else None
+        return share == 1.0
 
     def _next(self, line: _Line) -> tuple[float, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
         """Return the share up to the next event, and which points touch, reach their limit, and leave there."""
@@ -339,24 +315,22 @@ class _Path:
         until = step * (1.0 + 1e-12)
         return step, touch <= until, (limit <= until) & (leave > until), leave <= until
 
-    def _record(
-        self, force: Float, moved: Float, status: Status, amplitude: float, share: float, is_increment: bool = False
-    ) -> bool:
+    def _record(self, force: Float, moved: Float, status: Status, share: float, is_increment: bool = False) -> bool:
         """Keep a state if the contact conditions hold on the way to it; return whether they do."""
         part = np.column_stack([moved[:, 0], moved[:, 1] - self.displacement[:, 1]])
         error = residual(force, part, status, self.problem.friction, self.problem.length_scale)
         if error > TOLERANCE:
             return False
-        self.residual = max(self.residual, error)
-        self.force, self.displacement, self.share, self.amplitude = force, moved, share, amplitude
+        self.force, self.displacement, self.share = force, moved, share
         self.state = next_state(self.state, force, part, status)
-        self.events.append(Event(share, amplitude, self.state, error, self.systems, is_increment))
+        self.events.append(Event(share, self.state, error, self.systems, is_increment))
         return True
 
-    def _jump(self) -> Outcome | None:
-        """Solve a short increment where there are no rates, with a longer one where it has no solution."""
-        if self.resultant is not None:
-            return Outcome.FORCE_JUMPS
+    def jump(self) -> bool:
+        """Solve a short increment where there are no rates, with a longer one where it has no solution.
+
+        Return whether the path ends there.
+        """
         # one that follows at once is longer, else jumps in a row would go on in the smallest increments
         follows = self.share - self._landed <= self._stride or self._jumps > _MANY_JUMPS
         first = 10.0 * self._stride if follows else _STRIDES[0]
@@ -369,26 +343,200 @@ class _Path:
             if found.outcome.ok:
                 break
         else:
-            return found.outcome
+            raise RuntimeError(f"no increment over a jump: {found.outcome}")
         self._jumps, self._landed, self._stride = self._jumps + 1, share, share - self.share
         moved = self._through_body(found.state.force) + self._start + share * self._rate
-        if not self._record(found.state.force, moved, found.state.status, 0.0, share, is_increment=True):
-            return Outcome.NO_CONVERGENCE
+        if not self._record(found.state.force, moved, found.state.status, share, is_increment=True):
+            raise RuntimeError("the conditions do not hold after a jump")
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
-        return Outcome.CONVERGED if share >= 1.0 else None
-
-    def _touches(self, more: Resultant) -> bool:
-        """Move the object, without forces, to where the first point touches; return whether it does."""
-        if more.end <= 0.0:
-            return True
-        nears = more.motion[:, 0] < 0.0
-        way = np.min(self.displacement[nears, 0] / -more.motion[nears, 0], initial=np.inf)
-        if way > more.largest:
-            return False
-        moved = self.displacement + way * more.motion
-        self._record(self.force, moved, self._set.status, float(way), 0.0)
-        return True
+        return share >= 1.0
 
     def _through_body(self, force: Float) -> Float:
         """Return the displacement W r (c, d) mm of forces (c, d) N."""
         return np.asarray((self.problem.delassus @ force.ravel()).reshape(force.shape))
+
+
+def rates_start(
+    problem: ContactProblem,
+    rate: Float,
+    points: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
+    sign: Float,
+) -> tuple[NDArray[np.int8], Float] | None:
+    """Return status (c,) and direction of friction (c,) that the rates of forces have in a section, or None.
+
+    Parameters
+    ----------
+    rate : (c, 2) mm, of the free motion
+    points : (c,) each
+        Points that stick, points at their friction limit, which stick or slip, and points without gap and force.
+    sign : (c,), direction of friction of points at their limit
+    """
+    stick, at_limit, at_apex = points
+    c, mu, w, q = len(sign), problem.friction, problem.delassus, rate.ravel()
+    apex, limit = np.flatnonzero(at_apex), np.flatnonzero(at_limit)
+    unit = np.eye(2 * c).reshape(c, 2, 2 * c)  # [point, direction] -> force of size 1
+    n, t = unit[:, 0], unit[:, 1]
+    bilateral = np.concatenate([n[stick], t[stick], (n + (sign * mu)[:, None] * t)[limit]])
+    zero = np.concatenate([n[stick], t[stick], n[limit]])  # displacements that vanish
+    forces = np.concatenate([-sign[limit, None] * t[limit], n[apex], t[apex], -t[apex]])
+    f, k, b = len(forces), len(apex), len(bilateral)
+    m = f + k
+    if m > _LARGEST_RATES:
+        return None
+    equations, right = zero @ w @ bilateral.T, zero @ np.column_stack([w @ forces.T, q])
+    into = forces @ np.column_stack([w @ bilateral.T, w @ forces.T, q])
+    try:
+        reduced = into[:, b:] - into[:, :b] @ np.linalg.solve(equations, right)
+    except np.linalg.LinAlgError:
+        return None
+    matrix, load = np.zeros((m, m)), np.zeros(m)
+    matrix[:f, :f], load[:f] = reduced[:, :-1], reduced[:, -1]
+    normals, towards, away = (slice(f - (3 - i) * k, f - (2 - i) * k) for i in range(3))
+    matrix[towards, f:] = matrix[away, f:] = np.eye(k)
+    matrix[f:, normals], matrix[f:, towards], matrix[f:, away] = np.diag(mu[apex]), -np.eye(k), -np.eye(k)
+    matrix[:f, :f] /= np.abs(matrix[:f, :f]).max(initial=0.0) or 1.0
+    z = lemke(matrix, load / (np.abs(load).max(initial=0.0) or 1.0), 20 * m)
+    if z is None:
+        return None
+    status, direction = np.full(c, OPEN, dtype=np.int8), sign.copy()
+    status[stick] = STICK
+    status[limit] = np.where(z[: len(limit)] > 0.0, STICK, SLIP)
+    status[apex] = np.where(z[normals] > 0.0, np.where(z[f:] > 0.0, SLIP, STICK), OPEN)
+    direction[apex] = np.sign(z[towards] - z[away])
+    return status, direction
+
+
+# --- presses --------------------------------------------------------------------------------------------------------
+
+
+class ExactPath(NamedTuple):
+    """Path of a press between two poses.
+
+    Attributes
+    ----------
+    problem : Problem
+    move : from its start to its end
+    start : Event
+    events : in order, up to the end
+    bases : (c, d, d), directions of the points
+    """
+
+    problem: Problem
+    move: Move
+    start: Event
+    events: list[Event]
+    bases: Float
+
+    def at(self, share: float) -> tuple[Event, int]:
+        """Return the state at a share as an event, and the number of events up to there."""
+        done = bisect_right(self.events, share, key=lambda event: event.share)
+        before = self.events[done - 1] if done else self.start
+        if done == len(self.events) or before.share == share:
+            return before, done
+        after = self.events[done]
+        t = (share - before.share) / (after.share - before.share)
+        return Event(share, _between(before.state, after.state, t), after.residual, after.systems), done
+
+    def pose(self, share: float) -> ObjectPose:
+        """Return the pose of the object at a share."""
+        return self.move.end if share == 1.0 else self.move.at(share)
+
+    def energies(self, events: Sequence[Event]) -> tuple[float, float]:
+        """Return work and dissipation (mJ) from first to last event, exact since forces are linear between events.
+
+        What forces on points lose that move relative to the object is dissipated, in slip and where forces jump.
+        """
+        symmetry, states = self.problem.symmetry, [event.state for event in events]
+        count = np.bincount(symmetry.image_of, symmetry.multiplicity, len(self.bases)).astype(np.float64)
+        forces = np.stack([state.force for state in states])
+        mean = 0.5 * (forces[1:] + forces[:-1]) * count[:, None]
+        relative = np.stack([np.column_stack([state.gap, state.tangential_displacement]) for state in states])
+        resultants = np.einsum("eca,cak->ek", mean, self.bases)
+        if "x" in self.problem.axes:  # the halves of a mirrored finger cancel
+            resultants[:, 0] = 0.0
+        way = (self.move.end.displacement - self.move.start.displacement)[: forces.shape[2]]
+        return (
+            float(np.sum(resultants * np.diff([event.share for event in events])[:, None] * way)),
+            -float(np.sum(mean * np.diff(relative, axis=0))),
+        )
+
+
+def _between(one: ContactState, other: ContactState, t: float) -> ContactState:
+    """Return the state at the share t of a straight way to another state, which has its status."""
+    names = ("force", "gap", "tangential_displacement", "accumulated_slip")
+    mean = {name: (1.0 - t) * getattr(one, name) + t * getattr(other, name) for name in names}
+    return replace(other, **mean)
+
+
+def solve_path(problem: Problem, state: State[Float], move: Move, shares: Sequence[float] = ()) -> ExactPath:
+    """Follow the path on which the object moves straight from one pose to another.
+
+    Where forces jump, states are those of increments, none of which goes past one of the shares of the path.
+    """
+    d = state.body.shape[1]
+    found = contact_geometry(
+        problem.placed(move.end).distance,
+        problem.surface,
+        axes=problem.axes,
+        object_share=problem.system.object_share,
+    )
+    bases = found.bases
+    carried = (move.end.displacement - move.start.displacement)[:d]
+    free = np.column_stack([found.gap, -np.einsum("ctk,ck->ct", bases[:, 1:], state.body + carried)])
+    start = transported(state.contact, bases)
+    free[:, 1:] += start.tangential_displacement
+    rotations = bases @ vertical_frame(d).T
+    delassus = problem.delassus
+    if not (rotations == np.eye(d)).all():
+        delassus = rotated_delassus(delassus, rotations, np.arange(len(delassus)))
+    scale, law = length_scale(problem, move), problem.model.contact_law
+    contact = ContactProblem.of(start, free, delassus, law, scale, area=problem.surface.area)
+    return ExactPath(problem, move, Event(0.0, start, 0.0, 0), follow(contact, shares), bases)
+
+
+def exact_press(problem: Problem) -> list[StepResult]:
+    """Return the results at the stations of a press, between which it follows its exact path.
+
+    The body is a section in small strain, the object flat and never turned, poses are prescribed, and friction has one
+    constant coefficient.
+
+    Raises
+    ------
+    RuntimeError
+        If a path does not lead to its end.
+    """
+    model, formulation = problem.model, formulation_of(problem.model)
+    state, pose, out = formulation.start(problem), problem.origin, list[StepResult]()
+    work = lost = 0.0
+    for leg in model.legs:
+        assert isinstance(leg.steps, int)
+        shares = [k / leg.steps for k in range(1, leg.steps + 1)]
+        path = solve_path(problem, state, Move(pose, leg.end(pose)), shares)
+        body, begin, passed = LinearBody(problem.delassus, np.zeros(path.bases.shape[:2])), path.start, 0
+        for share in shares:
+            end, done = path.at(share)
+            gained = path.energies([begin, *path.events[passed:done], end])
+            work, lost = work + gained[0], lost + gained[1]
+            contact = replace(end.state, bases=path.bases)
+            state = State(contact, body.displacement(contact.force, path.bases))
+            there = path.pose(share)
+            out.append(
+                StepResult(
+                    target=there,
+                    state=problem.symmetry.unfold(contact),
+                    meshed_state=state,
+                    lowest=problem.placed(there).lowest,
+                    moment=problem.symmetry.total_moment(formulation.loads(problem, state, there).moment),
+                    readings=formulation.readings(problem, state),
+                    external_work_mJ=work,
+                    dissipation_mJ=lost,
+                    outcome=Outcome.CONVERGED,
+                    residual=max((event.residual for event in path.events[passed : done + 1]), default=0.0),
+                    iterations=end.systems - begin.systems,
+                    method="events",
+                    penetration_mm=max(-float(contact.gap.min(initial=0.0)), 0.0),
+                )
+            )
+            begin, passed = end, done
+        pose = path.move.end
+    return out
