@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import finger3d.effects
-from finger3d.contact.friction import Coulomb, TwoCoefficients
+from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type, fill, warn
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
@@ -65,8 +65,6 @@ def test_neutral_setting_is_the_baseline_to_round_off(name: str) -> None:
     mesh = MeshOptions(0.3 if depth == 0.5 else 0.04, 1.0, "swept")
     plain = replace(baseline(), legs=(Leg(depth, steps=5, duration_s=1.0),), mesh=mesh)
     neutral = effect_type(name)(**NEUTRAL[name]).apply(plain)
-    if name == "viscosity":  # both in increments: two equal coefficients keep a section from its exact path
-        plain, neutral = (replace(m, friction=TwoCoefficients(0.1, 1.0, "keep")) for m in (plain, neutral))
     for a, b in zip(march(build(plain)), march(build(neutral)), strict=True):
         assert np.abs(a.state.force - b.state.force).max() <= tolerance * np.abs(a.state.force).max()
 

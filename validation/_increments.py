@@ -15,12 +15,12 @@ from finger3d.mechanics.results.history import StepResult
 class PlainCoulomb(Coulomb):
     """Coulomb's law in plain increments, as the integral equations, Maeno 2004 and most codes solve it.
 
-    Every press by it goes on in increments, and a point that closes in one slips from the place it had at its start.
+    A point that closes in an increment slips from the place it had at its start.
     """
 
     @property
     def is_defined_by_increments(self) -> bool:
-        """True: neither the exact path nor the place where a point touches is used."""
+        """True: the place where a point touches is not used."""
         return True
 
 

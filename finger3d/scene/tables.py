@@ -113,7 +113,7 @@ class LegTable(TomlTable):
     force_x_N, force_z_N : force applied to the object along x, z, in place of a slide, which follows; 0 leaves it free
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
     turn_x_deg, turn_y_deg, turn_z_deg : how it then is turned about its lowest point, about x, then y, then z
-    steps : equal parts of the leg; "auto": 10 along the exact path of a section, else as errors of 1 % ask for
+    steps : equal parts of the leg; "auto": as errors of 1 % ask for
     duration_s : read only with viscosity
     """
 
