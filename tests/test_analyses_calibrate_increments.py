@@ -17,8 +17,7 @@ from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.mechanics.discretise.build import build
 from finger3d.sensor import estimate, load
-from finger3d.sensor.calibration import summary
-from tests.sensor_cases import FEW, NONE, SCENE, scene
+from tests.sensor_cases import NONE, scene
 
 NOISE = 1.5e-4
 
@@ -55,18 +54,6 @@ def test_increments_are_not_settled_by_a_press_that_fails() -> None:
     found = choose_increments(build(steps("auto").model()), lambda p: np.array([[0.0, np.nan]]))
     assert found.legs[0].steps == 320
     assert np.isnan(found.error)
-
-
-def test_a_section_under_a_plane_has_no_increments(tmp_path: Path) -> None:
-    """What has no error is no tolerance, in no file."""
-    for count in ("auto", 7):
-        flat = scene(press={"depth_mm": 10.0, "steps": count})
-        found = calibrate(flat, "g36", tmp_path / str(count), FEW, tolerances={**NONE, "increments": 1.0})
-        assert found.readings[0].tolerances == ()
-        data = json.loads((tmp_path / str(count) / "calibration.json").read_text())
-        assert "increments" not in data["about"]
-        assert not any("increments" in row for row in summary(found))
-    assert "increments" not in (tmp_path / "7" / "calibration.csv").read_text()
 
 
 def test_a_number_that_is_given_is_kept() -> None:
@@ -145,10 +132,3 @@ def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_
     more = find_best(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
     assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
     assert more.evaluations[: len(found.evaluations)] == found.evaluations
-
-
-def test_a_search_under_a_plane_tells_no_increments(tmp_path: Path) -> None:
-    given = {**SCENE, "mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
-    find_best(Search(given, (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),), mus=(0.1, 0.5), budget=2), tmp_path)
-    assert json.loads((tmp_path / "design.json").read_text())["increments"] == {}
-    assert "increments" not in (tmp_path / "report.html").read_text()

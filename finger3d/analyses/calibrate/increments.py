@@ -1,7 +1,6 @@
 """Number of increments of a calibration, and the error that they leave in its readings.
 
-Readings in N and 2 N increments are compared, as in `finger3d.mechanics.march.step_halving`.  Where the path is exact
-there is nothing to choose, and no error.
+Readings in N and 2 N increments are compared, as in `finger3d.mechanics.march.step_halving`.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ class Increments:
 def choose_increments(problem: Problem, read: Read) -> Increments:
     """Return the given increments of a path, or double automatic ones until their error is small relative to the noise.
 
-    Automatic ones are kept, too, where the path is exact or depends on the increments.
+    Automatic ones are kept, too, where the path depends on the increments.
 
     Parameters
     ----------

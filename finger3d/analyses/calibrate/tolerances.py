@@ -143,7 +143,7 @@ def evaluate_tolerances(
 
     Notes
     -----
-    A tolerance is left out if the presses that it needs fail, and that of the increments where the path is exact.
+    A tolerance is left out if the presses that it needs fail.
     """
     names = tuple(r.name for r in readings)
     mu = base.mu[base.sample]
