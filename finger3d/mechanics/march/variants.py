@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from threading import Event
 from typing import Generic, TypeVar
 
@@ -33,13 +33,11 @@ class Variant(Generic[T]):
     model : what was pressed
     found : what was kept of the press; None if it failed
     failure : why it failed, in words
-    is_meshed_anew : whether it has other cells, so that a difference contains the error of both meshes
     """
 
     model: Model
     found: T | None
     failure: str = ""
-    is_meshed_anew: bool = False
 
 
 def press_variants(
@@ -54,7 +52,7 @@ def press_variants(
     Parameters
     ----------
     problem : its increments are numbers
-    models : their legs have as many increments
+    models : their legs have as many increments; the problem's own may be among them
     read : of each press
     """
     if problem.model.finite_strain:
@@ -62,8 +60,8 @@ def press_variants(
 
     def pressed(model: Model) -> Variant[T]:
         try:
-            own, is_new = _problem(problem, model)
-            return _variant(own, is_new, list(march(own, cancel=cancel)), read)
+            own = _problem(problem, model)[0]
+            return _variant(own, list(march(own, cancel=cancel)), read)
         except FAILURES as error:
             return _failed(model, error)
 
@@ -83,8 +81,11 @@ def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T], ca
     from finger3d.mechanics.march.groups import march_in_groups  # a press in small strain needs none of it
 
     variants: dict[int, Variant[T]] = {}
+    itself = [number for number, model in enumerate(models) if model is problem.model]
     alike, others = dict[int, Problem](), dict[int, Problem]()
     for number, model in enumerate(models):
+        if number in itself:
+            continue
         try:
             own, is_new = _problem(problem, model)
         except FAILURES as error:
@@ -95,19 +96,19 @@ def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T], ca
     several = [problem if number is None else alike[number] for number in numbers]
     for place, steps in march_in_groups(several, formulation_of(problem.model).workspace(), cancel or Event()):
         own_number = numbers[place]
-        if own_number is not None:
-            variants[own_number] = _variant(alike[own_number], False, steps, read)
-    for place, own in others.items():
-        variants[place] = _variant(own, True, list(march(own, cancel=cancel)), read)
+        for number in itself if own_number is None else [own_number]:
+            variants[number] = _variant(several[place], steps, read)
+    for number, own in others.items():
+        variants[number] = _variant(own, list(march(own, cancel=cancel)), read)
     return [variants[number] for number in range(len(models))]
 
 
-def _variant(problem: Problem, is_new: bool, steps: Sequence[StepResult], read: Read[T]) -> Variant[T]:
+def _variant(problem: Problem, steps: Sequence[StepResult], read: Read[T]) -> Variant[T]:
     try:
         steps[-1].check("a variant")
-        return Variant(problem.model, read(problem, steps), is_meshed_anew=is_new)
+        return Variant(problem.model, read(problem, steps))
     except FAILURES as error:
-        return replace(_failed(problem.model, error), is_meshed_anew=is_new)
+        return _failed(problem.model, error)
 
 
 def _failed(model: Model, error: Exception) -> Variant[T]:
