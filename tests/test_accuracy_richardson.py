@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from finger3d.accuracy.richardson import ORDER, spread_error
+from finger3d.accuracy.richardson import spread_error
+from finger3d.mechanics.readings.quantities import ORDER
 
 
 def test_the_order_is_that_of_the_corners_of_the_base() -> None:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from finger3d._cost import CALIBRATION_S
-from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_share
 from finger3d.analyses.calibrate.run import calibrate
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings.quantities import ORDER
 from finger3d.meshing import limits
 from finger3d.progress import QUIET
 from finger3d.scene import load

@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.richardson import kinds_of, relative_error
+from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.press import press
+from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.mechanics.results.history import table_row
 
 from ._paper import columns

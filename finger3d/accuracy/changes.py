@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from finger3d._types import Tree
-from finger3d.accuracy.richardson import Kind, kinds_of, largest, spacing
+from finger3d.accuracy.richardson import largest, spacing
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
+from finger3d.mechanics.readings.quantities import Kind, kinds_of
 from finger3d.mechanics.results.history import StepResult, measure
 
 _SURE = 1.0 / 3.0

@@ -20,7 +20,7 @@ from finger3d._cost import INCREMENT_ERRORS
 from finger3d._types import Float
 from finger3d.accuracy.companion_presses import CompanionPress, companion_presses
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.richardson import gain, kinds_of, spacing, spread_error
+from finger3d.accuracy.richardson import gain, spacing, spread_error
 from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.discretise.companions import edge_ratio, is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
@@ -34,6 +34,7 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, Column, by_key, in_space
 from finger3d.mechanics.readings.marker_grid import MarkerGrid
+from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from finger3d.accuracy.richardson import kinds_of
 from finger3d.errors import FAILURES, MissingError
 from finger3d.fem.laws.material import Material
 from finger3d.mechanics.discretise.companions import companion
@@ -20,6 +19,7 @@ from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import QUANTITIES
+from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.mechanics.results.history import StepResult
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]

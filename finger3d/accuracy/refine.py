@@ -18,12 +18,13 @@ from finger3d._ranges import four_digits
 from finger3d._types import Tree
 from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_borders
 from finger3d.accuracy.estimate import discretisation, press_numbers
-from finger3d.accuracy.richardson import Kind, kinds_of, relative_error
+from finger3d.accuracy.richardson import relative_error
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
+from finger3d.mechanics.readings.quantities import Kind, kinds_of
 from finger3d.progress import QUIET, Progress
 
 MAX_ROUNDS = 8
@@ -255,7 +256,7 @@ def _zones_to_refine(beside: Problem, known: Mapping[str, float], goal: str, kin
     """
     mesh, zones = beside.model.mesh, {"contact"} if kind.is_zone else {"contact", "base"}
     zones |= {"gauges"} if kind is Kind.STRAIN else set()
-    zones |= {"border"} if goal.startswith("stick") else set()
+    zones |= {"border"} if kind.is_stick else set()
     changes = {}
     for zone in sorted(zones):
         finer = _shorter(mesh, {zone}, 1.0 / _FINER)

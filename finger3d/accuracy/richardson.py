@@ -18,104 +18,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from enum import Enum, auto
 
 import numpy as np
 
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.readings.columns import RESULTANTS, Column
+from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.readings.quantities import ORDER, Kind, kinds_of
 from finger3d.mechanics.results.history import StepResult, measure
-
-ORDER = 1.2
-"""Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
 
 _LEAST = 0.002
 """Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""
 
 _LEAST_SLIP = 0.1
 """Share of the work for that of few points that slip unseen."""
-
-
-class Kind(Enum):
-    """Kind of a number, which determines its order of convergence."""
-
-    NORMAL_FORCE = auto()
-    FRICTION_SUM = auto()
-    FORCE = auto()
-    PRESSURE = auto()
-    WORK = auto()
-    DISSIPATION = auto()
-    STRAIN = auto()
-    DISPLACEMENT = auto()
-    BASE_PRESSURE = auto()
-    OTHER_READING = auto()
-    CONTACT_LENGTH = auto()
-    CONTACT_AREA = auto()
-    STICK_LENGTH = auto()
-    STICK_AREA = auto()
-    DEPTH = auto()
-    MOMENT = auto()
-
-    @property
-    def is_zone(self) -> bool:
-        """Return whether the number is a length or an area of contact or stick."""
-        return self in (Kind.CONTACT_LENGTH, Kind.CONTACT_AREA, Kind.STICK_LENGTH, Kind.STICK_AREA)
-
-    @property
-    def is_stress(self) -> bool:
-        """Return whether the number is proportional to the stresses."""
-        geometric = (Kind.STRAIN, Kind.DISPLACEMENT, Kind.OTHER_READING, Kind.DEPTH)
-        return not self.is_zone and self not in geometric
-
-    @property
-    def order(self) -> float:
-        """Order of convergence with the edge length."""
-        return 1.5 if self in (Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT) else ORDER
-
-    @property
-    def factor(self) -> float:
-        """Factor c of the error bars, fitted to 118 drawn sections and 28 solids, a third of them deformed largely."""
-        return _FITTED.get(self, 0.9)
-
-
-_FITTED = {
-    Kind.FRICTION_SUM: 1.2,
-    Kind.STICK_LENGTH: 1.1,
-    Kind.STICK_AREA: 1.1,
-    Kind.DISSIPATION: 1.1,
-}
-
-_KINDS = {name: Kind.MOMENT if name.startswith("moment") else Kind.FORCE for name in RESULTANTS[3]} | {
-    "depth_mm": Kind.DEPTH,
-    "normal_force_N": Kind.NORMAL_FORCE,
-    "force_y_N": Kind.NORMAL_FORCE,
-    "outward_friction_x_N": Kind.FRICTION_SUM,
-    "outward_friction_z_N": Kind.FRICTION_SUM,
-    "force_N_per_mm": Kind.NORMAL_FORCE,
-    "friction_sum_N": Kind.FRICTION_SUM,
-    "friction_sum_N_per_mm": Kind.FRICTION_SUM,
-    "friction_along_x_N_per_mm": Kind.FORCE,
-    "friction_along_z_N_per_mm": Kind.FORCE,
-    "outward_friction_x_N_per_mm": Kind.FORCE,
-    "moment_y_Nmm_per_mm": Kind.FORCE,
-    "peak_pressure_MPa": Kind.PRESSURE,
-    "external_work_mJ": Kind.WORK,
-    "dissipation_mJ": Kind.DISSIPATION,
-    "contact_half_length_mm": Kind.CONTACT_LENGTH,
-    "stick_half_length_mm": Kind.STICK_LENGTH,
-    "contact_half_length_end_mm": Kind.CONTACT_LENGTH,
-    "contact_length_mm": Kind.CONTACT_LENGTH,
-    "contact_length_end_mm": Kind.CONTACT_LENGTH,
-    "stick_length_mm": Kind.STICK_LENGTH,
-    "contact_area_mm2": Kind.CONTACT_AREA,
-    "stick_area_mm2": Kind.STICK_AREA,
-}
-
-_READINGS = {
-    "gauge": Kind.STRAIN,
-    "marker": Kind.DISPLACEMENT,
-    "taxel": Kind.BASE_PRESSURE,
-}
 
 
 _IF_ZERO = {
@@ -126,11 +41,6 @@ _IF_ZERO = {
 _ROUND_OFF = 1e-9  # of the number in its place, below which a number is zero
 
 
-def kinds_of(readings: Iterable[Column]) -> dict[str, Kind]:
-    """Return the kinds of all numbers of a press or a comparison by name, those of readings included."""
-    return _KINDS | {column.key: _READINGS.get(column.kind, Kind.OTHER_READING) for column in readings}
-
-
 def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind) -> float:
     """Return the largest magnitude of all numbers of a kind, 0 without any."""
     return max((abs(v) for k, v in numbers.items() if kinds[k] is kind), default=0.0)
@@ -138,7 +48,7 @@ def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind)
 
 def largest_readings(numbers: Mapping[str, float], kinds: Mapping[str, Kind]) -> dict[Kind, float]:
     """Return the largest magnitude of every kind of reading, to which errors of readings are relative."""
-    return {kind: largest(numbers, kinds, kind) for kind in (*_READINGS.values(), Kind.OTHER_READING)}
+    return {kind: largest(numbers, kinds, kind) for kind in Kind if kind.is_reading}
 
 
 def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.richardson import kinds_of, spread_error
+from finger3d.accuracy.richardson import spread_error
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with
@@ -28,6 +28,7 @@ from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column, in_space
+from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree

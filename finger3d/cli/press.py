@@ -16,6 +16,8 @@ from finger3d.errors import Finger3dError, MissingError, Outcome
 
 if TYPE_CHECKING:
     from finger3d._types import TreeView
+    from finger3d.accuracy.error_bars import ErrorBars
+    from finger3d.mechanics.readings.quantities import Quantity
     from finger3d.progress import Progress
 
 
@@ -76,65 +78,21 @@ def _kept(out: Path, report: Progress) -> str:
     )
 
 
-_NUMBERS = {
-    "normal force": ("normal_force_N", 1.0, 5, " N"),
-    "friction sum": ("friction_sum_N", 1.0, 5, " N"),
-    "contact extent": ("contact_half_length_mm", 2.0, 4, " mm at z = 0"),
-    "stick extent": ("stick_half_length_mm", 2.0, 4, " mm at z = 0"),
-    "contact area": ("contact_area_mm2", 1.0, 4, " mm2"),
-    "stick area": ("stick_area_mm2", 1.0, 4, " mm2"),
-}
-"""Name of a row -> key of a step, factor, significant digits, unit."""
+_NUMBERS = "normal_force_N friction_sum_N contact_half_length_mm stick_half_length_mm contact_area_mm2 stick_area_mm2"
 
 
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
-    from finger3d.accuracy.changes import two_digits
-    from finger3d.accuracy.error_bars import ErrorBars, with_error
-    from finger3d.results.summary import readings_of
+    from finger3d.accuracy.error_bars import ErrorBars
 
     bars, estimate = ErrorBars.of_summary(summary), summary.get("error_estimate")
     steps = [step for step in summary["steps"] if step["outcome"] == str(Outcome.CONVERGED)]
-
-    def number(value: float, key: str, digits: int, factor: float = 1.0) -> str:
-        error = bars.total(key)
-        return with_error(factor * value, None if error is None else factor * error, digits, "+-")
-
-    def of_model(key: str, factor: float = 1.0) -> str:
-        """Return what the effects that are off would change, where that is more than the error bar."""
-        least, said = bars.total(key) or 0.0, []
-        for name, changes in summary.get("model_error", {}).items():
-            change, low, high = (changes.get(key, {}).get(part, 0.0) for part in ("change", "low", "high"))
-            if abs(change) > least and low * high > 0.0:
-                middle, *ends = (two_digits(factor * x) for x in (change, low, high))
-                said.append(f"; {name.replace('_', ' ')} {middle} ({' to '.join(ends)})")
-        return "".join(said)
-
-    def of_modulus(key: str, unit: str, factor: float = 1.0) -> str:
-        error = bars.modulus.get(key)
-        return "" if error is None else f", +- {factor * error:.2g}{unit} by the modulus"
-
     yield "outcome", summary["outcome"]
     for name, one in ((summary.get("effects_auto") or {}).get("judged") or {}).items():
         yield name.replace("_", " "), f"{'used' if one['used'] else 'not used'}: {one['why']}"
     if steps:
-        last = steps[-1]
-        depth = number(last["depth_mm"], "depth_mm", 4) + " mm" + of_modulus("depth_mm", " mm")
-        yield "depth", f"{depth}, increment {summary['steps'].index(last) + 1}"
-        for name, (key, factor, digits, unit) in _NUMBERS.items():
-            text = number(last[key], key, digits, factor) + unit + of_modulus(key, unit.split(" at ")[0], factor)
-            yield name, text + of_model(key, factor)
+        yield from _numbers(summary, steps[-1], bars)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
-        readings = readings_of(last["gauges"], last["markers"], last["taxels"])
-        for (kind, sensor), group in groupby(readings, key=lambda c: (c.kind, c.sensor)):
-            columns = list(group)
-            key, unit = columns[0].key, f" {columns[0].unit}".rstrip()
-            text = ", ".join(number(value, c.key, 5) for c in columns if (value := readings[c]) is not None) + unit
-            by_modulus = [bars.modulus.get(c.key, 0.0) for c in columns]
-            name = f"{'strain' if kind == 'gauge' else kind} {sensor}"
-            yield name, text if len(columns) > 1 else text + of_modulus(key, unit) + of_model(key)
-            if len(columns) > 1 and any(by_modulus):
-                yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f"{unit} by the modulus"
     if bars.discretisation:
         yield "+-", f"{bars.covered}, not of the model; estimated in {bars.seconds:.1f} s; smaller ones: finger3d cost"
     if estimate and not (bars.discretisation and bars.steps):
@@ -144,3 +102,49 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
     for path in sorted(out.iterdir()):
         if path.is_file() and not path.name.startswith("."):
             yield "", path.name
+
+
+def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tuple[str, str]]:
+    """Yield the quantities of a step by their titles, with their errors and what effects that are off would change."""
+    from finger3d.accuracy.error_bars import with_error
+    from finger3d.mechanics.readings.quantities import Quantity, named
+    from finger3d.results.summary import readings_of
+
+    def number(one: Quantity, value: float) -> str:
+        error = bars.total(one.name)
+        return with_error(one.factor * value, None if error is None else one.factor * error, sign="+-")
+
+    def line(one: Quantity, value: float) -> str:
+        text, by_modulus = f"{number(one, value)} {one.unit}".rstrip(), bars.modulus.get(one.name)
+        if by_modulus is not None:
+            text += f", +- {one.factor * by_modulus:.2g} {one.unit}".rstrip() + " by the modulus"
+        return f"{text} {one.where}".rstrip() + _of_model(summary, one, bars)
+
+    (depth,) = named("depth_mm")
+    yield depth.title, f"{line(depth, last[depth.name])}, increment {summary['steps'].index(last) + 1}"
+    for one in named(*_NUMBERS.split()):
+        yield one.title, line(one, last[one.name])
+    read = {c: v for c, v in readings_of(last["gauges"], last["markers"], last["taxels"]).items() if v is not None}
+    for (kind, sensor), group in groupby(read, key=lambda c: (c.kind, c.sensor)):
+        name, columns = f"{'strain' if kind == 'gauge' else kind} {sensor}", list(group)
+        several = [Quantity.of(column) for column in columns]
+        if len(several) == 1:
+            yield name, line(several[0], read[columns[0]])
+            continue
+        yield name, ", ".join(number(Quantity.of(c), read[c]) for c in columns) + f" {several[0].unit}"
+        by_modulus = [bars.modulus.get(one.name, 0.0) for one in several]
+        if any(by_modulus):
+            yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f" {several[0].unit} by the modulus"
+
+
+def _of_model(summary: TreeView, one: Quantity, bars: ErrorBars) -> str:
+    """Return what the effects that are off would change, where that is more than the error bar."""
+    from finger3d.accuracy.changes import two_digits
+
+    least, said = bars.total(one.name) or 0.0, []
+    for name, changes in summary.get("model_error", {}).items():
+        change, low, high = (changes.get(one.name, {}).get(part, 0.0) for part in ("change", "low", "high"))
+        if abs(change) > least and low * high > 0.0:
+            middle, *ends = (two_digits(one.factor * x) for x in (change, low, high))
+            said.append(f"; {name.replace('_', ' ')} {middle} ({' to '.join(ends)})")
+    return "".join(said)

@@ -13,24 +13,24 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
 from finger3d.mechanics.readings.columns import QUANTITIES
+from finger3d.mechanics.readings.quantities import OF_INCREMENT, Kind, Quantity, named
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table, write_page
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import PressStep, gauges_of, read_json, steps_of, title_of
 
-_HEADLINE = {
-    "normal_force_N": ("normal force", 1.0, "N"),
-    "friction_sum_N": ("sum of |friction|", 1.0, "N"),
-    "tangential_force_x_N": ("tangential force along x", 1.0, "N"),
-    "contact_half_length_mm": ("contact, extent along x at z = 0", 2.0, "mm"),
-    "stick_half_length_mm": ("stick, extent along x at z = 0", 2.0, "mm"),
-    "contact_area_mm2": ("contact area", 1.0, "mm²"),
-    "stick_area_mm2": ("stick area", 1.0, "mm²"),
-    "external_work_mJ": ("work done on the finger", 1.0, "mJ"),
-    "dissipation_mJ": ("lost to friction", 1.0, "mJ"),
-}
-"""Key of a step -> name, factor and unit on the page."""
+_HEADLINE = named(
+    "normal_force_N",
+    "friction_sum_N",
+    "tangential_force_x_N",
+    "contact_half_length_mm",
+    "stick_half_length_mm",
+    "contact_area_mm2",
+    "stick_area_mm2",
+    "external_work_mJ",
+    "dissipation_mJ",
+)
 
 _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
@@ -39,29 +39,9 @@ _PICTURES = {
     "force.png": "Forces, and half the extents of contact and stick zone along x, against depth and slides",
 }
 
-_STEP_COLUMNS = {
-    "depth_mm": "depth (mm)",
-    "slide_x_mm": "slide x (mm)",
-    "slide_z_mm": "slide z (mm)",
-    "turn_x_deg": "turn x (deg)",
-    "turn_y_deg": "turn y (deg)",
-    "turn_z_deg": "turn z (deg)",
-    "time_s": "time (s)",
-    "normal_force_N": "normal force (N)",
-    "tangential_force_x_N": "friction x (N)",
-    "tangential_force_z_N": "friction z (N)",
-    "friction_sum_N": "sum of |friction| (N)",
-    "force_x_N": "force x (N)",
-    "force_z_N": "force z (N)",
-    "moment_x_Nmm": "moment x (N mm)",
-    "moment_y_Nmm": "moment y (N mm)",
-    "moment_z_Nmm": "moment z (N mm)",
-    "contact_area_mm2": "contact (mm²)",
-    "stick_area_mm2": "stick (mm²)",
-    "largest_penetration_mm": "penetration (mm)",
-    "dissipation_mJ": "dissipation (mJ)",
-}
-"""Key of a step -> column of the table of steps."""
+_UNTABLED = "force_y_N", "external_work_mJ", "outward_friction_x_N", "outward_friction_z_N"
+_OF_STEPS = tuple(one for one in OF_INCREMENT if one.factor == 1.0 and one.name not in _UNTABLED)
+"""Quantities in the table of steps."""
 
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
@@ -153,21 +133,24 @@ def headline(
     """
     by_modulus = by_modulus or {}
 
-    def row(key: str, name: str, value: float | None, unit: str = "", factor: float = 1.0) -> HeadlineRow:
-        error, spread = errors.get(key), by_modulus.get(key)
+    def row(one: Quantity, value: float | None) -> HeadlineRow:
+        error, spread = errors.get(one.name), by_modulus.get(one.name)
+        unit = one.unit.replace("mm2", "mm²")
         if spread is not None:
-            unit = f"{unit}, ± {factor * spread:.2g} by the modulus".removeprefix(", ")
-        shown = "unknown" if value is None else factor * value
-        return HeadlineRow(name, shown, unit, None if error is None else factor * error)
+            unit = f"{unit}, ± {one.factor * spread:.2g} by the modulus".removeprefix(", ")
+        shown = "unknown" if value is None else one.factor * value
+        title = f"{one.title} {one.where}".rstrip()
+        return HeadlineRow(title, shown, unit, None if error is None else one.factor * error)
 
-    rows = [row("depth_mm", "depth", step.depth_mm, "mm")] if "depth_mm" in errors else []
-    for key, (name, factor, unit) in _HEADLINE.items():
-        value = getattr(step, key)
-        if key.startswith("tangential") and abs(value) <= _ROUND_OFF * max(step.friction_sum_N, 1e-300):
-            continue
-        rows.append(row(key, name, value, unit, factor))
+    numbers = {one: getattr(step, one.name) for one in (*named("depth_mm"), *_HEADLINE)}
+    least = _ROUND_OFF * max(step.friction_sum_N, 1e-300)
+    rows = [
+        row(one, value)
+        for one, value in numbers.items()
+        if (one.kind is not Kind.DEPTH or one.name in errors) and (one.kind is not Kind.FORCE or abs(value) > least)
+    ]
     read = step.readings.items()  # a displacement that is zero by symmetry is left out
-    return rows + [row(c.key, c.title, value, c.unit) for c, value in read if value != 0.0 or c.kind != "marker"]
+    return rows + [row(Quantity.of(c), value) for c, value in read if value != 0.0 or c.kind != "marker"]
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
@@ -277,11 +260,15 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     """Return a table of the converged steps; columns of the size of round-off are omitted."""
     scale = max(abs(step.normal_force_N) for step in good)
     # For instance the tangential force of a symmetric press, and slides of a path without them.
-    shown = [k for k in _STEP_COLUMNS if k == "depth_mm" or max(abs(getattr(s, k)) for s in good) > _ROUND_OFF * scale]
+    shown = [
+        one
+        for one in _OF_STEPS
+        if one.name == "depth_mm" or max(abs(getattr(s, one.name)) for s in good) > _ROUND_OFF * scale
+    ]
     columns = [column for column in good[-1].readings if not column.axis]
-    rows = [[*(getattr(s, k) for k in shown), *(s.readings.get(c) for c in columns)] for s in good]
+    rows = [[*(getattr(s, one.name) for one in shown), *(s.readings.get(c) for c in columns)] for s in good]
     names = [f"{QUANTITIES[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
-    table = Table([*(_STEP_COLUMNS[k] for k in shown), *names], rows)
+    table = Table([*(one.label for one in shown), *names], rows)
     return PageSection(
         "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
     )

@@ -12,6 +12,7 @@ from finger3d._types import Float
 from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
 from finger3d.mechanics.discretise.companions import FACTOR
+from finger3d.mechanics.readings.quantities import Quantity, named
 from finger3d.results.comparison import FORCE, Case
 
 WITHIN = 0.05
@@ -199,15 +200,15 @@ def _across(solid: Case) -> list[str]:
     return [f"{100 * across / total:.0f} % of the solid's sum of |friction| act along z, where a section has none."]
 
 
-_QUANTITIES = {
-    FORCE: "force (N per mm of width)",
-    "contact_length_mm": "extent of contact at z = 0 (mm)",
-    "stick_length_mm": "extent of the stick zone at z = 0 (mm)",
-    "friction_sum_N_per_mm": "sum of |friction| (N/mm)",
-    "friction_along_x_N_per_mm": "sum of |friction along x| (N/mm)",
-    "friction_along_z_N_per_mm": "sum of |friction along z| (N/mm)",
-    "peak_pressure_MPa": "peak pressure (MPa)",
-}
+_TABLE = (
+    FORCE,
+    "contact_length_mm",
+    "stick_length_mm",
+    "friction_sum_N_per_mm",
+    "friction_along_x_N_per_mm",
+    "friction_along_z_N_per_mm",
+    "peak_pressure_MPa",
+)
 
 
 def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]:
@@ -217,11 +218,11 @@ def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]
         (c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order),
         key=lambda c: order.index(c.model),
     )
-    shown = _QUANTITIES | {column.key: column.title for case in own for column in case.strains}
+    shown = [*named(*_TABLE), *dict.fromkeys(Quantity.of(column) for case in own for column in case.strains)]
     rows = [
-        [text, *(_with_error(case, key) if key in case.numbers else "" for case in own)]
-        for key, text in shown.items()
-        if any(case.numbers.get(key) for case in own)
+        [one.label, *(_with_error(case, one.name) if one.name in case.numbers else "" for case in own)]
+        for one in shown
+        if any(case.numbers.get(one.name) for case in own)
     ]
     return [["", *(case.model for case in own)], *rows] if rows else []
 

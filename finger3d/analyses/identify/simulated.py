@@ -16,7 +16,6 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.richardson import ORDER
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
 from finger3d.analyses.pressed_body import PressedBody, under
@@ -29,9 +28,9 @@ from finger3d.mechanics.march.path import ending_at, stations, targets
 from finger3d.mechanics.march.step_halving import automatic, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
+from finger3d.mechanics.readings.quantities import OF_INCREMENT, ORDER, kinds_of
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.results.journal import Journal
-from finger3d.results.summary import PressStep
 from finger3d.scene import Scene
 
 OFFSET = "depth_offset_mm"
@@ -47,17 +46,8 @@ MODULI: dict[str, Callable[[float], float]] = {
 _SHORTEST = 1.0 / 30.0
 """Measured part of the path of a scene below which the unit of the depths is in doubt."""
 
-_SCALED = ("_N", "_MPa", "_mJ", "_Nmm")
-"""Endings of the names of numbers that are proportional to Young's modulus."""
-
-_UNITS = ("N", "mm", "mm2", "mJ", "Nmm", "s", "deg")
-"""Last parts of the names of numbers of an increment."""
-
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
-
-_ZONES = ("contact_", "stick_")
-"""First words of the names of lengths and areas of zones."""
 
 _MAX_STORED = 4  # bodies, and presses
 
@@ -70,8 +60,7 @@ Curve = Mapping[str, Float]
 
 def names_of(model: Model) -> tuple[str, ...]:
     """Return the names of the numbers of an increment, readings included."""
-    own = [name for name in PressStep.__dataclass_fields__ if name.split("_")[-1] in _UNITS]
-    return (*own, *by_key(in_space(in_order(dict.fromkeys(model.columns, 0.0)))))
+    return (*(one.name for one in OF_INCREMENT), *by_key(in_space(in_order(dict.fromkeys(model.columns, 0.0)))))
 
 
 @dataclass
@@ -149,7 +138,17 @@ class Simulation:
             If the press fails.
         """
         point, factor = self._point(values)
-        return _scaled(self._unscaled(point), factor)
+        return self._scaled(self._unscaled(point), factor)
+
+    @cached_property
+    def _stresses(self) -> set[str]:
+        """Names of the numbers that are proportional to the stresses."""
+        columns = self.scene([f.middle for f in self.free]).model().columns
+        return {name for name, kind in kinds_of(columns).items() if kind.is_stress}
+
+    def _scaled(self, curve: Curve, factor: float) -> Curve:
+        """Return a curve with stresses times a factor."""
+        return {name: factor * v if name in self._stresses else v for name, v in curve.items()}
 
     def _unscaled(self, point: tuple[float, ...]) -> Curve:
         """Return the curve of a press with the values that it is solved with."""
@@ -168,7 +167,7 @@ class Simulation:
         curve = self._unscaled(point)
         offset = self._offset(values, measured)
         _check_range(measured, offset, curve[measured.index])
-        return dict(_scaled(_at_rows(curve, measured, offset), factor))
+        return dict(self._scaled(_at_rows(curve, measured, offset), factor))
 
     def _offset(self, values: Sequence[float] | Float, measured: MeasuredPress) -> float:
         """Return what is added to the measured depths, mm."""
@@ -192,7 +191,7 @@ class Simulation:
         growth = ratio**ORDER
         shapes = found[_LOAD] / curve[_LOAD][-1] * np.vstack([np.ones_like(growth), growth - 1.0, np.diag(growth)])
         known = {n: np.asarray(bars[n]) for n in measured.columns if math.isfinite(bars.get(n, math.nan))}
-        return {n: shapes * bar for n, bar in _scaled(known, factor).items()}
+        return {n: shapes * bar for n, bar in self._scaled(known, factor).items()}
 
     def _pressed(self, point: tuple[float, ...]) -> tuple[Problem, list[StepResult]]:
         """Return the condensed body at values of the free keys, and its increments; the last ones are kept."""
@@ -252,18 +251,14 @@ def _kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value
 
 def has_zones(columns: Iterable[str]) -> bool:
     """Return whether lengths or areas of zones are among columns of history.csv."""
-    return any(name.startswith(_ZONES) for name in columns)
+    kinds = kinds_of(())
+    return any(name in kinds and kinds[name].is_zone for name in columns)
 
 
 def _curve_of(problem: Problem, steps: Sequence[StepResult], with_zones: bool = True) -> Curve:
     """Return the curve of a press from its increments."""
     rows = [{"step": float(k)} | table_row(problem.points, step, with_zones) for k, step in enumerate(steps, start=1)]
     return {n: np.array([0.0, *(r[n] for r in rows)]) for n in rows[0] if isinstance(rows[0][n], int | float)}
-
-
-def _scaled(curve: Curve, factor: float) -> Curve:
-    """Return a curve with forces times a factor."""
-    return {name: factor * v if name.endswith(_SCALED) else v for name, v in curve.items()}
 
 
 def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, Float]:

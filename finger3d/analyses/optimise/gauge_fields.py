@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.accuracy.richardson import Kind, gain
+from finger3d.accuracy.richardson import gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.fem.recovery.recover import displacement
@@ -22,6 +22,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.readings.quantities import Kind
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Plane
 from finger3d.progress import Progress
