@@ -42,6 +42,37 @@ GROWTH = {2: 1.2, 3: 1.6}
 PRESS_TO_ROUND = 1.3
 """Time of a press over that of its last round of refinement: contact is solved again, and drawn."""
 
+USUAL_INCREMENTS = 20
+"""Usual number of automatic increments, at second order."""
+
+LEAST_BARS_S = 0.5
+COMPANIONS, COMPANIONS_BESIDE, FINER_COMPANION = 0.6, 0.45, 3.5
+"""Seconds of the error bars of any press, and others over those of the press.  The companions have 0.35, 0.13 and 0.02
+of its unknowns in solids; at large deformation they are pressed beside it.  The finer one of a coarse solid has 2.9."""
+
+SOLUTIONS = 5
+"""Contact solutions of an increment in small strain under an object that is not flat, whose normals change.
+
+They were 4 to 7 under a ball, an edge and a wave, and 10 under triangulated objects, whose distances take longer still.
+With them, forecasts for the wavy plate and the gear of geometries/ are 0.7 of the processor time of their presses.
+"""
+
+CONTACT_EXTENT = 0.7
+"""Extents of the contact over those of the overlap of a rigid object; of Hertz's contact."""
+
+BORDER_POINTS, BORDER_UNKNOWNS = {True: 1.2, False: 2.1}, 105.0
+"""Contact points added along one edge of the border of stick, over what its refinement asks for, of swept and other
+meshes; and unknowns for each of them."""
+
+GAUGE_UNKNOWNS = 140.0
+"""Unknowns for each contact point added close to a gauge, those around the gauge included; of the finger of Fig. 9."""
+
+FOIL_ROWS = {2: 16, 3: 96}
+"""Condensed rows of a foil with its mirror images, by dimension."""
+
+FOIL_S = {2: 0.02, 3: 0.2}
+"""Seconds to discretise a foil, by dimension."""
+
 _NODES_PER_TET, _VERTICES_PER_TET = (1.36, 4.0), (0.16, 1.25)
 """Nodes and vertices of a quadratic mesh over its number of tets: inside, and on its surface times tets^(1/3).  Medians
 of 152 meshes of fTetWild with 600 to 20 000 tets lie within 3 % of it, unknowns of large swept meshes within 1 %."""

@@ -13,13 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._cost import (
+    BORDER_POINTS,
+    BORDER_UNKNOWNS,
     CAD_MB,
+    COMPANIONS,
+    COMPANIONS_BESIDE,
+    CONTACT_EXTENT,
     FIGURES_S,
+    FINER_COMPANION,
+    FOIL_ROWS,
+    FOIL_S,
     GAUGE_CELL_S,
     GAUGE_S,
+    GAUGE_UNKNOWNS,
     JUDGEMENT_S,
     JUDGEMENT_SHARE,
+    LEAST_BARS_S,
+    SOLUTIONS,
     START_S,
+    USUAL_INCREMENTS,
     PressSize,
     meshing_s,
     tet_unknowns,
@@ -40,39 +52,8 @@ from finger3d.meshing.limits import check_memory
 from finger3d.meshing.refinement.sizing import Sizing
 from finger3d.objects import PlacedObject
 
-_USUAL = 20
-"""Usual number of automatic increments, at second order."""
-
 _LATTICE = 100
 """Places along each side of a part at which the contact face of an unstructured mesh is counted."""
-
-_LEAST_BARS_S = 0.5
-_COMPANIONS, _BESIDE, _FINER = 0.6, 0.45, 3.5
-"""Seconds of the error bars of any press, and others over those of the press.  The companions have 0.35, 0.13 and 0.02
-of its unknowns in solids; at large deformation they are pressed beside it.  The finer one of a coarse solid has 2.9."""
-
-_SOLUTIONS = 5
-"""Contact solutions of an increment in small strain under an object that is not flat, whose normals change.
-
-They were 4 to 7 under a ball, an edge and a wave, and 10 under triangulated objects, whose distances take longer still.
-With them, forecasts for the wavy plate and the gear of geometries/ are 0.7 of the processor time of their presses.
-"""
-
-_CONTACT = 0.7
-"""Extents of the contact over those of the overlap of a rigid object; of Hertz's contact."""
-
-_BORDER_POINTS, _BORDER_UNKNOWNS = {True: 1.2, False: 2.1}, 105.0
-"""Contact points added along one edge of the border of stick, over what its refinement asks for, of swept and other
-meshes; and unknowns for each of them."""
-
-_GAUGE_UNKNOWNS = 140.0
-"""Unknowns for each contact point added close to a gauge, those around the gauge included; of the finger of Fig. 9."""
-
-_FOIL_ROWS = {2: 16, 3: 96}
-"""Condensed rows of a foil with its mirror images, by dimension."""
-
-_FOIL_S = {2: 0.02, 3: 0.2}
-"""Seconds to discretise a foil, by dimension."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +99,7 @@ def press_cost(model: Model) -> PressCost:
     runs, free = _runs(model, size), sum(leg.steps == "auto" for leg in model.legs)
     fixed = sum(leg.steps for leg in model.legs if isinstance(leg.steps, int))
     marched = len(runs) * fixed + sum(runs) * free
-    solutions = 1 if model.object.is_flat or model.finite_strain else _SOLUTIONS
+    solutions = 1 if model.object.is_flat or model.finite_strain else SOLUTIONS
     seconds = {
         "start": START_S,
         "mesh": meshing_s(made) if _is_meshed_by_tetwild(model) else 3e-7 * size.dofs,
@@ -175,10 +156,10 @@ def forecast(model: Model, bars: bool = False) -> Tree:
 def _error_bars_s(model: Model, size: PressSize, seconds: dict[str, float], added_s: float) -> float:
     """Return the seconds of the error bars of a press from those of its stages, and of its effects."""
     solving = sum(seconds[stage] for stage in ("assembly", "condensation", "contact"))
-    more = _FINER if size.dim == 3 and size.dofs < LEAST_IN_SOLID else 0.0
+    more = FINER_COMPANION if size.dim == 3 and size.dofs < LEAST_IN_SOLID else 0.0
     if model.finite_strain:
-        return _LEAST_BARS_S + (_BESIDE + more) * (solving + added_s)
-    return _LEAST_BARS_S + (_COMPANIONS + more) * solving + max(JUDGEMENT_S, JUDGEMENT_SHARE * solving)
+        return LEAST_BARS_S + (COMPANIONS_BESIDE + more) * (solving + added_s)
+    return LEAST_BARS_S + (COMPANIONS + more) * solving + max(JUDGEMENT_S, JUDGEMENT_SHARE * solving)
 
 
 def without_output_s(expected: Tree) -> float:
@@ -198,7 +179,7 @@ def _runs(model: Model, size: PressSize) -> list[int]:
     if model.finite_strain:  # they are chosen on a coarser mesh
         return [last]
     runs = [first]
-    while runs[-1] < min(_USUAL, last):
+    while runs[-1] < min(USUAL_INCREMENTS, last):
         runs.append(2 * runs[-1])
     return runs
 
@@ -236,10 +217,10 @@ def _with_borders(model: Model, axes: tuple[str, ...], cells: int, size: PressSi
     if size.dim == 2 or _passes(model) == 0 or model.friction.largest == 0.0 or mesh.borders is not None:
         return cells, size
     x_min, x_max, z_min, z_max = model.first_contact.contact_box
-    edges = 2.0 * _CONTACT * (x_max - x_min + z_max - z_min) / 2 ** len(axes) / mesh.size_mm
+    edges = 2.0 * CONTACT_EXTENT * (x_max - x_min + z_max - z_min) / 2 ** len(axes) / mesh.size_mm
     finer = mesh.stick_refinement
-    points = _BORDER_POINTS[mesh.mesher == "swept"] * (0.3 * finer**2 + finer - 1.0) * edges
-    dofs = size.dofs + _BORDER_UNKNOWNS * points
+    points = BORDER_POINTS[mesh.mesher == "swept"] * (0.3 * finer**2 + finer - 1.0) * edges
+    dofs = size.dofs + BORDER_UNKNOWNS * points
     return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
 
 
@@ -258,7 +239,7 @@ def _with_gauges(model: Model, axes: tuple[str, ...], cells: int, size: PressSiz
         mirrored = sum(abs(at) < reach for axis, at in (("x", x), ("z", z)) if axis in axes)
         face = min(math.pi * reach, 2.0 * model.design.width_mm) * reach / 2.0**mirrored
         points += max(face / 0.866 * (edge**-2 - mesh.size_mm**-2), 0.0)
-    dofs = size.dofs + _GAUGE_UNKNOWNS * points
+    dofs = size.dofs + GAUGE_UNKNOWNS * points
     return round(cells * dofs / size.dofs), PressSize(size.dim, dofs, size.contact_points + points)
 
 
@@ -330,10 +311,10 @@ def added_cost(slot: str, model: Model, press: PressCost) -> AddedCost:
             )
         case "inclusions":
             foils, d = len(model.gauges), press.size.dim
-            rows = _FOIL_ROWS[d] * foils
+            rows = FOIL_ROWS[d] * foils
             share = min(rows / max(d * press.size.contact_points, 1.0), 1.0)
             return AddedCost(
-                seconds=share * press.seconds["condensation"] + press.seconds["contact"] + _FOIL_S[d] * foils,
+                seconds=share * press.seconds["condensation"] + press.seconds["contact"] + FOIL_S[d] * foils,
                 memory_mb=40e-6 * rows**2,
                 reason=f"{rows} more rows, and every increment once more without the foils",
             )
