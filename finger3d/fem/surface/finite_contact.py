@@ -51,10 +51,10 @@ class _Area:
         turned = [unit] if u.shape[1] == 2 else [np.cross(moved[1], unit), np.cross(unit, moved[0])]
         return cls(face, length / initial, initial, moved, turned)
 
-    def transposed(self, weights: Float) -> Float:
-        """Return the sum (n, d) of the derivatives with weights (q,)."""
+    def along(self, weights: Float) -> list[Float]:
+        """Return the sums of the derivatives with weights (q,), along the d - 1 axes of the facets (q, d)."""
         scaled = (weights / self.initial)[:, None]
-        return np.asarray(sum(x.T @ (scaled * t) for t, x in zip(self.turned, self.face.along, strict=True)))
+        return [scaled * one for one in self.turned]
 
     @cached_property
     def derivative(self) -> sp.csr_matrix:
@@ -128,18 +128,17 @@ class DeformedContact:
         face, area = self.face, self.area
         tangential = force.copy()
         tangential[:, 0] = force[:, 0] * (not self.follows_area)
-        out: Float = face.trace.T @ np.einsum("ctk,ct->ck", self.bases, tangential)
-        if self.follows_area:
-            per_area = force[:, 0] / self._slope_area
-            pressure = face.average.T @ per_area
-            out += face.interpolate.T @ ((pressure * area.ratio)[:, None] * self.samples_normal)
-            out += area.transposed(self._uneven(per_area))
-        return out
+        at_points = np.einsum("ctk,ct->ck", self.bases, tangential)
+        if not self.follows_area:
+            return np.asarray(face.trace.T @ at_points)
+        pressure, uneven = self._spread(force[:, 0] / self._slope_area)
+        at_samples = (pressure * area.ratio)[:, None] * self.samples_normal
+        return np.asarray(face.to_nodes @ np.concatenate([at_points, at_samples, *area.along(uneven)]))
 
-    def _uneven(self, per_area: Float) -> Float:
-        """Return the weights (q,) of the area's derivatives under forces per area (c,) at the points."""
-        average = self.face.average
-        return np.asarray(self.samples_gap * (average.T @ per_area) - average.T @ (per_area * self.slope * self.gap))
+    def _spread(self, per_area: Float) -> tuple[Float, Float]:
+        """Return pressures (q,) and weights (q,) of the area's derivatives under forces per area (c,) at the points."""
+        pressure, mean = (self.face.spread @ np.stack([per_area, per_area * self.slope * self.gap], axis=1)).T
+        return pressure, self.samples_gap * pressure - mean
 
     @cached_property
     def rows(self) -> sp.csr_matrix:
@@ -190,14 +189,14 @@ class DeformedContact:
         """
         face = self.face
         spread = self.area.derivative
-        per_area = force / self._slope_area
-        pressure = sp.diags_array(face.average.T @ per_area)
+        at_samples, uneven = self._spread(force / self._slope_area)
+        pressure = sp.diags_array(at_samples)
         normal = self.rows[:: self.bases.shape[1]]
         per_mean = sp.diags_array(force / self._mean_area)
         half = self._d_gap.T @ pressure @ spread - normal.T @ per_mean @ face.average @ spread
-        total = half + half.T + self.area.second_derivative(self._uneven(per_area))
+        total = half + half.T + self.area.second_derivative(uneven)
         if curvature is not None:
-            weighted = (pressure.diagonal() * self.area.ratio)[:, None, None] * curvature
+            weighted = (at_samples * self.area.ratio)[:, None, None] * curvature
             total = total + face.vector_interpolate.T @ block_diagonal(weighted) @ face.vector_interpolate
         return sp.csr_matrix(total)
 

@@ -91,6 +91,17 @@ class BoundarySurface:
         order = np.arange(rows.shape[0]).reshape(count, -1, d).swapaxes(0, 1).ravel()
         return sp.csr_matrix(rows[order])
 
+    @cached_property
+    def to_nodes(self) -> sp.csr_matrix:
+        """Transposes (n, c + d q) of `trace`, `interpolate` and `along`, side by side."""
+        rows = sp.vstack([self.trace, self.interpolate, *self.along], format="csr")
+        return sp.csr_matrix(rows.T)
+
+    @cached_property
+    def spread(self) -> sp.csr_matrix:
+        """Transpose (q, c) of `average`."""
+        return sp.csr_matrix(self.average.T)
+
     def _on_vectors(self, rows: sp.csr_matrix) -> sp.csr_matrix:
         return sp.csr_matrix(sp.kron(rows, np.eye(self.points.shape[1]), format="csr"))
 
