@@ -98,7 +98,7 @@ def test_the_numbers_of_the_models_are_a_table() -> None:
     ]
     head, force, *others = numbers_table([*cases, case("solid", 99.0, 1.0)], 20.0)
     assert head == ["", "solid", "plane strain"]
-    assert force == ["force (N per mm of width)", "10.00 ± 0.10", "15.00 ± 0.20"]
+    assert force == ["normal force (N/mm)", "10.00 ± 0.10", "15.00 ± 0.20"]
     assert ["strain of gauge g", "0.02", "0.01"] in others
     assert numbers_table(cases, 50.0) == []
 

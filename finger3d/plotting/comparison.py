@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d.plotting.layout import WIDEST, finish, sheet
-from finger3d.results.comparison import FORCE, Case
+from finger3d.results.comparison import FORCE, SHOWN, Case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
-_QUANTITIES = {
-    FORCE: "force",
-    "contact_length_mm": "extent of\ncontact",
-    "stick_length_mm": "extent of\nstick",
-    "friction_sum_N_per_mm": "sum of\n|friction|",
-    "friction_along_x_N_per_mm": "|friction\nalong x|",
-    "peak_pressure_MPa": "peak\npressure",
-}
 _MOST_QUANTITIES = 9  # groups of bars
 
 
@@ -88,7 +81,9 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
     if solid is None:
         axes.set_axis_off()
         return
-    names = _QUANTITIES | {column.key: f"gauge\n{column.sensor}" for column in solid.strains}
+    names = {one.name: fill(one.title, 11) for one in SHOWN} | {
+        column.key: f"gauge\n{column.sensor}" for column in solid.strains
+    }
     keys = [k for k in names if solid.numbers[k] != 0.0][:_MOST_QUANTITIES]
     shown = [c for c in own if c.model != "solid, ends held"]
     at, step = np.arange(len(keys)), 0.8 / max(len(shown), 1)

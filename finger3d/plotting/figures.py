@@ -136,7 +136,7 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> Non
     rows = {
         "force on the finger (N)": [
             ("normal force", "#222222", normal),
-            ("sum of |friction|", "#c0392b", values("friction_sum_N")),
+            ("friction sum", "#c0392b", values("friction_sum_N")),
             ("net friction along x", "#2c5f9e", values("tangential_force_x_N")),
             ("net friction along z", "#3c8d4f", values("tangential_force_z_N")),
         ],

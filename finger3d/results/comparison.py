@@ -9,8 +9,20 @@ from finger3d._types import Tree, TreeView
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.readings.quantities import named
 
 FORCE = "force_N_per_mm"
+
+SHOWN = named(
+    FORCE,
+    "contact_length_mm",
+    "stick_length_mm",
+    "friction_sum_N_per_mm",
+    "friction_along_x_N_per_mm",
+    "friction_along_z_N_per_mm",
+    "peak_pressure_MPa",
+)
+"""Quantities that tables and figures of a comparison show."""
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from finger3d._types import Float
 from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
 from finger3d.mechanics.discretise.companions import FACTOR
-from finger3d.mechanics.readings.quantities import Quantity, named
-from finger3d.results.comparison import FORCE, Case
+from finger3d.mechanics.readings.quantities import Quantity
+from finger3d.results.comparison import FORCE, SHOWN, Case
 
 WITHIN = 0.05
 """Relative deviation from the solid below which a plane model is called sufficient."""
@@ -197,18 +197,7 @@ def _across(solid: Case) -> list[str]:
     total, across = (solid.numbers[k] for k in ("friction_sum_N_per_mm", "friction_along_z_N_per_mm"))
     if total <= 0.0:
         return []
-    return [f"{100 * across / total:.0f} % of the solid's sum of |friction| act along z, where a section has none."]
-
-
-_TABLE = (
-    FORCE,
-    "contact_length_mm",
-    "stick_length_mm",
-    "friction_sum_N_per_mm",
-    "friction_along_x_N_per_mm",
-    "friction_along_z_N_per_mm",
-    "peak_pressure_MPa",
-)
+    return [f"{100 * across / total:.0f} % of the solid's friction sum act along z, where a section has none."]
 
 
 def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]:
@@ -218,7 +207,7 @@ def numbers_table(cases: Sequence[Case], own_width_mm: float) -> list[list[str]]
         (c for c in cases if c.ok and c.width_mm == own_width_mm and c.model in order),
         key=lambda c: order.index(c.model),
     )
-    shown = [*named(*_TABLE), *dict.fromkeys(Quantity.of(column) for case in own for column in case.strains)]
+    shown = [*SHOWN, *dict.fromkeys(Quantity.of(column) for case in own for column in case.strains)]
     rows = [
         [one.label, *(_with_error(case, one.name) if one.name in case.numbers else "" for case in own)]
         for one in shown
