@@ -1,13 +1,12 @@
 """What does an error cost in time: force, gauge strain and stick area of a section, beside CalculiX and FElupe?
 
 The Fig. 9 finger in plane strain, nu = 0.45, mu = 0.25, pressed 10 mm: the section of beside_calculix.py, on its
-quadratic meshes and on finer and coarser ones, of equal grading.  The path of a section under a plane is exact, so that
-errors are those of the mesh.  The truth is extrapolated from the two finest meshes by the rate of each number on the
-three finest; where these do not converge evenly, it is that of the finest mesh, uncertain by the last difference.
-Errors below the uncertainty are not drawn.  Times are the least of three, from the meshing to the last increment.
-Both peers press half sections in ten increments, once on each mesh, and their errors include those of their penalties:
-CalculiX those of beside_calculix.py, FElupe 11.3 those of its defaults.  Where ccx or FElupe is not installed its
-committed runs are shown.
+quadratic meshes and on finer and coarser ones, of equal grading, in automatic increments.  The truth is extrapolated
+from the two finest meshes by the rate of each number on the three finest; where these do not converge evenly, it is
+that of the finest mesh, uncertain by the last difference.  Errors below the uncertainty are not drawn.  Times are the
+least of three, from the meshing to the last increment.  Both peers press half sections in ten increments, once on each
+mesh, and their errors include those of their penalties: CalculiX those of beside_calculix.py, FElupe 11.3 those of its
+defaults.  Where ccx or FElupe is not installed its committed runs are shown.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Do the standard deviation and the 90 % interval of mu hold for readings of sensors within their tolerances?
 
-No source; the readings are presses of the same finger on a mesh four times finer and with more increments than those
-of the calibration.  Coefficient of friction, depth and Young's modulus are drawn, the last two with the standard
+No source; the readings are presses of the same finger on a mesh four times finer and with more increments than those of
+the calibration.  Coefficient of friction, depth and Young's modulus are drawn, the last two with the standard
 deviations that the calibration was given, and noise is added.  The finger of Fig. 9 is pressed 10 mm in plane strain
 and as a solid 20 mm wide; it has two gauges and a taxel, of which one gauge, or all three, are read.  It is calibrated
-on three meshes, the solid with 10 to 80 increments, and the section along its exact path.  z is (estimated - true) /
-stated standard deviation of mu, where an estimate is given.
+on three meshes, the solid with 10 to 80 increments.  z is (estimated - true) / stated standard deviation of mu, where
+an estimate is given.
 """
 
 from __future__ import annotations

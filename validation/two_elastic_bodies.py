@@ -170,7 +170,7 @@ def _swapped_rows(quick: bool) -> list[Row]:
     size = 0.12 if quick else 0.06
     block = {"half_length_mm": 5.0, "height_mm": 5.0, "width_mm": 2.0}
     under_bar = Effect(2.0, 0.45).apply(_half(1.0, 0.3, size, Cylinder(radius_mm=5.0), 0.2, **block))
-    one = _last(replace(under_bar, legs=(Leg(0.2, steps=20),)))  # the other follows its exact path
+    one = _last(replace(under_bar, legs=(Leg(0.2, steps=20),)))
     other = _last(Effect(1.0, 0.3, 5.0).apply(_half(2.0, 0.45, size, Plane(), 0.2)))
     force, friction = (other[key] / one[key] for key in ("normal_force_N", "friction_sum_N"))
     third = "Newton's third law"

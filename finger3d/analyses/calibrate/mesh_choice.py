@@ -33,8 +33,14 @@ class CalibratedMesh:
 
 
 def mesh_share(calibration: Calibration) -> float:
-    """Return the largest share of the mesh in the variance of mu, over all calibrated mu."""
-    return float(np.max(calibration.reductions(calibration.mu).get("mesh", 0.0)))
+    """Return the largest share of the mesh in the variance of mu, over the calibrated mu that noise lets tell.
+
+    Where all points stick, a reading hardly depends on mu, and any error outweighs its noise.
+    """
+    mu = calibration.mu
+    told = np.array([any(low <= one <= high for low, high in calibration.usable) for one in mu])
+    share = np.broadcast_to(calibration.reductions(mu).get("mesh", 0.0), mu.shape)
+    return float(np.max(share, where=told, initial=0.0))
 
 
 def choose_mesh(
