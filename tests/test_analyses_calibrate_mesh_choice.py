@@ -94,7 +94,8 @@ def test_a_mesh_that_cannot_be_made_leaves_the_calibration_before() -> None:
 @pytest.mark.slow
 def test_the_mesh_that_was_chosen_is_that_of_the_results(tmp_path: Path) -> None:
     only = {**NONE, "mesh": 1.0}
-    chosen = calibrate(scene(mesh={"mesher": "swept"}), "g36", tmp_path / "own", FEW, noise=3e-4, tolerances=only)
+    chosen = calibrate(scene(mesh={"mesher": "swept"}), "g36", tmp_path / "own", FEW, noise=1e-3, tolerances=only)
+    assert chosen.about["mesh"]["size_mm"] < 0.5  # of the first mesh
     assert chosen.about["mesh"]["note"] == ""
     assert mesh_share(chosen) <= SHARE
     assert load(tmp_path / "own" / "scene.toml").mesh.size_mm == chosen.about["mesh"]["size_mm"]
