@@ -81,7 +81,9 @@ def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | str) -
 
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     measured = measure(problem.points, step)
-    return {name: float(measured[name]) for name in (*FORCES, *ENERGIES)} | step.gauges
+    return {name: float(measured[name]) for name in (*FORCES, *ENERGIES)} | {
+        f"strain {gauge}": strain for gauge, strain in step.gauges.items()
+    }
 
 
 def _errors(exact: dict[str, float], numbers: dict[str, float]) -> dict[str, float]:
@@ -154,6 +156,8 @@ def _grid_rows(grid: Sequence[tuple[Any, ...]]) -> list[Row]:
 
 
 def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tuple[Any, ...]]) -> None:
+    from matplotlib import colormaps
+
     left, right = figure.subplots(1, 2)
     cases = list(dict.fromkeys(key[:2] for key in errors))
     for k, (name, mu) in enumerate(cases):
@@ -161,7 +165,7 @@ def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tupl
             counts = [n for *of, n in errors if of == [name, mu, kind]]
             worst = [max(errors[name, mu, kind, n].values()) for n in counts]
             label = f"{name}, mu = {mu:g}" if kind == OWN else None
-            left.loglog(counts, worst, f"o{style}", ms=3, lw=1, color=f"C{k % 10}", label=label)
+            left.loglog(counts, worst, f"o{style}", ms=3, lw=1, color=colormaps["tab20"](k), label=label)
     left.set(xlabel="increments", ylabel="largest relative error", title="finger3d's (lines), plain (dotted)")
     left.legend(fontsize=6)
     for k, number in enumerate(dict.fromkeys(line[2] for line in automatic)):
