@@ -84,7 +84,7 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
     names = {one.name: fill(one.title, 11) for one in SHOWN} | {
         column.key: f"gauge\n{column.sensor}" for column in solid.strains
     }
-    keys = [k for k in names if solid.numbers[k] != 0.0][:_MOST_QUANTITIES]
+    keys = [k for k in names if solid.numbers.get(k)][:_MOST_QUANTITIES]
     shown = [c for c in own if c.model != "solid, ends held"]
     at, step = np.arange(len(keys)), 0.8 / max(len(shown), 1)
     for i, case in enumerate(shown):
