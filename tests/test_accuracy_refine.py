@@ -205,7 +205,7 @@ def test_the_best_round_need_not_be_the_last() -> None:
     ("domain", "mesher", "tolerance"),
     [
         ("plane-strain", "swept", 0.05),
-        ("solid", "swept", 0.3),
+        pytest.param("solid", "swept", 0.3, marks=pytest.mark.slow),
         pytest.param("solid", "ftetwild", 0.3, marks=pytest.mark.slow),
     ],
 )

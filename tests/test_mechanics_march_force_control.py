@@ -288,12 +288,15 @@ def load_again(text: str, folder: Path) -> object:
     return load(folder / "again.toml")
 
 
+SMALL = "--set", "effects.auto=false", "--set", "press.steps=1"
+
+
 def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
-    assert main(["press", str(path), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]) == 0
+    assert main(["press", str(path), "--out", str(tmp_path / "out"), "--no-figures", "--no-error", *SMALL]) == 0
     assert "0.5 N" in capsys.readouterr().out
-    assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4"]) == 3
+    assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=1e4", *SMALL]) == 3
     error = capsys.readouterr().err
     assert "10000 N asked; the largest force is" in error
     summary = json.loads((tmp_path / "far" / "summary.json").read_text())

@@ -222,6 +222,7 @@ def test_the_reading_of_one_gauge_in_the_readme_gives_the_mu_it_states(
     assert float(found[1]) == pytest.approx(float(quoted), abs=0.006)  # two digits
 
 
+@pytest.mark.slow
 def test_every_estimate_of_the_tutorial_on_friction_finds_the_mu_that_was_read(
     root: Path, folder: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -170,8 +170,8 @@ def _swapped_rows(quick: bool) -> list[Row]:
     size = 0.12 if quick else 0.06
     block = {"half_length_mm": 5.0, "height_mm": 5.0, "width_mm": 2.0}
     under_bar = Effect(2.0, 0.45).apply(_half(1.0, 0.3, size, Cylinder(radius_mm=5.0), 0.2, **block))
-    one = _last(replace(under_bar, legs=(Leg(0.2, steps=20),)))
-    other = _last(Effect(1.0, 0.3, 5.0).apply(_half(2.0, 0.45, size, Plane(), 0.2)))
+    over_block = Effect(1.0, 0.3, 5.0).apply(_half(2.0, 0.45, size, Plane(), 0.2))
+    one, other = (_last(replace(model, legs=(Leg(0.2, steps=20),))) for model in (under_bar, over_block))
     force, friction = (other[key] / one[key] for key in ("normal_force_N", "friction_sum_N"))
     third = "Newton's third law"
     return [
