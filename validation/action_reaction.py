@@ -6,10 +6,8 @@ moment; friction dissipates at every point in every increment; a mirror-symmetri
 work of the object equals the stored energy, u K u / 2, plus the dissipation.
 
 Theory of the rates: the work of the contact forces on a linear body is integrated exactly, so without friction the
-balance holds to round-off in any number of increments.  A section under a plane goes from event to event, between
-which forces and slip are linear, so that its balance holds to round-off with friction, too.  In a solid dissipation is
-slip times the friction under the mean normal force of the increment; where friction turns during an increment it leaves
-an error of the second order in the step.
+balance holds to round-off in any number of increments.  Dissipation is slip times the friction under the mean normal
+force of the increment; where friction turns during an increment it leaves an error of the second order in the step.
 """
 
 from __future__ import annotations
@@ -127,7 +125,7 @@ def run(quick: bool) -> Result:
 
 
 def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> list[Row]:
-    """Rows of the work's balance, of a solid with friction also of its rate."""
+    """Rows of the work's balance, with friction also of its rate."""
     rows = []
     for mu, counts, slide in ((0.25, (20, 40, 80), 15.0), (0.0, (5, 10, 20, 40), 0.0)):
         found = [balance(problem, along(problem, n, mu, slide)[-1]).work for n in counts]
@@ -135,7 +133,7 @@ def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[t
         curves[f"mu = {mu:g}"][name] = steps, np.abs(found)
         table += [(name, mu, n, e) for n, e in zip(counts, found, strict=True)]
         kind = f"{name}, mu = {mu:g}"
-        if mu == 0.0 or problem.dim == 2:
+        if mu == 0.0:
             worst = float(np.abs(found).max())
             what = f"work less stored and lost, over the work, {kind}, {counts[0]} to {counts[-1]} increments, largest"
             rows.append(Row(what, _ALWAYS, 0.0, worst, 1e-10, "round-off", measure="absolute"))
@@ -165,5 +163,5 @@ def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None
         axes.grid(alpha=0.3)
         ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
         axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
-        axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}; sections: round-off")
+        axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}")
         axes.set_xticks([], minor=True)
