@@ -8,7 +8,7 @@ For each the finger is pressed 10 mm, its strain is read 25 times with errors dr
 their mean with its standard deviation, and the object is lifted: normal force Q / (mu - 3 std), then the tangential
 force Q, half of the weight.  Three standard deviations fail once in 741 objects. An estimate that says that mu is not
 determined is not acted on; the hand then looks for another place, and the object counts apart.  Every tolerance but the
-noise is left out, as in the tutorial, and the readings are those of the calibrated model.
+noise is left out, as in the tutorial, and the readings are those of the calibrated model on its exact path.
 
 One reading is too few where mu is small, because the gauge tells little there.  The standard deviation of mu is the
 noise over the slope of the strain against mu, to a few percent in the median; the slope is 0.055 below mu = 0.17 and
@@ -44,6 +44,7 @@ from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.sensor import Calibration, Estimate, estimate
 
+from ._exact_path import exact_press
 from ._paper import columns
 from ._rows import Result, Row
 
@@ -111,7 +112,8 @@ def lifting(normal: float, load: float) -> tuple[Leg, Leg]:
 def lifted(problem: Problem, calibration: Calibration, weight: float, mu: float, noise: float, errors: Float) -> Lift:
     """Read mu, and lift; errors : (`READINGS`,) of the strain."""
     load, least = 0.5 * weight * G, 0.5 * weight * G / mu
-    (*_, press) = pressed(problem, mu, (Leg(DEPTH, steps=1),))
+    once = replace(problem.model, friction=Coulomb(mu), legs=(Leg(DEPTH, steps=1),))
+    (press,) = exact_press(replace(problem, model=once))
     strain = measure(problem.points, press)["gauges"]["g36"]
     found, first = (
         estimate(calibration, strain + x.mean(), noise / math.sqrt(len(x)), tolerances=False)[0]

@@ -29,8 +29,10 @@ from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects
 from finger3d.sensor.maps import Reader
 
-_STEPS = 20
-"""Number of increments of a leg with automatic increments; few suffice, as places are only compared."""
+_STEPS, _STEPS_OF_SECTION = 20, 80
+"""Number of increments of a leg with automatic increments; few suffice, as places are only compared.  In a section in
+small strain they cost little, and twenty lead to other places: in the finger of Fig. 9 two gauges then tell mu to 0.016
+in place of 0.014."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,8 @@ class GaugeFields:
         model = replace(model, gauges=(), markers=(), taxels=())
         report.stage("pressing the body")
         body = PressedBody(model, report)
-        legs = with_steps(body.problem, _STEPS).model.legs
+        is_quick = body.problem.dim == 2 and not model.finite_strain
+        legs = with_steps(body.problem, _STEPS_OF_SECTION if is_quick else _STEPS).model.legs
         ends = body.ends(list(mus), legs)
         nominal = StrainField.of_frames(under(body.problem, legs=legs), ends, mus)
         problem, shared = nominal.problem, {}

@@ -157,10 +157,10 @@ def with_scaled_steps(problem: Problem, ratio: float) -> tuple[Problem, float]:
     return replace(problem, model=replace(problem.model, legs=scaled)), sum(counts) / sum(own)
 
 
-def with_few_increments(problem: Problem) -> Problem:
-    """Return the problem with at most `_FEW` increments in each leg."""
+def with_few_increments(problem: Problem, most: int = _FEW) -> Problem:
+    """Return the problem with at most so many increments in each leg, as many in one with automatic increments."""
     legs = (
-        replace(leg, steps=min(leg.steps, _FEW) if isinstance(leg.steps, int) else _FEW) for leg in problem.model.legs
+        replace(leg, steps=min(leg.steps, most) if isinstance(leg.steps, int) else most) for leg in problem.model.legs
     )
     return replace(problem, model=replace(problem.model, legs=tuple(legs)))
 
