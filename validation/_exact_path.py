@@ -81,14 +81,12 @@ class Event(NamedTuple):
     state : at the event; the status of a point is the one on the way from the event before
     residual : largest violation of the contact conditions since the event before, dimensionless
     systems : number of systems of equations that were solved on the path so far
-    is_increment : whether an increment led here from the event before, in which forces jump
     """
 
     share: float
     state: ContactState
     residual: float
     systems: int
-    is_increment: bool = False
 
 
 class _ActiveSet(NamedTuple):
@@ -172,9 +170,7 @@ class _Path:
         at_limit = (normal > border) & ((self._set.status == SLIP) | (beyond >= -border * self._limit))
         at_limit &= self.problem.friction > 0.0
         sign = np.where(at_limit, np.sign(self.force[:, 1]), self._set.sign)
-        status = self._set.status
-        chosen = _ActiveSet(status, sign)
-        line = self._improved(chosen, at_apex, at_limit, (True, False))
+        line = self._improved(_ActiveSet(self._set.status, sign), at_apex, at_limit, (True, False))
         return self._by_pivots(at_apex, at_limit, sign) if line is None else line
 
     def _improved(
@@ -315,7 +311,7 @@ class _Path:
         until = step * (1.0 + 1e-12)
         return step, touch <= until, (limit <= until) & (leave > until), leave <= until
 
-    def _record(self, force: Float, moved: Float, status: Status, share: float, is_increment: bool = False) -> bool:
+    def _record(self, force: Float, moved: Float, status: Status, share: float) -> bool:
         """Keep a state if the contact conditions hold on the way to it; return whether they do."""
         part = np.column_stack([moved[:, 0], moved[:, 1] - self.displacement[:, 1]])
         error = residual(force, part, status, self.problem.friction, self.problem.length_scale)
@@ -323,7 +319,7 @@ class _Path:
             return False
         self.force, self.displacement, self.share = force, moved, share
         self.state = next_state(self.state, force, part, status)
-        self.events.append(Event(share, self.state, error, self.systems, is_increment))
+        self.events.append(Event(share, self.state, error, self.systems))
         return True
 
     def jump(self) -> bool:
@@ -346,7 +342,7 @@ class _Path:
             raise RuntimeError(f"no increment over a jump: {found.outcome}")
         self._jumps, self._landed, self._stride = self._jumps + 1, share, share - self.share
         moved = self._through_body(found.state.force) + self._start + share * self._rate
-        if not self._record(found.state.force, moved, found.state.status, share, is_increment=True):
+        if not self._record(found.state.force, moved, found.state.status, share):
             raise RuntimeError("the conditions do not hold after a jump")
         self._set = _ActiveSet(found.state.status, np.sign(self.force[:, 1]))
         return share >= 1.0

@@ -18,8 +18,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import QUANTITIES
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings.columns import MEASURED
+from finger3d.mechanics.readings.quantities import quantities
 from finger3d.mechanics.results.history import StepResult
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
@@ -48,11 +48,11 @@ def modulus_errors(
     """
     if not spreads or not steps:
         return {}, ""
-    others = {column.key for column in steps[-1].readings if column.kind not in QUANTITIES}
+    others = {column.key for column in steps[-1].readings if column.kind not in MEASURED}
     told = {name: x for name, x in numbers(problem, steps[-1]).items() if name not in others}
     if set(spreads) == {""} and problem.model.forces_scale_with_modulus:
-        kinds = kinds_of(steps[-1].readings)
-        return {name: spreads[""] * abs(x) for name, x in told.items() if kinds[name].is_stress}, ""
+        known = quantities(steps[-1].readings)
+        return {name: spreads[""] * abs(x) for name, x in told.items() if known[name].is_stress}, ""
     try:
         found = _by_variants(problem, len(steps), spreads, numbers)
     except FAILURES as error:

@@ -116,7 +116,7 @@ def spread_error(
     found = {}
     for name, value in numbers.items():
         errors = [(value - other[name]) / gain(ratio, kinds[name].order) for ratio, other in told]
-        bar = kinds[name].factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
+        bar = kinds[name].bar_factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
         scale = scale_of(numbers, kinds, name)
         if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
             scale *= _LEAST_SLIP

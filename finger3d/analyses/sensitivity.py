@@ -28,7 +28,7 @@ from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column, in_space
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings.quantities import quantities
 from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
@@ -291,10 +291,10 @@ def differences(problem: Problem, changes: Mapping[str, Change]) -> Differences:
         sides[at] = _less(variant.found[0], numbers) if variant.found else variant.failure
     for at in read:
         sides[at] = _less(_read_anew(problem, last, ends[at]), numbers)
-    kinds = kinds_of(last.readings)
+    known = quantities(last.readings)
     for key, side in scaled:
         ratio = (2 * side - 1) * changes[key].change / changes[key].value
-        sides[key, side] = {name: ratio * x if kinds[name].is_stress else 0.0 for name, x in numbers.items()}
+        sides[key, side] = {name: ratio * x if known[name].is_stress else 0.0 for name, x in numbers.items()}
 
     def side_of(key: str, k: int) -> Side:
         end = changes[key].ends[k]

@@ -78,9 +78,6 @@ def _kept(out: Path, report: Progress) -> str:
     )
 
 
-_NUMBERS = "normal_force_N friction_sum_N contact_half_length_mm stick_half_length_mm contact_area_mm2 stick_area_mm2"
-
-
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
@@ -107,6 +104,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
 def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tuple[str, str]]:
     """Yield the quantities of a step by their titles, with their errors and what effects that are off would change."""
     from finger3d.accuracy.error_bars import with_error
+    from finger3d.mechanics.readings.columns import AREAS, MAIN
     from finger3d.mechanics.readings.quantities import Quantity, named
     from finger3d.results.summary import readings_of
 
@@ -122,7 +120,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
 
     (depth,) = named("depth_mm")
     yield depth.title, f"{line(depth, last[depth.name])}, increment {summary['steps'].index(last) + 1}"
-    for one in named(*_NUMBERS.split()):
+    for one in named(*MAIN, *AREAS):
         yield one.title, line(one, last[one.name])
     read = {c: v for c, v in readings_of(last["gauges"], last["markers"], last["taxels"]).items() if v is not None}
     for (kind, sensor), group in groupby(read, key=lambda c: (c.kind, c.sensor)):

@@ -12,7 +12,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.mechanics.readings.columns import QUANTITIES
+from finger3d.mechanics.readings.columns import AREAS, MAIN, MEASURED
 from finger3d.mechanics.readings.quantities import OF_INCREMENT, Kind, Quantity, named
 from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table, write_page
 from finger3d.report.scene import how_modelled
@@ -20,17 +20,7 @@ from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import PressStep, gauges_of, read_json, steps_of, title_of
 
-_HEADLINE = named(
-    "normal_force_N",
-    "friction_sum_N",
-    "tangential_force_x_N",
-    "contact_half_length_mm",
-    "stick_half_length_mm",
-    "contact_area_mm2",
-    "stick_area_mm2",
-    "external_work_mJ",
-    "dissipation_mJ",
-)
+_HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, "external_work_mJ", "dissipation_mJ")
 
 _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
@@ -135,7 +125,7 @@ def headline(
 
     def row(one: Quantity, value: float | None) -> HeadlineRow:
         error, spread = errors.get(one.name), by_modulus.get(one.name)
-        unit = one.unit.replace("mm2", "mm²")
+        unit = _spelt(one.unit)
         if spread is not None:
             unit = f"{unit}, ± {one.factor * spread:.2g} by the modulus".removeprefix(", ")
         shown = "unknown" if value is None else one.factor * value
@@ -151,6 +141,11 @@ def headline(
     ]
     read = step.readings.items()  # a displacement that is zero by symmetry is left out
     return rows + [row(Quantity.of(c), value) for c, value in read if value != 0.0 or c.kind != "marker"]
+
+
+def _spelt(text: str) -> str:
+    """Return a text with units as they are printed."""
+    return text.replace("mm2", "mm²").replace("Nmm", "N mm")
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
@@ -267,8 +262,8 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     ]
     columns = [column for column in good[-1].readings if not column.axis]
     rows = [[*(getattr(s, one.name) for one in shown), *(s.readings.get(c) for c in columns)] for s in good]
-    names = [f"{QUANTITIES[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
-    table = Table([*(one.label for one in shown), *names], rows)
+    names = [f"{MEASURED[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
+    table = Table([*(_spelt(one.label) for one in shown), *names], rows)
     return PageSection(
         "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
     )

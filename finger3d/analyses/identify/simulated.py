@@ -28,7 +28,7 @@ from finger3d.mechanics.march.path import ending_at, stations, targets
 from finger3d.mechanics.march.step_halving import automatic, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.readings.columns import by_key, in_order, in_space
-from finger3d.mechanics.readings.quantities import OF_INCREMENT, ORDER, kinds_of
+from finger3d.mechanics.readings.quantities import OF_INCREMENT, ORDER, kinds_of, quantities
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene
@@ -144,7 +144,7 @@ class Simulation:
     def _stresses(self) -> set[str]:
         """Names of the numbers that are proportional to the stresses."""
         columns = self.scene([f.middle for f in self.free]).model().columns
-        return {name for name, kind in kinds_of(columns).items() if kind.is_stress}
+        return {name for name, one in quantities(columns).items() if one.is_stress}
 
     def _scaled(self, curve: Curve, factor: float) -> Curve:
         """Return a curve with stresses times a factor."""

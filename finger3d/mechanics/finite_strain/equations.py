@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -64,15 +64,11 @@ _STEP_LENGTHS = (1.0, 0.5, 0.25, 0.125)
 
 @dataclass(frozen=True)
 class Configuration:
-    """Unknowns x (N,), internal forces (N,) and contact of the deformed surface there.
-
-    `balance` keeps the last contact forces and what they leave out of balance: an iteration asks four times for two.
-    """
+    """Unknowns x (N,), internal forces (N,) and contact of the deformed surface there."""
 
     x: Float
     internal: Float
     contact: DeformedContact
-    balance: list[tuple[Float, Float]] = field(default_factory=list, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -204,8 +200,8 @@ class IncrementEquations:
         contact = contact_of(problem, problem.surface, displacement(problem.mesh, x), self.move.end)
         return Configuration(x, self.body.internal_forces(x), contact)
 
-    def moved(self, now: Configuration, step: Float, force: Float) -> Configuration:
-        """Return the configuration after a step (N,), under contact forces (c, d) N.
+    def moved(self, now: Configuration, step: Float, force: Float) -> tuple[Configuration, Float]:
+        """Return the configuration after a step (N,) and what is out of balance there (N,), under forces (c, d) N.
 
         A step is at most as long as the largest one.  One that would be longer and leads up in energy, as it does where
         the tangent has a negative eigenvalue beyond a limit point of the path, is reversed.  It is halved where it
@@ -219,11 +215,11 @@ class IncrementEquations:
         """
         n = self.problem.mesh.points.size
 
-        def slope(at: Configuration) -> float:
-            return float(step[:n] @ self.out_of_balance(at, force)[:n])
-
         largest = float(np.abs(step[:n]).max())
-        whole, fall = min(1.0, self._largest_step / largest) if largest else 1.0, -slope(now)
+        whole, fall = (
+            min(1.0, self._largest_step / largest) if largest else 1.0,
+            -float(step[:n] @ self.out_of_balance(now, force)[:n]),
+        )
         if fall < 0.0:
             step, fall = (-step, -fall) if whole < 1.0 else (step, math.inf)
         after = None
@@ -232,11 +228,12 @@ class IncrementEquations:
                 after = self.at(now.x + whole * length * step)
             except InvertedError:
                 continue
-            if slope(after) <= fall:
+            unbalanced = self.out_of_balance(after, force)
+            if float(step[:n] @ unbalanced[:n]) <= fall:
                 break
         if after is None:
             raise InvertedError
-        return after
+        return after, unbalanced
 
     def linearise(self, now: Configuration, force: Float, damping: float = 0.0, local: bool = False) -> Linearisation:
         """Factor the tangent under contact forces (c, d), and keep the factor for later increments.
@@ -333,11 +330,9 @@ class IncrementEquations:
 
     def out_of_balance(self, now: Configuration, force: Float) -> Float:
         """Return internal less contact forces (N,)."""
-        if not (now.balance and now.balance[0][0] is force):
-            out = now.internal.copy()
-            out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self.active(force.ravel())).ravel()
-            now.balance[:] = [(force, out)]
-        return now.balance[0][1]
+        out = now.internal.copy()
+        out[: self.problem.mesh.points.size] -= now.contact.nodal_forces(self.active(force.ravel())).ravel()
+        return out
 
     def active(self, vector: Float) -> Float:
         """Return a vector (c d,) as (c, d), zero across symmetry planes.

@@ -146,7 +146,8 @@ class FiniteIncrement(IncrementEquations):
         A patient iteration shortens steps that are too long, and goes on.  One that does not converge with the tangent
         of an earlier increment starts again with a new one.
         """
-        first = increment, now, force = self, *self.initial(guess, expected)
+        now, force = self.initial(guess, expected)
+        first = increment, now, force, unbalanced = self, now, force, self.out_of_balance(now, force)
         is_new = now.x is self.start.body.unknowns and not force.any()  # the last tangent is of another configuration
         linearisation, factors, spent, errors = None if is_new else self.last_linearisation(), 0, 0, [math.inf]
         secants = _Secants()
@@ -158,15 +159,16 @@ class FiniteIncrement(IncrementEquations):
                 factors, secants = factors + 1, _Secants()
             is_astray = errors[-1] > _ASTRAY
             longest = increment._largest_step if factors and is_astray and not patient else math.inf
-            solution, after = increment._advance(now, force, linearisation, longest, None if is_astray else secants)
+            accelerating = None if is_astray else secants
+            solution, after = increment._advance(now, (force, unbalanced), linearisation, longest, accelerating)
             spent += solution.iterations
             if after is None:
                 if factors:
                     break
-                linearisation, (increment, now, force), errors = None, first, [math.inf]
+                linearisation, (increment, now, force, unbalanced), errors = None, first, [math.inf]
                 continue
-            (increment, now), force = after, solution.state.force
-            errors.append(increment._error(now, solution.state))
+            (increment, now, unbalanced), force = after, solution.state.force
+            errors.append(increment._error(now, solution.state, unbalanced))
             if self.has_converged(errors[-1], errors[-2]):
                 return increment, increment.finished(now, solution, errors[-1], spent)
             if factors and errors[-1] > _DIVERGED:
@@ -174,7 +176,7 @@ class FiniteIncrement(IncrementEquations):
             if self.remaining(errors) > self.factor_cost + NEW_TANGENT:
                 linearisation = None
                 if not factors and errors[-1] > _ASTRAY:
-                    (increment, now, force), errors = first, [math.inf]
+                    (increment, now, force, unbalanced), errors = first, [math.inf]
         return increment, increment.failed(now, Outcome.NEWTON, errors[-1], spent)
 
     def _iterate_damped(self) -> ContactSolution[State[DeformedBody]]:
@@ -184,13 +186,15 @@ class FiniteIncrement(IncrementEquations):
         a limit point of the path a constant multiple follows the snap down in energy.
         """
         now, force = self.at(self.start.body.unknowns), self.start.contact.force
+        unbalanced = self.out_of_balance(now, force)
         damping, spent, error = _FIRST_DAMPING, 0, math.inf
         may_snap, rises, snapped = self._may_snap, 0, False
         least, stalls = math.inf, 0
         for _ in range(2 * _DAMPED_FACTORS if may_snap else _DAMPED_FACTORS):
-            solution, after = self._advance(now, force, self.linearise(now, force, damping), math.inf, None)
+            tangent = self.linearise(now, force, damping)
+            solution, after = self._advance(now, (force, unbalanced), tangent, math.inf, None)
             spent += solution.iterations
-            next_error = math.inf if after is None else self._error(after[1], solution.state)
+            next_error = math.inf if after is None else self._error(after[1], solution.state, after[2])
             stalls = 0 if next_error < _FALLS * least else stalls + 1
             least = min(least, next_error)
             if stalls == _STALLS and not may_snap:
@@ -198,7 +202,8 @@ class FiniteIncrement(IncrementEquations):
             if after is None or next_error > _LARGEST_RISE * error:
                 damping = max(damping, _LEAST_DAMPING) * _MORE_DAMPING
                 continue
-            now, force, last_error, error = after[1], solution.state.force, error, next_error
+            (_, now, unbalanced), force = after, solution.state.force
+            last_error, error = error, next_error
             if self.has_converged(error, last_error):
                 solution = replace(solution, method=SNAPPED) if snapped else solution
                 return self.finished(now, solution, error, spent)
@@ -215,21 +220,28 @@ class FiniteIncrement(IncrementEquations):
         """Return the increment with another depth (mm) at its end."""
         return replace(self, move=Move(self.move.start, replace(self.move.end, depth_mm=depth)))
 
-    def _error(self, now: Configuration, state: ContactState) -> float:
-        return self.residual(now, state, self.out_of_balance(now, state.force))
+    def _error(self, now: Configuration, state: ContactState, unbalanced: Float) -> float:
+        return self.residual(now, state, unbalanced)
 
     def _turning(self, linearisation: Linearisation) -> Sequence[Float]:
         """Return loads (N,) N/mm by which nodal contact forces change with the depth, if that is unknown."""
         return ()
 
     def _advance(
-        self, now: Configuration, force: Float, linearisation: Linearisation, longest: float, secants: _Secants | None
-    ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration] | None]:
-        """Return the contact solution, and the next configuration, accelerated by secants if they are given.
+        self,
+        now: Configuration,
+        forces: tuple[Float, Float],
+        linearisation: Linearisation,
+        longest: float,
+        secants: _Secants | None,
+    ) -> tuple[ContactSolution[ContactState], tuple[Self, Configuration, Float] | None]:
+        """Return the contact solution, the next configuration, accelerated by secants, and what is out of balance.
 
-        There is none if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
+        The forces are those of contact (c, d) and what they leave out of balance (N,).  There is no next configuration
+        if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
         """
-        loads = [-self.out_of_balance(now, force), *self._turning(linearisation)]
+        force, unbalanced = forces
+        loads = [-unbalanced, *self._turning(linearisation)]
         eliminated = linearisation.condensation.eliminated(np.column_stack(loads))
         increment, solution, change = self.contact(
             now, force, linearisation, *eliminated.displacement[linearisation.reads].T
@@ -248,7 +260,7 @@ class FiniteIncrement(IncrementEquations):
             solution = replace(solution, state=replace(solution.state, force=force))
             increment = increment if end[-1] == depth else increment._to_depth(float(end[-1]))
         try:
-            return solution, (increment, increment.moved(now, step, solution.state.force))
+            return solution, (increment, *increment.moved(now, step, solution.state.force))
         except InvertedError:
             return solution, None
 
@@ -310,8 +322,8 @@ class IncrementToForce(FiniteIncrement):
         move = Move(start, replace(pose, depth_mm=depth))
         return replace(self, move=move, wanted=wanted, rate=rate)
 
-    def _error(self, now: Configuration, state: ContactState) -> float:
-        return max(super()._error(now, state), abs(self._force(now, state.force) / self.wanted - 1.0))
+    def _error(self, now: Configuration, state: ContactState, unbalanced: Float) -> float:
+        return max(super()._error(now, state, unbalanced), abs(self._force(now, state.force) / self.wanted - 1.0))
 
     def _force(self, now: Configuration, force: Float) -> float:
         """Return the normal force (N) on the whole finger of contact forces (c, d) in the present directions."""

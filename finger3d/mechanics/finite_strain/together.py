@@ -81,11 +81,10 @@ class _Trial:
         if not np.isfinite(step).all():
             return False
         try:
-            self.now = self.equations.moved(self.now, step, self.solution.state.force)
+            self.now, self.out_of_balance = self.equations.moved(self.now, step, self.solution.state.force)
         except InvertedError:
             return False
         self.force, self.last_error = self.solution.state.force, self.error
-        self.out_of_balance = self.equations.out_of_balance(self.now, self.force)
         self.error = self.equations.residual(self.now, self.solution.state, self.out_of_balance)
         return True
 

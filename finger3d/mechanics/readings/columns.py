@@ -24,7 +24,7 @@ RESULTANTS = {
 GIVEN_BY_FORCE = ("normal_force_N", "force_y_N")
 """Numbers that are given, and have no error, under a prescribed normal force."""
 
-QUANTITIES = {"gauge": "strain", "marker": "displacement", "taxel": "pressure"}
+MEASURED = {"gauge": "strain", "marker": "displacement", "taxel": "pressure"}
 """What a sensor of each kind reads, in the order of their columns; those of other kinds follow."""
 
 
@@ -53,14 +53,14 @@ class Column:
     @property
     def key(self) -> str:
         """Name of the column in tables: ``gauge_g36``, ``marker_m1_x_mm``, ``taxel_t1_MPa``, ``reading_<name>``."""
-        kind = self.kind if self.kind in QUANTITIES else "reading"
+        kind = self.kind if self.kind in MEASURED else "reading"
         return "_".join(part for part in (kind, self.sensor, self.axis, self.unit) if part)
 
     @property
     def title(self) -> str:
         """What the number is, in words."""
         along = f" along {self.axis}" if self.axis else ""
-        return f"{QUANTITIES.get(self.kind, 'reading')} of {self.kind} {self.sensor}{along}"
+        return f"{MEASURED.get(self.kind, 'reading')} of {self.kind} {self.sensor}{along}"
 
 
 def strain_columns(gauge: str) -> tuple[Column, Column]:
@@ -80,7 +80,7 @@ def pressure_column(taxel: str) -> Column:
 
 def in_order(readings: Mapping[Column, float]) -> dict[Column, float]:
     """Return readings in the order of tables: gauges, markers, taxels, and others."""
-    kinds = list(QUANTITIES)
+    kinds = list(MEASURED)
     return dict(sorted(readings.items(), key=lambda item: (*kinds, item[0].kind).index(item[0].kind)))
 
 

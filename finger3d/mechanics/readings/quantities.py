@@ -34,6 +34,7 @@ class Kind(Enum):
     STICK_LENGTH = auto()
     STICK_AREA = auto()
     DEPTH = auto()
+    MOTION = auto()
     MOMENT = auto()
 
     @property
@@ -53,8 +54,8 @@ class Kind(Enum):
 
     @property
     def is_stress(self) -> bool:
-        """Return whether the number is proportional to the stresses."""
-        geometric = (Kind.STRAIN, Kind.DISPLACEMENT, Kind.OTHER_READING, Kind.DEPTH)
+        """Return whether the number is proportional to the stresses; of other readings the unit tells."""
+        geometric = (Kind.STRAIN, Kind.DISPLACEMENT, Kind.OTHER_READING, Kind.DEPTH, Kind.MOTION)
         return not self.is_zone and self not in geometric
 
     @property
@@ -63,7 +64,7 @@ class Kind(Enum):
         return 1.5 if self in (Kind.FRICTION_SUM, Kind.STRAIN, Kind.DISPLACEMENT) else ORDER
 
     @property
-    def factor(self) -> float:
+    def bar_factor(self) -> float:
         """Factor c of the error bars, fitted to 118 drawn sections and 28 solids, a third of them deformed largely."""
         return _FITTED.get(self, 0.9)
 
@@ -98,6 +99,11 @@ class Quantity:
     factor: float = 1.0
 
     @property
+    def is_stress(self) -> bool:
+        """Whether the number is proportional to the stresses, by its kind, or by its unit if that is not known."""
+        return self.unit in _OF_STRESSES if self.kind is Kind.OTHER_READING else self.kind.is_stress
+
+    @property
     def label(self) -> str:
         """Title, place and unit, as a table or an axis shows them."""
         title = f"{self.title} {self.where}".rstrip()
@@ -117,9 +123,9 @@ _HALF = "at z = 0", 2.0
 
 OF_INCREMENT = (
     Quantity("depth_mm", Kind.DEPTH, "depth", "mm"),
-    *_along("xz", "slide", Kind.DEPTH, "slide along", "mm"),
-    *_along("xyz", "turn", Kind.DEPTH, "turn about", "deg"),
-    Quantity("time_s", Kind.DEPTH, "time", "s"),
+    *_along("xz", "slide", Kind.MOTION, "slide along", "mm"),
+    *_along("xyz", "turn", Kind.MOTION, "turn about", "deg"),
+    Quantity("time_s", Kind.MOTION, "time", "s"),
     Quantity("normal_force_N", Kind.NORMAL_FORCE, "normal force", "N"),
     *_along("xz", "tangential_force", Kind.FORCE, "tangential force along"),
     Quantity("friction_sum_N", Kind.FRICTION_SUM, "friction sum", "N"),
@@ -133,7 +139,7 @@ OF_INCREMENT = (
     Quantity("contact_half_length_mm", Kind.CONTACT_LENGTH, "contact extent", "mm", *_HALF),
     Quantity("stick_half_length_mm", Kind.STICK_LENGTH, "stick extent", "mm", *_HALF),
     Quantity("contact_half_length_end_mm", Kind.CONTACT_LENGTH, "contact extent", "mm", "at z = width/2", 2.0),
-    Quantity("largest_penetration_mm", Kind.DEPTH, "largest penetration", "mm"),
+    Quantity("largest_penetration_mm", Kind.MOTION, "largest penetration", "mm"),
     Quantity("external_work_mJ", Kind.WORK, "work", "mJ"),
     Quantity("dissipation_mJ", Kind.DISSIPATION, "dissipation", "mJ"),
 )
@@ -152,6 +158,8 @@ OF_WIDTH = (
     Quantity("peak_pressure_MPa", Kind.PRESSURE, "peak pressure", "MPa"),
 )
 """Numbers of a comparison of models, for each mm of width."""
+
+_OF_STRESSES = "N", "MPa", "mJ", "Nmm"
 
 _READINGS = {
     "gauge": Kind.STRAIN,

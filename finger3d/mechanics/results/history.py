@@ -15,7 +15,7 @@ from finger3d.contact.friction import STATUS_NAMES
 from finger3d.contact.state import ContactState
 from finger3d.errors import MissingError, Outcome
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
-from finger3d.mechanics.readings.columns import QUANTITIES, Column, by_key, in_space, of_kind
+from finger3d.mechanics.readings.columns import MEASURED, Column, by_key, in_space, of_kind
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.results.zones import Zone, edges_of, zone_area, zone_ends, zones
 from finger3d.objects import ObjectPose
@@ -255,7 +255,7 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
         **{f"outward_friction_{axis}_N": float(force) for axis, force in zip("xz", outward, strict=True)},
         **sizes,
     }
-    others = {column.name: value for column, value in step.readings.items() if column.kind not in QUANTITIES}
+    others = {column.name: value for column, value in step.readings.items() if column.kind not in MEASURED}
     return numbers | {
         "largest_penetration_mm": step.penetration_mm,
         "external_work_mJ": step.external_work_mJ,
