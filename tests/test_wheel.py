@@ -44,18 +44,31 @@ def environment(root: Path, folder: Path, *requirements: str | Path) -> Path:
     return programs
 
 
-@pytest.mark.parametrize("kind", ["*.whl", "*.tar.gz"], ids=["wheel", "sdist"])
-def test_the_core_is_small_and_presses_calibrates_and_exports_from_an_empty_folder(
-    kind: str, built: Path, root: Path, tmp_path: Path
-) -> None:
-    (file,) = built.glob(kind)
-    programs = environment(root, tmp_path / "venv", file)
-    work = tmp_path / "work"
+def installed(file: Path, root: Path, folder: Path) -> tuple[Path, Path]:
+    """Return the programs of a new environment with the core of a distribution, and an empty folder beside it."""
+    programs, work = environment(root, folder / "venv", file), folder / "work"
     work.mkdir()
-    finger3d, python = programs / "finger3d", programs / "python"
-    where = run(python, "-c", "import finger3d; print(finger3d.__file__, *finger3d.designs())", cwd=work)
-    assert str(tmp_path / "venv") in where
+    where = run(programs / "python", "-c", "import finger3d; print(finger3d.__file__, *finger3d.designs())", cwd=work)
+    assert str(folder / "venv") in where
     assert "clipped_cylinder" in where
+    return programs, work
+
+
+def test_the_core_of_the_sdist_presses(built: Path, root: Path, tmp_path: Path) -> None:
+    (file,) = built.glob("*.tar.gz")
+    programs, work = installed(file, root, tmp_path)
+    run(programs / "finger3d", "new", "scene.toml", cwd=work)
+    flat = ("--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4")
+    run(programs / "finger3d", "press", "scene.toml", *flat, "--out", "press", cwd=work)
+    assert "plotly.js" in (work / "press" / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_core_is_small_and_presses_calibrates_and_exports_from_an_empty_folder(
+    built: Path, root: Path, tmp_path: Path
+) -> None:
+    (file,) = built.glob("*.whl")
+    programs, work = installed(file, root, tmp_path)
+    finger3d = programs / "finger3d"
     run(finger3d, "new", "scene.toml", cwd=work)
     coarse = ("--set", "mesh.mesher=swept", "--set", "mesh.size_mm=6", "--set", "mesh.base_size_mm=12")
     run(finger3d, "press", "scene.toml", *coarse, "--out", "press", cwd=work)
