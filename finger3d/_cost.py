@@ -36,6 +36,9 @@ CALIBRATION_S, CALIBRATION_PRESSES = 60.0, 40.0
 """Forecast time of a calibration beyond which a finer mesh is recommended but not used, and its time over that of a
 press without output: 12 to 32 in sections of 8 000 to 75 000 unknowns, 45 at large deformation, 50 to 75 in solids."""
 
+INCREMENT_ERRORS_S, INCREMENT_ERRORS_SHARE = 0.2, 0.15
+"""Seconds that the errors of the increments may take in any case, and over those of the press."""
+
 GROWTH = {2: 1.2, 3: 1.6}
 """Power of the unknowns with which the seconds of a press grow, by dimension; from 161 000 to 523 000 of a solid."""
 
@@ -90,23 +93,6 @@ _ITERATION_S, _LEAST_ITERATION_S = {2: 7.5e-7, 3: 2.8e-6}, 4e-3
 
 Increments of sections of 500 to 144 000 unknowns took 0.65 to 2.4 times the time that follows, and 1.1 in the median.
 """
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Largest cost of an estimate, relative to that of the press and in seconds; the larger limit applies."""
-
-    share: float
-    least_s: float
-
-    def seconds(self, press_s: float) -> float:
-        """Return the seconds that the estimate may take beside a press of `press_s`."""
-        return max(self.share * press_s, self.least_s)
-
-
-INCREMENT_ERRORS = Budget(0.15, 0.2)
-"""Of the errors due to the increments."""
-
 
 _LEAST_TETS = 1600.0
 """Tets of the coarsest meshes by fTetWild; see `tets_of_ftetwild`."""

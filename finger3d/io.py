@@ -162,6 +162,9 @@ _DAMAGED = (
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 
 
+_CHECKSUM = "checksum"
+"""Name of the array of an .npz file with the SHA-256 of all others."""
+
 _MOST_EXPANSION = 100
 """Largest ratio of the arrays' bytes to those of an .npz file; finger3d writes them uncompressed."""
 
@@ -233,6 +236,28 @@ def write_json(path: str | Path, data: object) -> None:
 def json_text(data: object) -> str:
     """JSON of nested dicts, lists, arrays and numbers; NaN and infinity become null."""
     return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def write_arrays(path: str | Path, arrays: Mapping[str, Array]) -> None:
+    """Write arrays and their checksum as an .npz file, whole or not at all."""
+    with atomic(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, allow_pickle=False, **{**arrays, _CHECKSUM: _checksum_of(arrays)})
+
+
+def check_arrays(arrays: Mapping[str, Array]) -> None:
+    """Raise ValueError unless arrays are those that `write_arrays` wrote, their checksum among them."""
+    own = {name: values for name, values in arrays.items() if name != _CHECKSUM}
+    if not np.array_equal(arrays.get(_CHECKSUM, np.zeros(0)), _checksum_of(own)):
+        raise ValueError("it was altered after it was written")
+
+
+def _checksum_of(arrays: Mapping[str, Array]) -> Array:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        values = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {values.dtype.str} {values.shape}".encode())
+        digest.update(values.data)
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def checksum(data: object, before: str = "") -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from finger3d.analyses.calculix import deck as calculix
 from finger3d.analyses.calculix.deck import (
     OBJECT,
     Contact,
@@ -18,9 +18,6 @@ from finger3d.analyses.calculix.deck import (
     ObjectElements,
     facet_lines,
     law_cards,
-    printed_forces,
-    program,
-    solve,
 )
 from finger3d.errors import MissingError
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
@@ -28,6 +25,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import FACETS, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
 from tests.given_meshes import cube, refused
+from validation._ccx import printed_forces, program, solve
 
 MATERIAL = Isotropic(3.0, 0.4)
 SHEAR, BULK = 3.0 / 2.8, 3.0 / 0.6
@@ -198,7 +196,7 @@ PRINTED = """
 
 def test_forces_are_read_with_their_times(tmp_path: Path) -> None:
     (tmp_path / "press.dat").write_text(PRINTED, encoding="ascii")
-    times, forces = calculix.printed_forces(tmp_path / "press.dat")
+    times, forces = printed_forces(tmp_path / "press.dat")
     np.testing.assert_array_equal(times, [0.5, 1.0])
     np.testing.assert_allclose(forces, [[0.1, -2.5, 3e-12], [-0.125, -5.0, 0.0]])
 
@@ -207,11 +205,11 @@ def test_a_run_that_does_not_finish_is_told(tmp_path: Path, monkeypatch: pytest.
     ccx = tmp_path / "ccx"
     ccx.write_text("#!/bin/sh\necho $1 diverges\n", encoding="ascii")
     ccx.chmod(0o755)
-    monkeypatch.setattr(calculix.shutil, "which", lambda name: str(ccx))
+    monkeypatch.setattr(shutil, "which", lambda name: str(ccx))
     with pytest.raises(RuntimeError, match="ccx .* 0: press diverges"):
-        calculix.solve(tmp_path / "press.inp", 10.0)
+        solve(tmp_path / "press.inp", 10.0)
     ccx.write_text("#!/bin/sh\necho Job finished\n", encoding="ascii")
-    calculix.solve(tmp_path / "press.inp", 10.0)
-    monkeypatch.setattr(calculix.shutil, "which", lambda name: None)
+    solve(tmp_path / "press.inp", 10.0)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(MissingError, match="apt install calculix-ccx"):
-        calculix.solve(tmp_path / "press.inp", 10.0)
+        solve(tmp_path / "press.inp", 10.0)

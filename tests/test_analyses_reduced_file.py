@@ -13,7 +13,7 @@ import pytest
 
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.errors import Finger3dError
-from finger3d.io import read_arrays
+from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.build import build
 from tests.models import small_section
 
@@ -44,7 +44,6 @@ def test_a_header_or_arrays_that_do_not_fit_are_one_line(tmp_path: Path) -> None
         for name, a in arrays.items()
         if a.size
         for value in (a[:-1], a[..., None], np.full(a.shape, "x"), np.full(a.shape, np.nan), np.array(1.0))
-        if not (name == "facets" and value.shape == a[:-1].shape)  # any number of facets fits
     ]
     path = tmp_path / "bad.npz"
     for told, values in [*((h, arrays) for h in headers), *contents]:
@@ -73,7 +72,7 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
     cases = {
         "cut short": data[: len(data) // 2],
         "no reduced model": b"hello",
-        "version 7": with_header(version=7),
+        "version 8": with_header(version=8),
         "; `finger3d calibrate` writes one": with_header(format="a cake"),
         "parts of the reduced model are missing": missing.getvalue(),
     }
@@ -120,11 +119,11 @@ def test_damaged_files_are_one_line(tmp_path: Path) -> None:
 def test_whole_numbers_of_a_header_become_floats(tmp_path: Path) -> None:
     good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
     with np.load(good) as stored:
-        arrays = dict(stored)
+        arrays = {name: stored[name] for name in stored if name != "checksum"}
     header = json.loads(arrays["header"].tobytes())
     header["legs"][0]["slide_x_mm"] = 10**30
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    np.savez(tmp_path / "whole.npz", **arrays)
+    write_arrays(tmp_path / "whole.npz", arrays)
     assert isinstance(ReducedModel.load(tmp_path / "whole.npz").problem.model.legs[0].slide_x_mm, float)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from finger3d._cost import Budget, PressSize, mesh_gb, tet_unknowns, tets_made
+from finger3d._cost import PressSize, mesh_gb, tet_unknowns, tets_made
 from finger3d.meshing.limits import is_possible
 
 
@@ -22,14 +22,6 @@ def test_an_increment_at_finite_strain_costs_a_factorisation_and_its_iterations(
 def test_increments_of_sections_at_finite_strain_take_what_was_measured(dofs: int, measured: float) -> None:
     # processor seconds an increment of the sections at large deformation of validation/cost_forecast.py
     assert 0.5 < PressSize(2, dofs, 50.0).finite_strain_s / measured < 2.0
-
-
-def test_a_budget_is_a_share_of_the_press_and_at_least_its_seconds() -> None:
-    size = PressSize(2, 10_000.0, 100.0)
-    press = size.press_s(10)
-    assert press == pytest.approx(size.condensation_s + 10 * size.contact_s)
-    assert Budget(0.5, 0.0).seconds(press) == pytest.approx(0.5 * press)
-    assert Budget(0.5, 100.0).seconds(press) == 100.0
 
 
 def test_large_meshes_take_the_memory_that_was_measured() -> None:

@@ -81,6 +81,8 @@ def damaged_steps(arrays: dict[str, np.ndarray]) -> Iterator[tuple[str, dict[str
     """Each array of steps.npz missing, of another type, shape or length, or with numbers that cannot be."""
     for name, a in arrays.items():
         yield f"{name} missing", {k: v for k, v in arrays.items() if k != name}
+        if name == "checksum":  # its type does not matter
+            continue
         changed = {
             "text": np.full(a.shape, "x"), "scalar": np.array(1.0), "one more axis": a[..., None], "empty": a[:0],
             "complex": a.astype(complex),

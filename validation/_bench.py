@@ -412,8 +412,9 @@ def _large_deformation(size: float) -> list[Row]:
 
 def _beside_calculix(quick: bool) -> list[Row]:
     """Return time of CalculiX over finger3d's on the finest meshes of beside_calculix.py; nothing without ccx."""
-    from finger3d.analyses.calculix.deck import program
     from validation.beside_calculix import cases, measured, times
+
+    from ._ccx import program
 
     if program() is None:
         print("ccx is not installed (apt install calculix-ccx): no comparison with CalculiX", file=sys.stderr)

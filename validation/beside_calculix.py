@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
-from finger3d.analyses.calculix.deck import Contact, program
+from finger3d.analyses.calculix.deck import Contact
 from finger3d.errors import MissingError
 from finger3d.mechanics.model import Leg
 
-from ._ccx import Answer, version
+from ._ccx import Answer, program, version
 from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import finger3d
-from finger3d.analyses.calculix.deck import printed_forces, program, solve
 from finger3d.analyses.calculix.press import press_deck
 from finger3d.scene import Scene
 
+from ._ccx import printed_forces, program, solve
 from ._rows import Result, Row
 
 TOLERANCE, REASON = 0.01, "wanted of the deck: 1 %; penalty and multipliers, facets and surface: 0.8 % or less measured"

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calculix.deck import Contact, program
+from finger3d.analyses.calculix.deck import Contact
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
@@ -26,6 +26,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 
+from ._ccx import program
 from ._ccx import run as run_calculix
 from ._rows import Result, Row
 

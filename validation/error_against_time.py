@@ -19,12 +19,12 @@ from dataclasses import replace
 from typing import Any
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.analyses.calculix.deck import program
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, Model
 
+from ._ccx import program
 from ._cost import SECTION, Case, model_of
 from ._felupe import felupe_press, is_felupe_installed
 from ._paper import columns

@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.analyses.calculix.deck import printed_forces, program, solve
 from finger3d.analyses.calculix.press import press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.model import Leg, Model
 
+from ._ccx import printed_forces, program, solve
 from ._felupe import felupe_press, is_felupe_installed
 from ._paper import columns
 from ._rows import Result, Row, committed

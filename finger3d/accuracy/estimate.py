@@ -14,15 +14,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from finger3d._cost import INCREMENT_ERRORS
-from finger3d._types import Float
+from finger3d._cost import INCREMENT_ERRORS_S, INCREMENT_ERRORS_SHARE
 from finger3d.accuracy.companion_presses import CompanionPress, companion_presses
 from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.richardson import gain, spacing, spread_error
+from finger3d.accuracy.richardson import spacing, spread_error
 from finger3d.errors import FAILURES, Finger3dError
-from finger3d.mechanics.discretise.companions import edge_ratio, is_unstructured
+from finger3d.mechanics.discretise.companions import is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
@@ -32,9 +29,8 @@ from finger3d.mechanics.march.step_halving import (
     step_error,
     with_increments_of,
 )
-from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, Column, by_key, in_space
+from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, by_key, in_space
 from finger3d.mechanics.readings.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
@@ -77,18 +73,6 @@ def press_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
     others = (*RESULTANTS[problem.dim], "external_work_mJ", "dissipation_mJ", "contact_half_length_end_mm")
     numbers = main_numbers(problem, step) | {name: float(measured[name]) for name in others if name in measured}
     return {"depth_mm": step.target.depth_mm, **numbers} if problem.model.ends_at_force else numbers
-
-
-def reading_error(problem: Problem, beside: Problem, fine: Float, coarse: Float, kind: str = "gauge") -> Float:
-    """Return the discretisation error (m,) of a reading at several coefficients of friction.
-
-    Parameters
-    ----------
-    fine, coarse : (m,) readings of the problem and of its companion
-    kind : of the reading: gauge, marker or taxel
-    """
-    order = kinds_of([column := Column("", kind)])[column.key].order
-    return np.abs(fine - coarse) / gain(edge_ratio(problem, beside), order)
 
 
 def estimate(
@@ -199,7 +183,7 @@ def _of_increments(
     beside_s = math.inf if beside is None else _marching_cost(beside)
     failure: Exception | None = None
     own_s = _marching_cost(own)
-    budget = INCREMENT_ERRORS.seconds(own.size.condensation_s + own_s)
+    budget = max(INCREMENT_ERRORS_S, INCREMENT_ERRORS_SHARE * (own.size.condensation_s + own_s))
     trials = [(own, 2.0, own_s), (beside, 2.0, beside_s), (beside, 0.5, 0.0), (own, 0.5, 0.0)]
     for judged, ratio, seconds in trials:
         if judged is None or ratio * seconds > budget:

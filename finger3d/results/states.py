@@ -14,15 +14,12 @@ from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
-from finger3d.io import atomic, read_arrays
+from finger3d.io import check_arrays, read_arrays, write_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, contact_table
 from finger3d.mechanics.results.zones import Zone, edges_of, zones
 from finger3d.objects import PlacedObject
-
-_LARGEST = 1e9
-"""Bound of every number in steps.npz, in mm or MPa: far above any result, and far below an overflow in a drawing."""
 
 _MOST_TRIANGLES = 20_000
 """Triangles of the object that are kept for pictures, at most."""
@@ -224,8 +221,7 @@ def object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangle
 
 def write_states(path: str | Path, states: States) -> None:
     """Write steps.npz."""
-    with atomic(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, allow_pickle=False, **{f.name: getattr(states, f.name) for f in fields(States)})
+    write_arrays(path, {f.name: getattr(states, f.name) for f in fields(States)})
 
 
 def load_states(path: str | Path) -> States:
@@ -240,65 +236,11 @@ def load_states(path: str | Path) -> States:
         data = read_arrays(path)
         if missing := [f.name for f in fields(States) if f.name not in data]:
             raise ValueError(f"{missing[0]} is missing")
-        states = States(**{f.name: data[f.name] for f in fields(States)})
-        _check(states)
+        check_arrays(data)
     except (OSError, ValueError) as error:
         why = " ".join(str(error).split())
         raise Finger3dError(f"{path}: cannot be read as steps of a press ({why}); press the scene again") from None
-    return states
-
-
-def _check(states: States) -> None:
-    """Raise ValueError unless types, shapes, indices and numbers of all arrays fit together."""
-    n, d = states.points.shape if states.points.ndim == 2 else (0, 0)
-    if d not in (2, 3) or not n:
-        raise ValueError(f"points has the shape {states.points.shape}")
-    s, m = len(np.atleast_1d(states.step)), len(np.atleast_1d(states.nodes))
-    e, t = len(np.atleast_1d(states.cells)), len(np.atleast_1d(states.facets))
-    v, f = len(np.atleast_1d(states.object_points)), len(np.atleast_1d(states.object_faces))
-    wanted: dict[str, tuple[tuple[tuple[int, ...], ...], str]] = {
-        "points": (((n, d),), "f"),
-        "cells": (((e, d + 1), (e, (d + 1) * (d + 2) // 2)), "iu"),
-        "part": (((e,),), "i"),
-        "facets": (((t, d), (t, d * (d + 1) // 2)), "iu"),
-        "facet_face": (((t,),), "i"),
-        "nodes": (((m,),), "iu"),
-        "face": (((m,),), "i"),
-        "compliance": (((m,),), "f"),
-        "step": (((s,),), "iu"),
-        "target": (((s, 6),), "iuf"),
-        "displacement": (((s, n, d),), "f"),
-        **dict.fromkeys(("pressure", "shear_x", "shear_y", "shear_z", "gap"), (((s, m),), "f")),
-        "status": (((s, m),), "iu"),
-        "object_points": (((v, 3),), "f"),
-        "object_faces": (((f, 3),), "iu"),
-        "object_rotation": (((s, 3, 3),), "f"),
-        "object_place": (((s, 3),), "f"),
-    }
-    for name, (shapes, kinds) in wanted.items():
-        values = getattr(states, name)
-        empty = not values.size and name not in ("object_points", "object_faces")
-        if values.shape not in shapes or empty or values.dtype.kind not in kinds:
-            raise ValueError(f"{name} is an array of {values.dtype}, shape {values.shape}, and does not fit the others")
-        if values.dtype.kind == "f" and not (np.abs(values) < _LARGEST).all():
-            raise ValueError(f"{name} has a number that is not finite or too large")
-    bounds = {"cells": (0, n), "facets": (0, n), "nodes": (0, n), "status": (0, 3), "step": (1, 2**31)}
-    bounds |= {
-        "part": (0, 128),
-        "object_faces": (0, v),
-        "face": (0, len(FREE_FACES)),
-        "facet_face": (-1, len(FREE_FACES)),
-    }
-    for name, (low, high) in bounds.items():
-        values = getattr(states, name)
-        if values.size and (values.min() < low or values.max() >= high):
-            raise ValueError(f"{name} has a number out of range")
-    if (np.diff(states.step.astype(np.int64)) <= 0).any():
-        raise ValueError("step does not ascend")
-    if bool(v) != bool(f):
-        raise ValueError("the object has points without triangles")
-    if not states.on_contact.any() or (np.ptp(states.points, axis=0) <= 0.0).any():
-        raise ValueError("the body has no contact face, or no extent")
+    return States(**{f.name: data[f.name] for f in fields(States)})
 
 
 def label(step: int, target: Array) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float
-from finger3d.accuracy.estimate import reading_error
+from finger3d.accuracy.richardson import gain
 from finger3d.analyses.calibrate.increments import Increments, error_of_increments
 from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read
 from finger3d.analyses.calibrate.settings import CalibratedReading
@@ -29,13 +29,15 @@ from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted
 from finger3d.analyses.pressed_body import PressesByMu, under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import changed
-from finger3d.mechanics.discretise.companions import companion
+from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings.quantities import Quantity
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
@@ -332,9 +334,9 @@ def _mesh_errors(body: ReferenceBody, coarse: ReferenceBody, readings: Sequence[
 
     The error depends little on mu, and where the readings of the two meshes cross they agree by chance.
     """
-    found = []
+    found, ratio = [], edge_ratio(body.problem, coarse.problem)
     for own, other, reading in zip(body.readings, coarse.readings, readings, strict=True):
-        error = reading_error(body.problem, coarse.problem, own, other, reading.kind)
+        error = np.abs(own - other) / gain(ratio, Quantity.of(Column("", reading.kind)).kind.order)
         known = error[np.isfinite(error)]
         found.append(np.maximum(error, math.sqrt(float(np.mean(known**2)))) if len(known) else error)
     return np.array(found)
