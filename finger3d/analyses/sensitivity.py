@@ -122,7 +122,7 @@ def largest(effect: Effect) -> float:
     return max((abs(x) for x in (effect.falling, effect.growing) if not math.isnan(x)), default=0.0)
 
 
-class Change(NamedTuple):
+class KeyChange(NamedTuple):
     """A key with its value, and the models with it less and plus its change; the reason where there is none."""
 
     value: float
@@ -138,7 +138,7 @@ def sensitivity(
     overrides: Sequence[str] = (),
     tolerances: Mapping[str, float] | None = None,
 ) -> Sensitivity:
-    """Change every key of a scene by its tolerance, to both sides, and press it again.
+    """KeyChange every key of a scene by its tolerance, to both sides, and press it again.
 
     All presses have the increments and the mesh of the scene's own press; the mesh moves with the dimensions.  A key
     that breaks the symmetry of the press is changed in a press without it, on a coarser mesh.  The errors follow from
@@ -188,7 +188,7 @@ def sensitivity(
     return result
 
 
-def changes_of(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[str, Change]:
+def changes_of(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dict[str, KeyChange]:
     """Return the changes of all keys of a scene, by their names, in the mesh and the increments of a model."""
     given = with_moduli_only(scene.as_dict())
     wanted = {tree.numbered(key, given, "--tolerance"): change for key, change in tolerances.items()}
@@ -204,19 +204,19 @@ def changes_of(scene: Scene, own: Model, tolerances: Mapping[str, float]) -> dic
         count = sum(int(leg.steps) for leg in own.legs)
         return replace(model, mesh=own.mesh, legs=with_increments_of(model.legs, count), warnings=own.warnings)
 
-    def change(key: str, value: float) -> Change:
+    def change(key: str, value: float) -> KeyChange:
         step = wanted.get(key) or _tolerance(key, value) or _PERCENT * abs(value)
-        return Change(value, step, (at(key, value - step), at(key, value + step)))
+        return KeyChange(value, step, (at(key, value - step), at(key, value + step)))
 
     told = {key: value for key, value in values.items() if value or key in wanted}
     return {_named(key, given): change(key, value) for key, value in told.items()}
 
 
 def effects_on(
-    problem: Problem, changes: Mapping[str, Change], report: Progress
+    problem: Problem, changes: Mapping[str, KeyChange], report: Progress
 ) -> tuple[dict[str, dict[str, Effect]], dict[str, str]]:
     """Return the effects on all numbers by key, and why there are none."""
-    by_axes = dict[tuple[str, ...], dict[str, Change]]()
+    by_axes = dict[tuple[str, ...], dict[str, KeyChange]]()
     for key, one in changes.items():
         kept = [set(symmetry(end)) for end in one.ends if isinstance(end, Model)]
         axes = tuple(axis for axis in problem.axes if all(axis in some for some in kept))
@@ -270,7 +270,7 @@ def _effect(sides: tuple[Side, Side], errors: Sequence[Mapping[str, float]], nam
     return Effect(told[0], errors[0].get(name, math.nan), told[1], errors[1].get(name, math.nan))
 
 
-def differences(problem: Problem, changes: Mapping[str, Change]) -> Differences:
+def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differences:
     """Press a problem and its variants; those that change readings only are read in the problem's own press."""
     own, mesh = problem.model, problem.model.mesh
     ends = {

@@ -25,7 +25,7 @@ Read = Callable[[Problem, Sequence[StepResult]], T]
 
 
 @dataclass(frozen=True)
-class Variant(Generic[T]):
+class PressedVariant(Generic[T]):
     """Press of a changed scene, in the same increments.
 
     Attributes
@@ -42,7 +42,7 @@ class Variant(Generic[T]):
 
 def press_variants(
     problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None = None
-) -> list[Variant[T]]:
+) -> list[PressedVariant[T]]:
     """Press changed models beside a problem, each in as many increments.
 
     A variant shares the condensed body where only friction, path or a rigid object differ, and else the cells of the
@@ -58,7 +58,7 @@ def press_variants(
     if problem.model.finite_strain:
         return _share_tangents(problem, models, read, cancel)
 
-    def pressed(model: Model) -> Variant[T]:
+    def pressed(model: Model) -> PressedVariant[T]:
         try:
             own = _problem(problem, model)[0]
             return _variant(own, list(march(own, cancel=cancel)), read)
@@ -77,10 +77,12 @@ def _problem(problem: Problem, model: Model) -> tuple[Problem, bool]:
         return build(model), True
 
 
-def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None) -> list[Variant[T]]:
+def _share_tangents(
+    problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None
+) -> list[PressedVariant[T]]:
     from finger3d.mechanics.march.groups import march_in_groups  # a press in small strain needs none of it
 
-    variants: dict[int, Variant[T]] = {}
+    variants: dict[int, PressedVariant[T]] = {}
     itself = [number for number, model in enumerate(models) if model is problem.model]
     alike, others = dict[int, Problem](), dict[int, Problem]()
     for number, model in enumerate(models):
@@ -103,13 +105,13 @@ def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T], ca
     return [variants[number] for number in range(len(models))]
 
 
-def _variant(problem: Problem, steps: Sequence[StepResult], read: Read[T]) -> Variant[T]:
+def _variant(problem: Problem, steps: Sequence[StepResult], read: Read[T]) -> PressedVariant[T]:
     try:
         steps[-1].check("a variant")
-        return Variant(problem.model, read(problem, steps))
+        return PressedVariant(problem.model, read(problem, steps))
     except FAILURES as error:
         return _failed(problem.model, error)
 
 
-def _failed(model: Model, error: Exception) -> Variant[T]:
-    return Variant(model, None, str(error) or type(error).__name__)
+def _failed(model: Model, error: Exception) -> PressedVariant[T]:
+    return PressedVariant(model, None, str(error) or type(error).__name__)
