@@ -18,8 +18,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
 from finger3d.mechanics.readings.columns import RESULTANTS, by_key
-from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 from finger3d.scene import load

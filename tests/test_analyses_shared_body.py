@@ -16,8 +16,8 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.postprocess.penetration import beyond_candidates, check_surface
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.penetration import beyond_candidates, check_surface
 from finger3d.scene import Scene, parse, tree
 from tests.logs import Log
 

@@ -18,8 +18,8 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.penetration import check_surface
 from finger3d.objects import Cylinder, Plane
 from tests.models import block, large_fig9, last
 

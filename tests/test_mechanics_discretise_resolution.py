@@ -28,8 +28,8 @@ from finger3d.mechanics.discretise.resolution import (
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.postprocess.penetration import check_surface, penetration_warnings
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.penetration import check_surface, penetration_warnings
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import ball, box, write_stl
 from tests.scenes import FIG9 as FINGER

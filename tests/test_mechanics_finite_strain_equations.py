@@ -17,8 +17,8 @@ from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement
 from finger3d.mechanics.finite_strain.state import DeformedBody
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import ElasticObject, Leg, MeshOptions, Model
+from finger3d.mechanics.path import targets
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move
 from tests.models import half_cylinder

@@ -12,7 +12,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.formulation import Beginning, FiniteStrain, increments
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.path import targets
 from finger3d.objects import Move
 from tests.models import half_cylinder
 

@@ -10,13 +10,13 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder, Sphere
 from tests.models import fig9
 

@@ -10,8 +10,8 @@ import pytest
 
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.parts import Substep, energies, solved_in_turn
-from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.solve import Press
+from finger3d.mechanics.path import stations
 from finger3d.objects import Cylinder, Move, ObjectPose
 from tests.models import half_cylinder, large_fig9
 

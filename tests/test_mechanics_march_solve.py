@@ -17,10 +17,10 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import Station, stations, targets
 from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.path import Station, stations, targets
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Move, ObjectPose, Plane
 from tests.models import block, fig9, last, run

@@ -10,6 +10,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.parts import Substep
 from finger3d.mechanics.march.solve import march
@@ -22,7 +23,6 @@ from finger3d.mechanics.march.to_force import (
 )
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder, Move, ObjectPose
 from tests.models import block, ended, small_section
 from tests.viscous_cases import TWO

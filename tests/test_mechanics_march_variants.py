@@ -12,6 +12,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build, changed
 from finger3d.mechanics.discretise.problem import Problem
@@ -20,7 +21,6 @@ from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import ElasticObject, Foils, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder
 
 CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)

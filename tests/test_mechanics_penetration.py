@@ -16,7 +16,12 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface, penetration_advice, penetration_warnings
+from finger3d.mechanics.postprocess.penetration import (
+    SurfaceCheck,
+    check_surface,
+    penetration_advice,
+    penetration_warnings,
+)
 from finger3d.objects import Plane, RigidObject, Wedge
 from finger3d.scene import parse
 

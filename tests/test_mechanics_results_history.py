@@ -13,9 +13,10 @@ from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import ObjectPose, Sphere
 from tests.models import ended, small_section
 

@@ -7,9 +7,9 @@ import pytest
 
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.laws.relaxation import InternalVariables, Step
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.small_strain.relaxation import InternalVariables, Step
 from finger3d.mechanics.small_strain.viscoelastic_body import (
     ConstantBulkModulus,
     ConstantPoissonRatio,

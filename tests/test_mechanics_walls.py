@@ -16,8 +16,8 @@ from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.penetration import check_surface
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 from tests.bodies import channel, write_stl
 from tests.models import block, fig9

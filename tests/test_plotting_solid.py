@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
+from finger3d.contact.zones import Zone, border_shares
 from finger3d.fem.mesh.simplex import Mesh
-from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting import solid as render
 from tests.pictures import OBJECT, assert_shows_the_zones, finger_picture, solid_finger, top
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finger3d.contact.zones import zone_area
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.results.zones import zone_area
 from finger3d.results.states import chosen, load_states
 
 

@@ -26,12 +26,13 @@ from finger3d.fem.surface.traces import BoundarySurface, local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import candidate_points, contact_rows
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import ContactPoints, StepResult, measure
+from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.report import MeshReport
 from finger3d.meshing.structured.swept import mesh_section

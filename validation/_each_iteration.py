@@ -15,7 +15,7 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem
 from finger3d.mechanics.discretise.symmetry import unfold_points
-from finger3d.mechanics.march.path import targets
+from finger3d.mechanics.path import targets
 
 from ._common import free_motion
 from ._cost import MU, Parts

@@ -31,9 +31,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.readings.columns import AREAS, MAIN
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.penetration import check_surface
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids

@@ -22,11 +22,11 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Cylinder, Sphere
 
 from ._increments import PlainCoulomb, imbalance, pressed

@@ -21,7 +21,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.penetration import check_surface
+from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.objects import MeshObject
 
 from ._rows import Result, Row

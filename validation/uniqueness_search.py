@@ -23,9 +23,9 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import stations
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.path import stations
 
 from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, Float, columns, fig9, said

@@ -29,6 +29,7 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solvers.condense import Condensation, condense
@@ -36,7 +37,6 @@ from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, s
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.small_strain.elastic import SmallStrain
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 

@@ -44,9 +44,9 @@ from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.gauge_refinement import face_near_gauge, locally_refined
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry
-from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import automatic, limits
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.path import AUTO_START
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.meshing.limits import check_memory
 from finger3d.meshing.refinement.sizing import Sizing

@@ -21,7 +21,6 @@ from finger3d.accuracy.richardson import spacing, spread_error
 from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.discretise.companions import is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import (
     StepEstimate,
     errors_of_runs,
@@ -29,8 +28,9 @@ from finger3d.mechanics.march.step_halving import (
     step_error,
     with_increments_of,
 )
+from finger3d.mechanics.path import AUTO_START
+from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
 from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, by_key, in_space
-from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress

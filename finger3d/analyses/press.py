@@ -158,8 +158,8 @@ def _refine_mesh(scene: Scene, report: Progress) -> Refinement | None:
 
 def _march(record: PressRecord, writer: ResultWriter, report: Progress, begun: Begun | None) -> None:
     """Solve the increments of a record, and write what there is after each and after an interruption."""
-    from finger3d.mechanics.march.path import AUTO_START
     from finger3d.mechanics.march.step_halving import automatic, with_steps
+    from finger3d.mechanics.path import AUTO_START
 
     for warning in record.warnings[len(record.problem.model.warnings) :]:  # those of the model are said before
         report.say(f"warning: {warning}")
@@ -177,8 +177,8 @@ def _march(record: PressRecord, writer: ResultWriter, report: Progress, begun: B
 
 def _march_through(record: PressRecord, writer: ResultWriter, report: Progress) -> None:
     """Solve the increments that the scene names."""
-    from finger3d.mechanics.march.path import targets
     from finger3d.mechanics.march.solve import march
+    from finger3d.mechanics.path import targets
 
     total = len(targets(record.problem.model.legs))
     report.stage("pressing")
@@ -232,10 +232,9 @@ def _remark(problem: Problem, step: StepResult) -> str:
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fields | None:
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
-    from finger3d.mechanics.discretise import resolution
     from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
+    from finger3d.mechanics.postprocess.penetration import increments_without_contact, penetration_warnings
     from finger3d.mechanics.results.cavity import cavity_warnings
-    from finger3d.mechanics.results.penetration import penetration_warnings
 
     begin = time.perf_counter()
     report.stage("writing fields")
@@ -251,7 +250,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
         fields = Fields.of(record, u, strain, stress)
         record.warnings += cavity_warnings(fields.mesh, fields.displacement)
         writer.fields(record, fields)
-    record.warnings += point_count_warning(record) + resolution.increments_without_contact(problem, record.steps)
+    record.warnings += point_count_warning(record) + increments_without_contact(problem, record.steps)
     record.seconds["output"] += time.perf_counter() - begin
     return fields
 
@@ -300,7 +299,7 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
 def _advise(record: PressRecord) -> None:
     """Set the lines of advice that follow from the results so far."""
     from finger3d.accuracy.advice import advise
-    from finger3d.mechanics.results.penetration import penetration_advice
+    from finger3d.mechanics.postprocess.penetration import penetration_advice
 
     large = record.model_error.get("large_deformation")
     record.advice = advise(record.problem.model, record.largest_strain, large)

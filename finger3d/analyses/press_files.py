@@ -18,8 +18,9 @@ from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
-from finger3d.mechanics.readings.marker_grid import marker_table
-from finger3d.mechanics.results.history import ContactPoints, StepResult, contact_table, row_of_entry
+from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.postprocess.marker_grid import marker_table
+from finger3d.mechanics.results.history import StepResult, contact_table, row_of_entry
 from finger3d.results.states import object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate
-    from finger3d.mechanics.readings.marker_grid import MarkerGrid
-    from finger3d.mechanics.results.penetration import SurfaceCheck
+    from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
+    from finger3d.mechanics.postprocess.penetration import SurfaceCheck
     from finger3d.scene import Scene
 
 _SMALL_STRAIN_DEPTH = 0.3
@@ -110,7 +110,7 @@ class PressRecord:
     @property
     def marker_grid(self) -> MarkerGrid | None:
         """The grid of markers, if the scene has one."""
-        from finger3d.mechanics.readings.marker_grid import MarkerGrid
+        from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
 
         table = self.scene.tables.marker_grid
         return MarkerGrid.of(self.problem, table.spacing_mm) if table else None
@@ -213,7 +213,7 @@ def _coupling_warning(coupling: float) -> list[str]:
 
 def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
     """Return a warning if a press in small strain is deep; `steps` tell the depth of one whose force is given."""
-    from finger3d.mechanics.results.penetration import reached_depth
+    from finger3d.mechanics.postprocess.penetration import reached_depth
 
     if problem.model.finite_strain:
         return []

@@ -30,8 +30,8 @@ from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.postprocess.penetration import SurfaceCheck, check_surface
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.penetration import SurfaceCheck, check_surface
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")

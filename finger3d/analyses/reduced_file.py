@@ -21,12 +21,12 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import check_arrays, read_arrays, write_arrays
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Taxel
-from finger3d.mechanics.results.history import ContactPoints
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
 Made = TypeVar("Made", RigidObject, FrictionLaw)

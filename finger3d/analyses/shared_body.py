@@ -25,12 +25,12 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
+from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.marker_grid import MarkerGrid
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.results.history import StepResult, table_row
-from finger3d.mechanics.results.penetration import check_surface
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 from finger3d.scene.files import contents

@@ -11,8 +11,8 @@ from annotated_types import MinLen
 from finger3d._ranges import Fraction, Seconds
 from finger3d.effects import fill, warn
 from finger3d.errors import Finger3dError
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 
 _ROUNDING = 5e-3
 """Largest excess over 1 of a sum of relative moduli that is taken for rounding."""

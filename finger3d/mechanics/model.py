@@ -12,11 +12,11 @@ from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.design import Design
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker, Reading, Taxel
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.meshing.options import Mesher
 from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.objects import (

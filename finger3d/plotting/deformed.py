@@ -15,8 +15,8 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
+from finger3d.contact.zones import Zone, border_shares
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.mechanics.results.zones import Zone, border_shares
 from finger3d.plotting.gauges import Mark, draw_marks
 from finger3d.plotting.panels import (
     Marks,

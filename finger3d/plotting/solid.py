@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
-from finger3d.mechanics.results.zones import FACET_SIDES, Zone, facet_borders
 from finger3d.plotting.renderer import (
     AXES,
     WINDOW,

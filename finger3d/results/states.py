@@ -11,6 +11,7 @@ import numpy as np
 
 from finger3d._types import Array, freeze_arrays
 from finger3d.contact.state import ContactState
+from finger3d.contact.zones import Zone, edges_of, zones
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
@@ -18,7 +19,6 @@ from finger3d.io import check_arrays, read_arrays, write_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, contact_table
-from finger3d.mechanics.results.zones import Zone, edges_of, zones
 from finger3d.objects import PlacedObject
 
 _MOST_TRIANGLES = 20_000
@@ -40,7 +40,7 @@ class States:
     facet_face : (t,) number in `finger3d.fem.mesh.simplex.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     face : (m,) number of the face that each contact point belongs to
-    compliance : (m,) 1/MPa, as in `finger3d.mechanics.results.history.ContactPoints`
+    compliance : (m,) 1/MPa, as in `finger3d.mechanics.discretise.contact_points.ContactPoints`
     step : (s,) number of each increment, from 1
     target : (s, 6) depth_mm, slide_x_mm, slide_z_mm, turn_x_deg, turn_y_deg, turn_z_deg
     displacement : (s, n, d) mm

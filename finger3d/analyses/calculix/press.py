@@ -14,8 +14,8 @@ from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.mechanics.discretise.build import mesh_part
 from finger3d.mechanics.discretise.symmetry import symmetry
-from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import AUTO_START
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import Move, ObjectPose, PlacedObject
 from finger3d.progress import QUIET, Progress

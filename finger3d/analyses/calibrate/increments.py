@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from finger3d._types import Float
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import automatic, increment_error, with_scaled_steps, with_steps
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.path import AUTO_START
 
 NOISE_SHARE = 0.1
 """Error of the increments, relative to the noise of a reading, at which no more increments are added."""

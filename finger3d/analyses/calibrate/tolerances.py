@@ -32,9 +32,9 @@ from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import targets
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.quantities import Quantity

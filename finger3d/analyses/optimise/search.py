@@ -20,9 +20,9 @@ from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import AUTO_START
 from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import StepResult, measure

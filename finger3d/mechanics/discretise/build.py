@@ -35,8 +35,8 @@ from finger3d.mechanics.discretise.problem import (
 )
 from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
-from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import targets
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import check_rows

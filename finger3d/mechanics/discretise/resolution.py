@@ -12,14 +12,12 @@ normal, and points of walls and ends count too: a flank may touch the finger fro
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN
 from finger3d.errors import UnresolvedError
 from finger3d.fem.mesh.simplex import CONTACT
 from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
@@ -27,9 +25,8 @@ from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
 from finger3d.mechanics.discretise.regular_points import Box, regular_points
 from finger3d.mechanics.discretise.size_advice import is_meshable_at, rounded_down, size_advice
-from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.path import targets
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
@@ -126,7 +123,7 @@ def unresolved_overlap(
         mirrored = np.where([a in axes for a in "xz"[: d - 1]], np.abs(_horizontal(points)), _horizontal(points))
         near = tree.query(mirrored, k=count)[1]
         places, around = np.vstack([face.samples, points]), np.vstack([nearest, near.reshape(-1, count)])
-        vertical = _overlap(model, places, touch_mm, target)
+        vertical = vertical_overlap(model, places, touch_mm, target)
         if not unresolved.in_contact:
             under = face.average @ (vertical[: len(face.samples)] > 0.0) > 0.0  # no other can be inside
             # an object deeper than it is thick has left the finger at rest behind
@@ -274,27 +271,6 @@ def _messages(model: Model, touch_mm: float, landmarks: Float | None, unresolved
     return messages
 
 
-def increments_without_contact(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
-    """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
-    model, face, touch_mm = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
-    missed: list[float] = []
-    for step in steps:
-        end = step.target
-        if end.depth_mm <= 0.0 or not step.outcome.ok or (step.state.status != OPEN).any():
-            continue
-        slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
-        if (rigid_gap(problem.placed(end), problem.surface) < 0.0).any():  # the finger has not followed yet
-            continue
-        if not slid or (_overlap(model, face.samples, touch_mm, end) > 0.0).any():
-            missed.append(end.depth_mm)
-    if not missed:
-        return []
-    return [
-        f"{len(missed)} of {len(steps)} increments reach no contact point and have no force, at depths up to "
-        f"{max(missed):.3g} mm; lower mesh.size_mm"
-    ]
-
-
 def resolving_size(
     model: Model, touch_mm: float, unresolved: UnresolvedOverlap, landmarks: Float | None
 ) -> float | None:
@@ -334,7 +310,7 @@ def _horizontal(points: Float) -> Float:
     return points[..., ::2] if points.shape[-1] == 3 else points[..., :1]
 
 
-def _overlap(model: Model, points: Float, touch_mm: float, target: ObjectPose) -> Float:
+def vertical_overlap(model: Model, points: Float, touch_mm: float, target: ObjectPose) -> Float:
     """Return the vertical overlap (n,), mm, of the object with points (n, d) of the finger; -inf outside the object."""
     z = points[:, 2] if points.shape[1] == 3 else np.zeros(len(points))
     return PlacedObject.of(model.object, touch_mm, target).overlap(points[:, 0], points[:, 1], z)
@@ -345,7 +321,7 @@ def _mean_overlap(model: Model, face: BoundarySurface, touch_mm: float, target: 
 
     It is 0 for a point of whose hat function the object covers less than half.
     """
-    overlap = _overlap(model, face.samples, touch_mm, target)
+    overlap = vertical_overlap(model, face.samples, touch_mm, target)
     covered = np.isfinite(overlap)
     fraction = np.asarray(face.average @ covered)
     mean = np.asarray(face.average @ np.where(covered, overlap, 0.0)) / np.maximum(fraction, _COVERED)

@@ -9,8 +9,8 @@ import numpy as np
 
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.symmetry import symmetry
-from finger3d.mechanics.march.path import targets
 from finger3d.mechanics.model import Model
+from finger3d.mechanics.path import targets
 from finger3d.meshing.generate import is_meshable
 from finger3d.objects import PlacedObject
 

@@ -13,8 +13,8 @@ from finger3d.fem.laws.material import LinearElasticity
 from finger3d.fem.mesh.parts import contact_compliance
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, unfold
 from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import ContactPoints
 from finger3d.objects import PlacedObject, vertical_frame
 
 LOCAL_DIRECTIONS = (1, 0, 2)

@@ -10,12 +10,12 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, Stiffness
 from finger3d.fem.laws.base import Inhomogeneous
+from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.solids.bars import BarRelaxation, Bars
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.small_strain.relaxation import InternalVariables, Relaxation, Step
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from finger3d._types import Float
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.laws import IsochoricLaw
+from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step, relaxed
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.recovery.recover import displacement, extrapolated
 from finger3d.fem.solids.deformed import nodal_fields
@@ -25,11 +26,10 @@ from finger3d.mechanics.finite_strain.increment import FiniteIncrement, Incremen
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_strain.together import solve_together
 from finger3d.mechanics.formulation import Loads
-from finger3d.mechanics.march.passing import moves_too_far, passes_through, pulls
+from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.readings.columns import Column, of_kind
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import carried_by_object
-from finger3d.mechanics.small_strain.relaxation import InternalVariables, Relaxation, Step, relaxed
 from finger3d.objects import Move, ObjectPose
 
 

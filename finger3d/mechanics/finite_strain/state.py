@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
+from finger3d.fem.laws.relaxation import InternalVariables
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
 from finger3d.fem.surface.traces import BoundarySurface
@@ -15,7 +16,6 @@ from finger3d.fem.tensors import bases_of
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.small_strain.relaxation import InternalVariables
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 TARGET_RESIDUAL = 5e-9

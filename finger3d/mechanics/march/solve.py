@@ -21,13 +21,13 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
 from finger3d.mechanics.march.force_control import deepest, target
 from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, combined, energies, expecting, solved_in_turn
-from finger3d.mechanics.march.path import Load, Station, stations
 from finger3d.mechanics.march.to_force import (
     ToForce,
     ToForceAtFiniteStrain,
     expected_depth,
     forces_on,
 )
+from finger3d.mechanics.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
 from finger3d.mechanics.results.slip_limit import largest_force

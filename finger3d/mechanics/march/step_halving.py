@@ -32,9 +32,9 @@ from finger3d.mechanics.discretise.companions import coarse_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.path import AUTO_START, stations
 from finger3d.mechanics.march.solve import CUTS, march
 from finger3d.mechanics.model import Leg, Model
+from finger3d.mechanics.path import AUTO_START, stations
 from finger3d.mechanics.readings.columns import by_key, of_kind
 from finger3d.mechanics.results.history import StepResult, measure
 
@@ -128,7 +128,7 @@ def automatic(model: Model) -> bool:
     """Whether the number of increments of any leg is chosen by the error.
 
     Under the paper's rules of contact or of kinetic friction the solution does not converge with the number of
-    increments; there "auto" is a fixed number, `finger3d.mechanics.march.path.AUTO_START`.
+    increments; there "auto" is a fixed number, `finger3d.mechanics.path.AUTO_START`.
     """
     depends_on_steps = model.rule in STEP_DEPENDENT_RULES or model.friction.depends_on_steps
     return not depends_on_steps and any(leg.steps == "auto" for leg in model.legs)

@@ -1,1 +1,1 @@
-"""What a press leaves: increments, zones, and checks of the surface."""
+"""What a press leaves: states, increments and their history, and the limit of slip."""

@@ -14,7 +14,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.state import ContactState
-from finger3d.mechanics.results.history import ContactPoints
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 
 
 @dataclass(frozen=True)

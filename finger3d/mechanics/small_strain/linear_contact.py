@@ -26,7 +26,7 @@ from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace, length_scale
-from finger3d.mechanics.march.passing import moves_too_far, passes_through, pulls
+from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, vertical_frame
 

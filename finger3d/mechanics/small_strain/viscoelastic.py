@@ -20,6 +20,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
+from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.solvers.condense import spring_forces, stiffened
 from finger3d.fem.surface.traces import BoundarySurface
@@ -29,7 +30,6 @@ from finger3d.mechanics.readings.columns import Column, of_kind
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import at_rest, linear_gap, linear_loads
 from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_increment
-from finger3d.mechanics.small_strain.relaxation import InternalVariables, Relaxation, Step
 from finger3d.mechanics.small_strain.viscoelastic_body import (
     ConstantBulkModulus,
     ConstantPoissonRatio,

@@ -13,13 +13,13 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness, times
 from finger3d.fem.laws.material import Elasticity
+from finger3d.fem.laws.relaxation import InternalVariables, Prony, Step, relaxed
 from finger3d.fem.mesh.parts import ElasticityByPart
 from finger3d.fem.mesh.simplex import MeshPart
 from finger3d.fem.recovery.recover import averaged, displacement, nodal_pressure, nodal_strain
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.small_strain.relaxation import InternalVariables, Prony, Step, relaxed
 
 _FACTORS_KEPT = 5
 """Number of condensations kept, each with a factor: few paths have more than two lengths of step beside three parts."""

@@ -12,7 +12,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import MeshOptions
-from finger3d.mechanics.readings.marker_grid import MarkerGrid, grid_markers, marker_table
+from finger3d.mechanics.postprocess.marker_grid import MarkerGrid, grid_markers, marker_table
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.meshing.generate import mesh_solid
 from tests.models import block

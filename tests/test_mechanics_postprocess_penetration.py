@@ -9,7 +9,7 @@ import pytest
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg
-from finger3d.mechanics.results.penetration import beyond_candidates, check_surface
+from finger3d.mechanics.postprocess.penetration import beyond_candidates, check_surface
 from tests.models import fig9
 
 

@@ -8,9 +8,9 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.small_strain.relaxation import Relaxation
 from finger3d.objects import Plane
 from tests.models import marched
 from tests.viscous_cases import RAMP_AND_HOLD, TWO, block, mean_relaxation, viscous

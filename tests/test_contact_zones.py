@@ -10,13 +10,13 @@ from scipy.spatial import Delaunay
 
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
+from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
 from finger3d.objects import Cylinder, Sphere
 
 MODULUS = 2.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.mechanics.march.path import AUTO_START, ending_at, targets
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.path import AUTO_START, ending_at, targets
 from finger3d.objects import Move, ObjectPose
 
 

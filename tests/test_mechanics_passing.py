@@ -14,9 +14,9 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.passing import moves_too_far, passes_through
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.passing import moves_too_far, passes_through
 from finger3d.objects import Cylinder, MeshObject, Move, ObjectPose, Plane, RigidObject, Sphere, Wave
 from tests.bodies import ball, box
 from tests.models import block, last

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
+from finger3d.contact.friction import OPEN
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import BoundarySurface, restrict
+from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
 from finger3d.mechanics.discretise.contact_geometry import may_touch
-from finger3d.mechanics.discretise.problem import Problem, free_surface
+from finger3d.mechanics.discretise.problem import Problem, free_surface, rigid_gap
+from finger3d.mechanics.discretise.resolution import vertical_overlap
 from finger3d.mechanics.discretise.size_advice import rounded_down, size_advice
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
@@ -163,3 +165,24 @@ def _stays_out(problem: Problem, u: Float, target: ObjectPose, others: BoundaryS
         if gap[points].min(initial=np.inf) <= -tolerance * length_scale(problem, Move(target, target)):
             return False
     return True
+
+
+def increments_without_contact(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
+    """Return warnings about increments in which the object overlaps the finger at rest but reaches no contact point."""
+    model, face, touch_mm = problem.model, contact_face(problem.surface), problem.system.first_contact_mm
+    missed: list[float] = []
+    for step in steps:
+        end = step.target
+        if end.depth_mm <= 0.0 or not step.outcome.ok or (step.state.status != OPEN).any():
+            continue
+        slid = end.slide_x_mm or end.slide_z_mm or end.is_turned
+        if (rigid_gap(problem.placed(end), problem.surface) < 0.0).any():  # the finger has not followed yet
+            continue
+        if not slid or (vertical_overlap(model, face.samples, touch_mm, end) > 0.0).any():
+            missed.append(end.depth_mm)
+    if not missed:
+        return []
+    return [
+        f"{len(missed)} of {len(steps)} increments reach no contact point and have no force, at depths up to "
+        f"{max(missed):.3g} mm; lower mesh.size_mm"
+    ]
