@@ -161,7 +161,6 @@ _DAMAGED = (
 )
 """What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
 
-
 _CHECKSUM = "checksum"
 """Name of the array of an .npz file with the SHA-256 of all others."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of, with_defaults
+from finger3d.analyses.calibrate.tolerances import _mesh_errors, displaced_gauges, tolerance_of, with_defaults
 from finger3d.analyses.press import press
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
@@ -21,7 +22,21 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 from finger3d.sensor import estimate
+from tests.models import half_cylinder
 from tests.sensor_cases import FEW, NONE, SCENE, scene
+
+
+def test_the_error_of_the_mesh_follows_from_the_companion_and_is_nowhere_below_its_mean() -> None:
+    problem = build(half_cylinder(0.4))
+    beside = companion(problem)
+    own = SimpleNamespace(problem=problem, readings=np.array([[0.03, 0.01]]))
+    coarse = SimpleNamespace(problem=beside, readings=np.array([[0.02, 0.01]]))
+    (found,) = _mesh_errors(own, coarse, [SimpleNamespace(kind="gauge")])
+    # from the change, the ratio of edges and the order of strains, 1.5; the second reading agrees by chance
+    ratio = (problem.mesh.points.size / beside.mesh.points.size) ** 0.5
+    error = abs(0.01 / (ratio**1.5 - 1.0))
+    assert found == pytest.approx([error, error / 2.0**0.5], rel=1e-12)
+
 
 # --- calibration of a scene ------------------------------------------------------------------------------------------
 

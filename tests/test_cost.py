@@ -24,6 +24,11 @@ def test_increments_of_sections_at_finite_strain_take_what_was_measured(dofs: in
     assert 0.5 < PressSize(2, dofs, 50.0).finite_strain_s / measured < 2.0
 
 
+def test_a_press_takes_its_condensation_and_its_increments() -> None:
+    size = PressSize(2, 10_000.0, 100.0)
+    assert size.press_s(10) == pytest.approx(size.condensation_s + 10 * size.contact_s)
+
+
 def test_large_meshes_take_the_memory_that_was_measured() -> None:
     # of condensations of the Fig. 9 finger with 482 640, 776 577 and 1 009 778 unknowns, by validation/scaling.py
     for tets, measured in ((107_613, 8.0), (174_372, 14.4), (228_024, 19.8)):

@@ -138,7 +138,7 @@ def sensitivity(
     overrides: Sequence[str] = (),
     tolerances: Mapping[str, float] | None = None,
 ) -> Sensitivity:
-    """KeyChange every key of a scene by its tolerance, to both sides, and press it again.
+    """Change every key of a scene by its tolerance, to both sides, and press it again.
 
     All presses have the increments and the mesh of the scene's own press; the mesh moves with the dimensions.  A key
     that breaks the symmetry of the press is changed in a press without it, on a coarser mesh.  The errors follow from
