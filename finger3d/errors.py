@@ -76,7 +76,8 @@ class Outcome(Enum):
         "fillet where a sharp edge of the finger folds over, or small strain, effects.auto = false"
     )
     FORCE_NOT_REACHED = (
-        "the prescribed force is not reached within the finger's height; prescribe a smaller force, or a depth"
+        "the prescribed force is not reached before finger or object come to the base; prescribe a smaller force, or "
+        "a depth"
     )
     FORCE_JUMPS = (
         "the prescribed force is not reached: the force jumps with the depth, as where an edge slips off, or by "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -301,6 +302,21 @@ def test_a_press_by_force_tells_the_depth(tmp_path: Path, capsys: pytest.Capture
     assert "10000 N asked; the largest force is" in error
     summary = json.loads((tmp_path / "far" / "summary.json").read_text())
     assert "prescribed force is not reached" in summary["outcome"]
+
+
+def test_a_force_for_which_an_inclined_plane_would_reach_the_base_is_an_outcome(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plane touches a quarter of the circle: at the edge of the base it is r (sqrt 2 - 1) = 2.07 mm above it."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE + '[object]\nshape = "plane"\nturn_z_deg = 45.0\n[mesh]\nsize_mm = 0.5\n')
+    assert main(["press", str(path), "--out", str(tmp_path / "far"), "--set", "press.force_N=30", *SMALL]) == 3
+    error = capsys.readouterr().err
+    largest = re.search(r"30 N asked; the largest force is .* N, at a depth of (.*) mm", error)
+    assert largest is not None
+    assert float(largest[1]) == pytest.approx(0.99 * 5.0 * (math.sqrt(2.0) - 1.0), rel=0.02)
+    assert main(["press", str(path), "--out", str(tmp_path / "deep"), "--set", "press.depth_mm=2.2", *SMALL]) == 2
+    assert "incline it less" in capsys.readouterr().err
 
 
 def test_an_increment_that_failed_tells_what_it_led_to_until_then() -> None:

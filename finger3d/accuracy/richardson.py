@@ -29,6 +29,9 @@ from finger3d.mechanics.results.history import StepResult, measure
 _LEAST = 0.002
 """Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""
 
+_LEAST_OF_ZONES = 0.04
+"""The same for lengths and areas of contact and stick, which points on the border enter or leave unseen."""
+
 _LEAST_SLIP = 0.1
 """Share of the work for that of few points that slip unseen."""
 
@@ -120,5 +123,6 @@ def spread_error(
         scale = scale_of(numbers, kinds, name)
         if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
             scale *= _LEAST_SLIP
-        found[name] = max(bar, _LEAST * spacing * scale)
+        least = _LEAST_OF_ZONES if kinds[name].is_zone else _LEAST
+        found[name] = max(bar, least * spacing * scale)
     return {name: error for name, error in found.items() if math.isfinite(error)}

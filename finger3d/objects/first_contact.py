@@ -191,10 +191,10 @@ def _clear_of_base(way: ContactPath, first_contact_mm: float) -> None:
                 continue
             if (PlacedObject.of(way.object, first_contact_mm, between).distance(base)[0] < 0.0).any():
                 x, y, z = np.degrees(between.turns)
+                turned = f"turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z " if between.is_turned else ""
                 raise Finger3dError(
-                    f"press: turned by {x:.4g}, {y:.4g}, {z:.4g} deg about x, y, z at a depth of "
-                    f"{between.depth_mm:.4g} mm, the object reaches the finger's base, which is held; turn it less, or "
-                    "press less deep"
+                    f"press: {turned}at a depth of {between.depth_mm:.4g} mm, the object reaches the finger's base, "
+                    f"which is held; {'turn' if turned else 'incline'} it less, or press less deep"
                 )
         before = pose
 

@@ -47,19 +47,26 @@ _SIMILAR = 0.5
 _GRADED = np.concatenate([[0.0], np.geomspace(1e-5, 1.0, 100)])
 """Distances from the place of first touch at which the overlap is found for a forecast, over the finger's extent."""
 
+_ENDS = np.array([-1.0, 1.0])
+
 _BEYOND = 1.1
 """Depth reached, over its forecast, from which the contact may lie beyond the fine part of the mesh."""
 
 
-def deepest(obj: RigidObject, first_contact_mm: float, height: float) -> float:
+def deepest(way: ContactPath, first_contact_mm: float, height: float) -> float:
     """Return the largest depth (mm) at which a force is looked for: neither finger nor object reaches the base there.
 
     Parameters
     ----------
+    way : the object, and the extents of the finger; its poses are not looked at
     first_contact_mm : height of the object's lowest point at first touch
     height : of the finger, mm
     """
-    return _DEEPEST * (height if obj.is_flat else min(height, first_contact_mm))
+    lowest = first_contact_mm
+    if way.object.is_flat:  # it has no lowest point; over the base it is lowest at a corner
+        x, z = np.meshgrid(way.half_length_mm * _ENDS, way.half_width_mm * _ENDS)
+        lowest = float(PlacedObject.of(way.object, first_contact_mm).height(x.ravel(), z.ravel()).min())
+    return _DEEPEST * min(height, lowest)
 
 
 @dataclass(frozen=True)
@@ -304,7 +311,7 @@ def forecast_depth(way: ContactPath, material: Isotropic, force: float, height: 
         thickness = min(b * max(1.2, math.log(2.8 * length / b) - 0.5), 1.2 * height)
         return modulus * float((overlap * plan).sum()) / thickness
 
-    most = deepest(way.object, touch.height_mm, height)
+    most = deepest(way, touch.height_mm, height)
     depth = brentq(lambda depth: pressed(depth) - force, 0.0, most) if pressed(most) > force else most
     return float(f"{depth:.4g}")
 

@@ -233,7 +233,7 @@ class Press:
     @property
     def _deepest(self) -> float:
         model = self.problem.model
-        return deepest(model.object, self.problem.system.first_contact_mm, model.design.height_mm)
+        return deepest(model.contact_path, self.problem.system.first_contact_mm, model.design.height_mm)
 
     def _to_force(self, move: Move, load: Load) -> Advanced:
         """Advance to the depth where the normal force is the prescribed one; where contact begins, in parts."""
