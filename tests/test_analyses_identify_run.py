@@ -56,8 +56,8 @@ def test_errors_of_the_mesh_do_not_depend_on_the_bounds_of_the_modulus(tmp_path:
     for number, bounds in enumerate(((0.05, 5.0), (0.3, 0.5))):
         free = FREE | {"material.E_MPa": bounds}
         found.append(finger3d.identify(scene_file, measured, free, tmp_path / f"out{number}").fitted.numerical)
-    # derivatives are differences over a hundredth of the range, which is another in either case
-    assert found[1] == pytest.approx(found[0], rel=0.05)
+    # a deviation from 2048 samples is known to 2 %, and presses are at other places in either case
+    assert found[1] == pytest.approx(found[0], rel=0.15)
 
 
 @pytest.mark.slow
@@ -82,7 +82,7 @@ def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> 
 
 
 def test_presses_are_few_and_share_bodies(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four points with noise: half of the presses are those of the fit, the others those along friction."""
+    """Four points with noise, three unknowns: nine presses of the design, and those that the emulator asks for."""
     counted = {"bodies": 0, "presses": 0}
     built, pressed = PressedBody._built, PressedBody.steps
 
@@ -100,7 +100,7 @@ def test_presses_are_few_and_share_bodies(tmp_path: Path, scene_file: Path, monk
     measured.write_text("\n".join([lines[0], *lines[2::2]]) + "\n")
     found = finger3d.identify(scene_file, measured, FREE | {"material.nu": (0.3, 0.495)}, tmp_path / "out")
     assert found.measured.count == 2 * 4
-    assert found.presses == counted["presses"] <= 40
+    assert found.presses == counted["presses"] <= 25
     assert counted["bodies"] <= 16  # of one body all friction that is tried at first
     for value, std, true in zip(found.fitted.values, found.fitted.stds, [*TRUE.values(), 0.45], strict=True):
         assert value == pytest.approx(true, abs=4.0 * std)

@@ -127,7 +127,7 @@ def case(kind: str, random: np.random.Generator) -> Iterator[Fitted]:
 
 def run(quick: bool) -> Result:
     """Quick: eighteen sections."""
-    random = np.random.default_rng(20261126)
+    random = np.random.default_rng(20261130)
     counts = IF_QUICK if quick else CASES
     found = [one for domain, count in counts.items() for _ in range(count) for one in case(domain, random)]
     rows = list(_rows(found, quick))

@@ -1,94 +1,102 @@
-"""Uncertainty of fitted values: the likelihood along the friction coefficient, normal in all other values.
+"""Posterior distribution of the free keys, and the uncertainty of fitted values.
 
-With the Jacobian J of residuals whose covariance is the identity, and a variance of 1/12 of the range beforehand, that
-of a uniform distribution, ``H = J^T J + 12`` is the Fisher matrix and its inverse the covariance of the values (Bard
-1974, Ch. 7).  An eigenvector of ``J^T J`` along which the standard deviation is a quarter of the range or more is a
-combination of values that the data do not determine.
-
-What is read bends strongly with friction, and is constant where all of the contact sticks.  The press is therefore
-solved at several coefficients from bound to bound.  At each the other values minimise the linearised sum of squares
-chi^2, and Laplace's method gives the likelihood ``exp(-chi^2 / 2) / sqrt(det H)`` of the coefficient and a normal
-distribution of the others; in between residuals and Jacobian are interpolated.  The standard deviation of a value is
-its root mean square distance from the fitted one over this mixture, and the ends of its interval are quantiles.
+Beforehand all shares of the ranges are equally likely.  Samples of the posterior are drawn by sequential Monte Carlo
+(Del Moral, Doucet and Jasra 2006): samples of the prior are weighted with rising powers of the likelihood, resampled,
+and moved by differences of other samples (ter Braak 2006), so that flat likelihoods and those with several maxima are
+followed as well as narrow ones.  The standard deviation of a value is its root mean square distance from the fitted one
+over the samples, and the ends of its interval are quantiles.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize, special
-from scipy.interpolate import PchipInterpolator
+from scipy.stats import qmc
 
 from finger3d._types import Float
-from finger3d.analyses.identify.fit import Scale, values_at
-from finger3d.errors import Finger3dError
+from finger3d.analyses.identify.scale import Scale, values_at
 
-_PRIOR = 12.0
-"""Inverse of the variance of a uniform distribution over the range, in shares."""
+_EFFECTIVE = 0.5
+"""Effective share of the samples that is left by a rise of the power."""
 
-_COARSE, _FINE = np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 401)
-_NEAR, _FINE_NEAR = np.array([-3.0, -1.5, 0.0, 1.5, 3.0]), np.linspace(-5.0, 5.0, 201)
-"""Coefficients that are pressed, and those at which the likelihood is interpolated: as shares of the range, and near
-the fitted one, in standard deviations."""
+_MOVES, _JUMP, _JITTER = 8, 4, 1e-5
+"""Moves after each rise; of them, each fourth by a whole difference, which leads from one maximum to another; and
+standard deviation that is added, in shares."""
 
-_APART = 1e-3
-"""Least distance of coefficients that are pressed, in shares."""
-
-_ROUNDS, _STILL, _NEGLIGIBLE = 3, 0.05, 1e-2
-"""Largest number of times that presses follow the other values; change of a share, and part of the largest likelihood,
-below which they need not."""
+_SEED = 2006
 
 _UNTOLD = 0.25
 """Standard deviation of a combination, relative to the range, at which the data do not determine it."""
 
-_LEAST_SD = 1e-12  # of a share
 _STRONG = 0.95  # correlation that is named
 _AT_BOUND = 1e-3  # distance of a share from 0 or 1
 _PART = 0.3  # component of an eigenvector that is named
-_PLAUSIBLE = np.exp(-0.5)  # of the largest likelihood: the 68 % limit of a likelihood ratio
+_BINS, _PLAUSIBLE = 40, 1.0
+"""Bins of a share; chi-square beyond the least one at the 68 % limit of a likelihood ratio, and twice it between two
+ranges that are apart."""
+
 _TAIL = 0.5 * special.erfc(np.sqrt(0.5))  # probability beyond one standard deviation, to one side
+
+LogLikelihood = Callable[[Float], Float]
+"""Logarithm of the likelihood (s,) at shares (s, k), without a constant."""
 
 
 @dataclass(frozen=True)
-class Mixture:
-    """Normal distributions (m) of the shares (k) whose mixture is the likelihood.
+class Samples:
+    """Equally weighted samples of the posterior distribution.
 
     Attributes
     ----------
-    shares : (m, k) means
-    covariance : (m, k, k)
-    weight : (m,)
-    density : (m,) likelihood of the friction coefficient over its largest value
+    shares : (s, k)
+    log_likelihood : (s,)
     """
 
     shares: Float
-    covariance: Float
-    weight: Float
-    density: Float
-
-    @property
-    def sd(self) -> Float:
-        """Standard deviations (m, k)."""
-        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+    log_likelihood: Float
 
     def about(self, shares: Float) -> Float:
         """Return the mean squares and products (k, k) of distances from shares (k,)."""
         distance = self.shares - shares
-        products = self.covariance + distance[:, :, None] * distance[:, None, :]
-        return np.asarray(np.einsum("m,mij->ij", self.weight, products))
+        return np.asarray(distance.T @ distance / len(distance))
 
-    def quantile(self, number: int, probability: float) -> float:
-        """Return a quantile of a share, within its bounds."""
-        middle, sd = self.shares[:, number], np.maximum(self.sd[:, number], 1e-9)
 
-        def excess(share: float) -> float:
-            return float(self.weight @ special.ndtr((share - middle) / sd)) - probability
+def sampled(log_likelihood: LogLikelihood, dimension: int, count: int) -> Samples:
+    """Return samples of the posterior, the same in each call; `count` is a power of 2."""
+    random = np.random.default_rng(_SEED)
+    shares = qmc.Sobol(dimension, rng=_SEED).random(count)
+    found, power = log_likelihood(shares), 0.0
+    while power < 1.0:
+        rise = _rise(found, 1.0 - power)
+        power += rise
+        weight = special.softmax(rise * found)
+        places = (random.random() + np.arange(count)) / count
+        chosen = np.minimum(np.searchsorted(np.cumsum(weight), places), count - 1)
+        shares, found = shares[chosen], found[chosen]
+        for move in range(_MOVES):
+            gamma = 1.0 if move % _JUMP == _JUMP - 1 else 2.38 / math.sqrt(2.0 * dimension)
+            first, second = random.integers(count, size=(2, count))
+            proposed = shares + gamma * (shares[first] - shares[second]) + random.normal(0.0, _JITTER, shares.shape)
+            after = np.full(count, -np.inf)
+            inside = ((proposed >= 0.0) & (proposed <= 1.0)).all(axis=1)
+            if inside.any():
+                after[inside] = log_likelihood(proposed[inside])
+            taken = np.log(random.random(count)) < power * (after - found)
+            shares, found = np.where(taken[:, None], proposed, shares), np.where(taken, after, found)
+    return Samples(shares, found)
 
-        if excess(0.0) >= 0.0 or excess(1.0) <= 0.0:
-            return 0.0 if excess(0.0) >= 0.0 else 1.0
-        return float(optimize.brentq(excess, 0.0, 1.0, xtol=1e-12))
+
+def _rise(log_likelihood: Float, most: float) -> float:
+    """Return the rise of the power, at most `most`, that leaves the effective share of the samples."""
+
+    def excess(rise: float) -> float:
+        weight = special.softmax(rise * log_likelihood)
+        return float(1.0 / (weight @ weight)) - _EFFECTIVE * len(weight)
+
+    return most if excess(most) >= 0.0 else float(optimize.brentq(excess, 0.0, most, xtol=1e-12 * most, rtol=1e-6))
 
 
 @dataclass(frozen=True)
@@ -115,114 +123,30 @@ class FittedValues:
     numerical: Float
 
 
-Press = Callable[[Float], tuple[Float, Float]]
-"""Residuals (n,) at shares (k,), and their derivatives (n, k - 1) by all shares but that of friction."""
-
-
-def normal(shares: Float, derivative: Float) -> Mixture:
-    """Return the normal distribution about shares (k,) with the derivatives (n, k) of the residuals."""
-    covariance = np.asarray(np.linalg.inv(derivative.T @ derivative + _PRIOR * np.eye(len(shares))))
-    return Mixture(shares[None], covariance[None], np.ones(1), np.ones(1))
-
-
-def along_friction(shares: Float, derivative: Float, friction: int, press: Press) -> Mixture:
-    """Return the likelihood along the share of a number, about shares (k,) and derivatives (n, k) there."""
-    best, others = shares[friction], np.arange(len(shares)) != friction
-    sd = float(normal(shares, derivative).sd[0, friction])
-    places = np.unique(np.clip([*_COARSE, *(best + sd * _NEAR)], 0.0, 1.0))
-    places = places[np.append(True, np.diff(places) > _APART)]
-    fine = np.unique(np.clip([*_FINE, *(best + sd * _FINE_NEAR)], 0.0, 1.0))
-    bases = np.where(others, shares, np.where(others, 0.0, places[:, None]))
-    known: dict[int, tuple[Float, Float]] = {}
-    for _ in range(_ROUNDS):
-        for i, base in enumerate(bases):
-            if i not in known:
-                try:
-                    known[i] = press(base)
-                except Finger3dError:
-                    known[i] = np.full(len(derivative), np.nan), np.full_like(derivative[:, others], np.nan)
-        good = np.array([i for i in sorted(known) if np.isfinite(known[i][0]).all()])
-        fine = fine[(fine >= places[good[0]]) & (fine <= places[good[-1]])]
-        residual, slope, base = (
-            PchipInterpolator(places[good], np.array(values))(fine)
-            for values in ([known[i][0] for i in good], [known[i][1] for i in good], bases[np.ix_(good, others)])
-        )
-        mixture = _laplace(fine, friction, residual, slope, base, shares[others])
-        moved = np.array([np.interp(places, fine, column) for column in mixture.shares.T]).T
-        counts = np.interp(places, fine, mixture.density) > _NEGLIGIBLE
-        left = [i for i in good if counts[i] and np.abs(moved[i] - bases[i])[others].max(initial=0.0) > _STILL]
-        for i in left:
-            bases[i, others] = moved[i, others]
-            del known[i]
-        if not left:
-            break
-    return mixture
-
-
-def _laplace(fine: Float, friction: int, residual: Float, slope: Float, base: Float, prior: Float) -> Mixture:
-    """Return the mixture at shares (m,) of friction.
-
-    Parameters
-    ----------
-    residual, slope : (m, n), (m, n, k - 1) at the other shares `base` (m, k - 1)
-    prior : (k - 1,) shares that are expected beforehand
-    """
-    turned = slope.transpose(0, 2, 1)
-    hessian = turned @ slope + _PRIOR * np.eye(len(prior))
-    gradient = turned @ residual[:, :, None] + _PRIOR * (base - prior)[:, :, None]
-    step = -np.linalg.solve(hessian, gradient)[:, :, 0]
-    reached = np.clip(base + step, 0.0, 1.0)
-    left = residual + np.einsum("mnk,mk->mn", slope, reached - base)
-    chi_square = np.sum(left**2, axis=1) + _PRIOR * np.sum((reached - prior) ** 2, axis=1)
-    log = -0.5 * (chi_square + np.linalg.slogdet(hessian).logabsdet)
-    density = np.exp(log - log.max())
-    weight = density * np.gradient(fine)
-    count = len(prior) + 1
-    others = np.arange(count) != friction
-    shares, covariance = np.empty((len(fine), count)), np.zeros((len(fine), count, count))
-    shares[:, friction], shares[:, others] = fine, reached
-    covariance[np.ix_(range(len(fine)), others, others)] = np.linalg.inv(hessian)
-    return Mixture(shares, covariance, weight / weight.sum(), density)
-
-
 def fitted_values(
-    scales: Sequence[Scale], shares: Float, derivative: Float, errors: Float, mixture: Mixture, friction: int | None
+    scales: Sequence[Scale], shares: Float, samples: Samples, derivative: Float, errors: Float
 ) -> FittedValues:
     """Return the values at shares (k,) with their uncertainty.
 
-    The standard deviation of a value is the root mean square distance of the ends of one standard deviation of its
-    share, within the bounds, over the mixture.
-
     Parameters
     ----------
-    derivative : (n, k) of the residuals by shares
-    errors : (n, n) part of the errors of the simulation in the covariance of the residuals
-    friction : number of the share along which the mixture is
+    derivative : (n, k) of the residuals, whose covariance is the identity, by shares
+    errors : (n, n) part of the errors of the simulation in that covariance
     """
-    values, fisher = values_at(scales, shares), derivative.T @ derivative
-    ends = (np.clip(mixture.shares + sign * mixture.sd, 0.0, 1.0) for sign in (-1.0, 1.0))
-    squares = sum(0.5 * (np.array([values_at(scales, end) for end in one]) - values) ** 2 for one in ends)
-    stds = np.sqrt(mixture.weight @ squares)
-    low, high = (
-        np.array([scale.value(choose(mixture.quantile(i, p), float(shares[i]))) for i, scale in enumerate(scales)])
-        for p, choose in ((_TAIL, min), (1.0 - _TAIL, max))
-    )
-    covariance = normal(shares, derivative).covariance[0]
+    values = values_at(scales, shares)
+    sampled_values = np.array([values_at(scales, one) for one in samples.shares])
+    stds = np.sqrt(np.mean((sampled_values - values) ** 2, axis=0))
+    low, high = np.quantile(sampled_values, [_TAIL, 1.0 - _TAIL], axis=0)
     shift = np.linalg.pinv(derivative)
     whole, part = (np.sqrt(np.diag(shift @ matrix @ shift.T)) for matrix in (np.eye(len(errors)), errors))
-    slopes = np.array([scale.slope(float(share)) for scale, share in zip(scales, shares, strict=True)])
-    numerical = np.minimum(slopes, stds / np.maximum(whole, _LEAST_SD)) * part
-    eigenvalues, vectors = np.linalg.eigh(fisher)
-    about = mixture.about(shares)
-    told = [
-        *_untold(scales, eigenvalues, vectors),
-        *_correlated(scales, _correlation(covariance), eigenvalues),
-        *_bound(scales, shares),
-    ]
-    if friction is not None:
-        told += _along(scales[friction], mixture, friction, float(np.sqrt(about[friction, friction])))
-    untold = tuple(dict.fromkeys(told))
-    return FittedValues(values, stds, low, high, _correlation(about), shares, untold, numerical)
+    numerical = stds * np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)
+    about = samples.about(samples.shares.mean(axis=0))
+    correlation = _correlation(samples.about(shares))
+    told = [*_untold(scales, about), *_correlated(scales, _correlation(about), about), *_bound(scales, shares)]
+    for number, scale in enumerate(scales):
+        told += _maxima(scale, samples, number)
+    low, high = np.minimum(low, values), np.maximum(high, values)
+    return FittedValues(values, stds, low, high, correlation, shares, tuple(dict.fromkeys(told)), numerical)
 
 
 def _correlation(covariance: Float) -> Float:
@@ -230,15 +154,16 @@ def _correlation(covariance: Float) -> Float:
     return np.asarray(covariance / np.outer(sd, sd))
 
 
-def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list[str]:
+def _untold(scales: Sequence[Scale], covariance: Float) -> list[str]:
     """Name the values, or combinations of them, that the data do not determine."""
     found = []
-    for value, vector in zip(eigenvalues, vectors.T, strict=True):
-        if value * _UNTOLD**2 < 1.0:
+    values, vectors = np.linalg.eigh(covariance)
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value >= _UNTOLD**2:
             parts = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) >= _PART]
             names = [scales[i].key for i in parts]
             if len(names) == 1:
-                found.append(_cannot_tell(scales[parts[0]]))
+                found.append(f"the data cannot tell {names[0]} within its bounds")
             else:
                 same = np.sign(vector[parts]) == np.sign(vector[parts[0]])
                 how = "rise together" if same.all() else "change against each other"
@@ -246,13 +171,9 @@ def _untold(scales: Sequence[Scale], eigenvalues: Float, vectors: Float) -> list
     return found
 
 
-def _cannot_tell(scale: Scale) -> str:
-    return f"the data cannot tell {scale.key} within its bounds"
-
-
-def _correlated(scales: Sequence[Scale], correlation: Float, eigenvalues: Float) -> list[str]:
+def _correlated(scales: Sequence[Scale], correlation: Float, covariance: Float) -> list[str]:
     """Name pairs of values that are known much better together than each alone."""
-    if eigenvalues.min() * _UNTOLD**2 < 1.0:
+    if np.linalg.eigvalsh(covariance).max() >= _UNTOLD**2:
         return []
     pairs = [(i, j) for i in range(len(scales)) for j in range(i) if abs(correlation[i, j]) > _STRONG]
     return [
@@ -267,10 +188,17 @@ def _bound(scales: Sequence[Scale], shares: Float) -> list[str]:
     return [f"{scale.key} is at its {'lower' if share < 0.5 else 'upper'} bound: widen it" for scale, share in ends]
 
 
-def _along(scale: Scale, mixture: Mixture, friction: int, sd: float) -> list[str]:
-    """Say that the likelihood of the friction coefficient is flat, or that it has several maxima."""
-    inside = np.flatnonzero(np.diff(np.pad((mixture.density >= _PLAUSIBLE).astype(int), 1))).reshape(-1, 2)
-    place = mixture.shares[:, friction]
-    ranges = [f"{scale.value(place[a]):.3g} to {scale.value(place[b - 1]):.3g}" for a, b in inside]
-    found = [f"{scale.key} = {' and '.join(ranges)} fit about as well"] if len(ranges) > 1 else []
-    return [*found, _cannot_tell(scale)] if sd > _UNTOLD else found
+def _maxima(scale: Scale, samples: Samples, number: int) -> list[str]:
+    """Say that several ranges of a value fit about as well."""
+    share, beyond = samples.shares[:, number], 2.0 * (samples.log_likelihood.max() - samples.log_likelihood)
+    edges = np.linspace(share.min(), share.max(), _BINS + 1)
+    place, least = np.clip(np.searchsorted(edges, share) - 1, 0, _BINS - 1), np.full(_BINS, np.inf)
+    np.minimum.at(least, place, beyond)
+    ranges = [[edges[0], edges[0]]]
+    is_apart = True
+    for begin, end, lost in zip(edges[:-1], edges[1:], least, strict=True):
+        if lost <= _PLAUSIBLE:
+            ranges = [*ranges, [begin, end]] if is_apart else [*ranges[:-1], [ranges[-1][0], end]]
+        is_apart = (is_apart and lost > _PLAUSIBLE) or lost > 2.0 * _PLAUSIBLE
+    texts = [f"{scale.value(a):.3g} to {scale.value(b):.3g}" for a, b in ranges[1:]]
+    return [f"{scale.key} = {' and '.join(texts)} fit about as well"] if len(texts) > 1 else []

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import interp1d
+from scipy import optimize
 from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
-from finger3d.analyses.identify.fit import Scale, fit, jacobian, misfit_text, values_at
+from finger3d.analyses.identify.emulator import Emulator, ends
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
-from finger3d.analyses.identify.posterior import FittedValues, Mixture, along_friction, fitted_values, normal
+from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
+from finger3d.analyses.identify.scale import values_at
 from finger3d.analyses.identify.simulated import (
-    MODULI,
     OFFSET,
     Curve,
     Simulation,
@@ -48,10 +46,13 @@ _BAR = 1.645
 
 _SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
-_TRIED_MODULI = 41  # values of Young's modulus that are tried at the start
-_FRICTION = 0.2, 0.45, 0.7  # shares tried at the start: a fit does not leave values at which all of the contact sticks
-_FITS, _AS_LIKELY = 3, 0.8  # most fits; likelihood, over the largest one, of values from which no other fit is tried
-_FROM_BOUND = 0.05  # of the first shares: the method is slow near a bound
+_MOST = 12  # presses for each key that needs some, at most, and one more
+_FEW, _MANY = 256, 2048  # samples of the posterior while presses are chosen, and at the end
+_AGREES = 0.5  # difference of an emulator from a press, in standard deviations, that counts as none
+_NEAR = 1e-3  # distance of shares from a press at which there is no other
+_STEP = 0.01  # of shares, for derivatives
+_IMPOSSIBLE, _INSIDE = 1e12, 1e-9  # misfit where a press fails; distance of a first guess from its bounds
+_MISFIT = 2.0  # residuals over their stated standard deviation beyond which the scene does not explain the data
 
 
 @dataclass(frozen=True)
@@ -191,92 +192,144 @@ def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) 
 
 @dataclass(frozen=True)
 class _Misfit:
-    """Residuals of a simulation over their standard deviations, as functions of the values or shares (k).
+    """Residuals of a simulation over their standard deviations.
 
     Attributes
     ----------
+    start : (k,) shares from which values stay near where the data do not determine them
     stds : (n,) standard deviations by column
     root : Cholesky factor of the covariance of all residuals, each over its standard deviation
     """
 
-    simulation: Simulation
-    data: MeasuredPress
-    report: Progress
+    emulator: Emulator
+    start: Float
     stds: Mapping[str, Float]
     root: Float
 
     @classmethod
-    def of(cls, simulation: Simulation, data: MeasuredPress, report: Progress) -> _Misfit:
+    def of(cls, emulator: Emulator, start: Float) -> _Misfit:
         """Return the misfit by the noise alone; that of columns without standard deviations is a share of them."""
+        data = emulator.data
         stds = {
             n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
             for n, v in data.columns.items()
         }
-        return cls(simulation, data, report, stds, np.eye(data.count))
+        shares = np.array([scale.share(v) for scale, v in zip(emulator.scales, start, strict=True)])
+        return cls(emulator, shares, stds, np.eye(data.count))
 
-    @cached_property
-    def scales(self) -> list[Scale]:
-        return [Scale.of(f) for f in self.simulation.free]
+    def with_errors(self, known: Mapping[str, Float]) -> _Misfit:
+        """Return the misfit with independent errors (m, r) of the simulation at the rows of each column."""
+        zero = np.zeros((1, len(self.emulator.data.at)))
+        # a row of zeros for all columns but the one that the error is of
+        plain = block_diag(*(known.get(name, zero) / (_BAR * std) for name, std in self.stds.items()))
+        return replace(self, root=np.linalg.cholesky(np.eye(plain.shape[1]) + plain.T @ plain))
 
-    def of_curve(self, simulated: Mapping[str, Float]) -> Float:
-        """Return the residuals of simulated columns."""
-        plain = [(simulated[n] - v) / self.stds[n] for n, v in self.data.columns.items()]
-        return np.asarray(solve_triangular(self.root, np.concatenate(plain), lower=True))
+    @property
+    def part_of_errors(self) -> Float:
+        """Part (n, n) of the errors of the simulation in the covariance of whitened residuals."""
+        inverse = solve_triangular(self.root, np.eye(len(self.root)), lower=True)
+        return np.eye(len(self.root)) - inverse @ inverse.T
 
-    def residuals(self, values: Float) -> Float:
-        return self.of_curve(self.simulation.at(values, self.data))
+    def whitened(self, difference: Float) -> Float:
+        """Return differences (s, n) of numbers over their standard deviations, with the identity as covariance."""
+        plain = difference / np.concatenate([*self.stds.values()])
+        return np.asarray(solve_triangular(self.root, plain.T, lower=True)).T
 
-    def jacobian(self, shares: Float, wanted: Sequence[int] | None = None) -> Float:
-        """Return the derivatives by shares, by some of them if these are given."""
-        return jacobian(self.scales, shares, self.residuals, wanted)
+    def residuals(self, shares: Float) -> Float:
+        """Return the residuals (s, n) at shares (s, k)."""
+        return self.whitened(self.emulator(shares) - np.concatenate([*self.emulator.data.columns.values()]))
 
-    @cached_property
-    def without_press(self) -> list[int]:
-        """Numbers of the shares whose change needs no press."""
-        scales = self.simulation.scales_with_modulus
-        return [i for i, f in enumerate(self.simulation.free) if f.key == OFFSET or (f.key in MODULI and scales)]
+    def log_likelihood(self, shares: Float) -> Float:
+        """Return the logarithm of the likelihood (s,) at shares (s, k), which is very small where presses fail.
 
-    def fit(self, shares: Float) -> Float:
-        """Return the shares with the least sum of squares, from those given."""
+        The error of the emulator adds to the variance (Kennedy and O'Hagan 2001).
+        """
+        variance = 1.0 + self.whitened(self.emulator.error(shares)) ** 2
+        found = -0.5 * np.sum(self.residuals(shares) ** 2 / variance + np.log(variance), axis=1)
+        return np.where(self.emulator.fails(shares), -_IMPOSSIBLE, found)
 
-        def announce(values: Float) -> None:
-            named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.simulation.free, values, strict=True))
-            self.report.stage(f"fitting, {self.simulation.solved} presses: {named}")
+    def derivative(self, shares: Float) -> Float:
+        """Return the derivatives (n, k) of the residuals at shares (k,)."""
+        ends = [np.clip(shares + sign * _STEP * np.eye(len(shares)), 0.0, 1.0) for sign in (-1.0, 1.0)]
+        less, more = map(self.residuals, ends)
+        return np.asarray((more - less).T / np.diag(ends[1] - ends[0]))
 
-        return fit(self.scales, shares, self.residuals, announce, self.without_press)
+    def best(self, samples: Samples) -> Float:
+        """Return the most likely shares (k,); over the whole range of a share, one standard deviation is added."""
+
+        def residuals(shares: Float) -> Float:
+            return np.concatenate([self.residuals(shares[None])[0], shares - self.start])
+
+        added = 0.5 * np.sum((samples.shares - self.start) ** 2, axis=1)
+        first = samples.shares[np.argmax(samples.log_likelihood - added)]
+        inside = np.clip(first, _INSIDE, 1.0 - _INSIDE)
+        found = optimize.least_squares(residuals, inside, bounds=(0.0, 1.0), xtol=1e-10, ftol=1e-12, x_scale=_STEP).x
+        return first if self.emulator.fails(found[None])[0] else np.asarray(found)
+
+    def explored(self, report: Progress, rounds: int = _MOST) -> Float:
+        """Return the most likely shares (k,), once presses there and where the emulator is least sure agree with it."""
+        emulator, simulation = self.emulator, self.emulator.simulation
+        for _ in range(rounds):
+            samples = sampled(self.log_likelihood, len(self.start), _FEW)
+            best = self.best(samples)
+            named = zip(simulation.free, values_at(emulator.scales, best), strict=True)
+            told = ", ".join(f"{free.key} = {value:.5g}" for free, value in named)
+            report.stage(f"fitting, {simulation.solved} presses: {told}")
+            unsure = np.sum(self.whitened(emulator.error(samples.shares)) ** 2, axis=1)
+            gaps = []
+            for shares in (best, samples.shares[np.argmax(unsure)]):
+                if emulator.distance(shares) > _NEAR and simulation.solved < _MOST * len(emulator.pressed):
+                    before = emulator(shares[None])
+                    emulator.press(shares)
+                    gaps.append(float(np.linalg.norm(self.whitened(emulator(shares[None]) - before))))
+            if max(gaps, default=0.0) <= _AGREES:
+                break
+        return self.best(sampled(self.log_likelihood, len(self.start), _FEW))
+
+    def as_far_as_it_fits(self, shares: Float) -> _Misfit:
+        """Return the misfit with a covariance larger by the reduced chi-square at shares (k,), if that is above one.
+
+        It is the square of the ratio of Birge (1932): what the scene does not explain counts as an error of all data.
+        """
+        residuals = self.residuals(shares[None])[0]
+        ratio = float(residuals @ residuals) / max(len(residuals) - len(shares), 1)
+        return replace(self, root=math.sqrt(max(ratio, 1.0)) * self.root)
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
-        simulated = self.simulation.at(values_at(self.scales, shares), self.data)
-        return replace(self, stds={**self.stds, **_by_residuals(self.data, simulated, len(shares))})
+        data = self.emulator.data
+        return replace(self, stds={**self.stds, **_by_residuals(data, self.emulator.columns(shares), len(shares))})
 
 
 def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
-    """Fit by the noise, then by the noise and the errors of the simulation, and follow the likelihood of friction."""
+    """Fit by the noise, then by the noise and the errors of the simulation."""
     report.stage("first presses")
-    misfit = _Misfit.of(simulation, data, report)
-    shares = misfit.fit(_first(misfit, start))
-    if set(data.stds) != set(data.columns):
-        misfit = misfit.by_residuals(shares)
-        shares = misfit.fit(shares)
-        misfit = misfit.by_residuals(shares)
+    emulator = Emulator(simulation, data)
+    designed = emulator.design()
+    for shares in designed:
+        emulator.press(shares)
+    emulator.check()
+    _check_columns(emulator, ends(emulator, designed))
+    misfit = _Misfit.of(emulator, start)
+    shares = misfit.explored(report, 2)
     report.stage("errors of mesh and increments")
-    scales = misfit.scales
-    known = simulation.errors(values_at(scales, shares), data)
-    zero = np.zeros((1, len(data.at)))
-    # a row of zeros for all columns but the one that the error is of
-    plain = block_diag(*(known.get(name, zero) / (_BAR * misfit.stds[name]) for name in data.columns))
-    misfit = replace(misfit, root=np.linalg.cholesky(np.eye(data.count) + plain.T @ plain))
-    errors = solve_triangular(misfit.root, plain.T, lower=True)
-    shares, mixture, derivative = _likelihood(misfit, shares)
-    friction = _friction(simulation.free)
-    fitted = fitted_values(scales, shares, derivative, errors @ errors.T, mixture, friction)
-    values = values_at(scales, shares)
+    known = simulation.errors(values_at(emulator.scales, shares), data)
+    misfit = misfit.with_errors(known)
+    shares = misfit.explored(report)
+    if set(data.stds) != set(data.columns):
+        misfit = misfit.by_residuals(shares).with_errors(known)
+        shares = misfit.explored(report)
+        misfit = misfit.by_residuals(shares).with_errors(known)
+    misfit = misfit.as_far_as_it_fits(shares)
+    samples = sampled(misfit.log_likelihood, len(start), _MANY)
+    shares = misfit.best(samples)
+    fitted = fitted_values(emulator.scales, shares, samples, misfit.derivative(shares), misfit.part_of_errors)
+    values = fitted.values
     simulated = simulation.at(values, data)
-    reduced = _reduced_chi_square(data, simulated, len(scales))
+    reduced = _reduced_chi_square(data, simulated, len(values))
     unknown = sorted(set(data.columns) - set(known))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
-    notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := misfit_text(reduced)) else [])]
+    notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := _misfit_text(reduced)) else [])]
     return Identification(
         scene=simulation.scene(values),
         keys=tuple(f.key for f in simulation.free),
@@ -291,108 +344,24 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     )
 
 
-def _first(misfit: _Misfit, start: Float) -> Float:
-    """Return the shares to fit from: those of `start`, or with another friction or modulus if these promise more."""
-    simulation, data, scales = misfit.simulation, misfit.data, misfit.scales
-    given = np.array([scale.share(v) for scale, v in zip(scales, start, strict=True)])
-    begin = np.clip(given, _FROM_BOUND, 1.0 - _FROM_BOUND)
-    friction, starts = _friction(simulation.free), [begin]
-    if friction is not None:
-        starts += [np.where(np.arange(len(begin)) == friction, share, begin) for share in _FRICTION]
-    tried = [_with_modulus(simulation, shares) for shares in starts]
-    curves = [[simulation.at(values_at(scales, shares), data) for shares in trials] for trials in tried]
-    _check_columns(simulation, scales, [curve for some in curves for curve in some], data)
-    least = [int(np.argmin([np.sum(misfit.of_curve(curve) ** 2) for curve in some])) for some in curves]
-    best = [trials[number] for trials, number in zip(tried, least, strict=True)]
-    return min(best, key=lambda shares: float(np.sum(misfit.residuals(values_at(scales, shares)) ** 2)))
+def _check_columns(emulator: Emulator, tried: Sequence[Float]) -> None:
+    """Raise an error for a column of another sign or unit than the scene gives at all shares (k,) that are tried."""
+    good = [shares for shares in tried if not emulator.fails(shares[None])[0]]
+    curves = [emulator.columns(shares) for shares in good]
+    emulator.data.check_signs(curves)
+    magnitudes = [largest(curve) for curve in curves]
+    columns = emulator.data.columns
+    emulator.data.check_units(
+        {n: min(m[n] for m in magnitudes) for n in columns}, {n: max(m[n] for m in magnitudes) for n in columns}
+    )
 
 
-def _friction(free: Sequence[FreeKey]) -> int | None:
-    """Return the number of the first key of friction."""
-    return next((i for i, f in enumerate(free) if f.key.startswith("friction.")), None)
-
-
-def _likelihood(misfit: _Misfit, start: Float) -> tuple[Float, Mixture, Float]:
-    """Return the most likely shares (k,), the likelihood about them, and the derivatives (n, k) of the residuals there.
-
-    The fit begins again where the likelihood along friction has a larger maximum.
-    """
-    friction = _friction(misfit.simulation.free)
-
-    for _ in range(_FITS):
-        shares = misfit.fit(start)
-        derivative = misfit.jacobian(shares)
-        if friction is None:
-            return shares, normal(shares, derivative), derivative
-        misfit.report.stage("likelihood of friction")
-        mixture = along_friction(shares, derivative, friction, _press_along(misfit, shares, friction))
-        start = mixture.shares[np.argmax(mixture.density)]
-        if np.interp(shares[friction], mixture.shares[:, friction], mixture.density) > _AS_LIKELY:
-            break
-    return shares, mixture, derivative
-
-
-def _press_along(misfit: _Misfit, shares: Float, friction: int) -> Callable[[Float], tuple[Float, Float]]:
-    """Return the function that `along_friction` presses with.
-
-    Derivatives that need presses change little along friction: they are interpolated between its bounds and the values
-    that were found.
-    """
-    scales, others = misfit.scales, [i for i in range(len(shares)) if i != friction]
-    pressed = [i for i in others if i not in misfit.without_press]
-    known: list[tuple[float, Float]] = []
-    for place in np.unique([0.0, shares[friction], 1.0]) if pressed else ():
-        with suppress(Finger3dError):  # a press that fails leaves the others
-            at = np.where(np.arange(len(shares)) == friction, place, shares)
-            known.append((float(place), misfit.jacobian(at, pressed)))
-
-    def press(at: Float) -> tuple[Float, Float]:
-        residual = misfit.residuals(values_at(scales, at))
-        slope = np.empty((len(residual), len(shares)))
-        slope[:, misfit.without_press] = misfit.jacobian(at, misfit.without_press)
-        if pressed:
-            places, columns = zip(*known, strict=True)
-            slope[:, pressed] = interp1d(places, np.array(columns), axis=0)(
-                np.clip(at[friction], places[0], places[-1])
-            )
-        return residual, slope[:, others]
-
-    return press
-
-
-def _check_columns(
-    simulation: Simulation, scales: Sequence[Scale], curves: Sequence[Mapping[str, Float]], data: MeasuredPress
-) -> None:
-    """Check signs and units against presses that the fit needs anyway, and refuse them only if those at the bounds do.
-
-    Raises
-    ------
-    Finger3dError
-        For a column of another sign or unit than the scene gives.
-    """
-
-    def check(every: Sequence[Mapping[str, Float]]) -> None:
-        data.check_signs(every)
-        magnitudes = [largest(curve) for curve in every]
-        data.check_units(
-            {n: min(m[n] for m in magnitudes) for n in data.columns},
-            {n: max(m[n] for m in magnitudes) for n in data.columns},
-        )
-
-    try:
-        check(curves)
-    except Finger3dError:
-        ends = (np.zeros(len(scales)), np.ones(len(scales)))
-        check([*curves, *(simulation.at(values_at(scales, shares), data) for shares in ends)])
-
-
-def _with_modulus(simulation: Simulation, shares: Float) -> list[Float]:
-    """Return the shares, and copies with several values of Young's modulus if these need no further solution."""
-    own = np.array([f.key in MODULI for f in simulation.free])
-    if own.sum() != 1 or not simulation.scales_with_modulus:
-        return [shares]
-    moduli = np.linspace(_FROM_BOUND, 1.0 - _FROM_BOUND, _TRIED_MODULI)
-    return [np.where(own, share, shares) for share in (shares[own][0], *moduli)]
+def _misfit_text(reduced: float) -> str:
+    """Say whether residuals are larger than their standard deviations, from the reduced chi-square."""
+    ratio = math.sqrt(reduced)
+    if ratio <= _MISFIT:
+        return ""
+    return f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
 
 
 def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:

@@ -146,6 +146,10 @@ class Simulation:
         columns = self.scene([f.middle for f in self.free]).model().columns
         return {name for name, one in quantities(columns).items() if one.is_stress}
 
+    def is_stress(self, name: str) -> bool:
+        """Return whether a number is proportional to the stresses."""
+        return name in self._stresses
+
     def _scaled(self, curve: Curve, factor: float) -> Curve:
         """Return a curve with stresses times a factor."""
         return {name: factor * v if name in self._stresses else v for name, v in curve.items()}
@@ -181,6 +185,7 @@ class Simulation:
         as an error of order `ORDER` does.  Two are those of all rows at once, with and without this growth, and one is
         of each row, since errors change as points close one by one.
         """
+        self.curve(values)  # the press is one of the journal
         point, factor = self._point(values)
         problem, steps = self._pressed(point)
         self._known[point] = _curve_of(problem, steps)
