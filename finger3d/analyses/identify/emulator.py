@@ -1,8 +1,8 @@
 """Emulator of a press: what it gives with any values of the free keys, interpolated between presses.
 
-Presses are made on a face-centred central composite design (Box and Wilson 1951) first, then where the emulator is
-asked for more.  Between them the inverse hyperbolic sine of every number, which is linear for small ones and logarithmic
-for large ones, is interpolated by cubic radial basis functions.  Young's modulus, where all stresses are proportional to
+Presses are made on a face-centred central composite design (Box and Wilson 1951) first, then wherever the emulator is
+asked to.  Between them the inverse hyperbolic sine of every number, which is linear for small ones and logarithmic for
+large ones, is interpolated by cubic radial basis functions.  Young's modulus, where all stresses are proportional to
 it, and the offset of the depth need no presses.
 """
 
@@ -143,7 +143,7 @@ class Emulator:
             free, modulus = self.simulation.free[i], MODULI[self.simulation.free[i].key]
             factor = [modulus(self.scales[i].value(float(share))) / modulus(free.middle) for share in shares[:, i]]
             found = np.where(self._is_stress, np.array(factor)[:, None] * found, found)
-        return found
+        return np.asarray(found)
 
     def columns(self, shares: Float) -> dict[str, Float]:
         """Return the numbers of every measured column at its rows, for shares (k,)."""

@@ -233,7 +233,7 @@ class _Misfit:
     def whitened(self, difference: Float) -> Float:
         """Return differences (s, n) of numbers over their standard deviations, with the identity as covariance."""
         plain = difference / np.concatenate([*self.stds.values()])
-        return np.asarray(solve_triangular(self.root, plain.T, lower=True)).T
+        return np.transpose(np.asarray(solve_triangular(self.root, plain.T, lower=True)))
 
     def residuals(self, shares: Float) -> Float:
         """Return the residuals (s, n) at shares (s, k)."""
@@ -281,7 +281,8 @@ class _Misfit:
                 if emulator.distance(shares) > _NEAR and simulation.solved < _MOST * len(emulator.pressed):
                     before = emulator(shares[None])
                     emulator.press(shares)
-                    gaps.append(float(np.linalg.norm(self.whitened(emulator(shares[None]) - before))))
+                    gap = float(np.linalg.norm(self.whitened(emulator(shares[None]) - before)))
+                    gaps.append(math.inf if emulator.fails(shares[None])[0] else gap)
             if max(gaps, default=0.0) <= _AGREES:
                 break
         return self.best(sampled(self.log_likelihood, len(self.start), _FEW))
@@ -320,10 +321,10 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         misfit = misfit.by_residuals(shares).with_errors(known)
         shares = misfit.explored(report)
         misfit = misfit.by_residuals(shares).with_errors(known)
-    misfit = misfit.as_far_as_it_fits(shares)
+    part, misfit = misfit.part_of_errors, misfit.as_far_as_it_fits(shares)
     samples = sampled(misfit.log_likelihood, len(start), _MANY)
     shares = misfit.best(samples)
-    fitted = fitted_values(emulator.scales, shares, samples, misfit.derivative(shares), misfit.part_of_errors)
+    fitted = fitted_values(emulator.scales, shares, samples, misfit.derivative(shares), part)
     values = fitted.values
     simulated = simulation.at(values, data)
     reduced = _reduced_chi_square(data, simulated, len(values))

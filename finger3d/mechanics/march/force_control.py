@@ -17,7 +17,7 @@ from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.state import State
-from finger3d.objects import ContactPath, ObjectPose, PlacedObject, RigidObject, first_touch
+from finger3d.objects import ContactPath, ObjectPose, PlacedObject, first_touch
 
 _DEEPEST = 0.99
 """Largest depth at which a force is searched for, over that at which the object would reach the finger's base."""
