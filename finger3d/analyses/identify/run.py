@@ -233,7 +233,8 @@ class _Misfit:
     def whitened(self, difference: Float) -> Float:
         """Return differences (s, n) of numbers over their standard deviations, with the identity as covariance."""
         plain = difference / np.concatenate([*self.stds.values()])
-        return np.transpose(np.asarray(solve_triangular(self.root, plain.T, lower=True)))
+        found: Float = np.asarray(solve_triangular(self.root, plain.T, lower=True))
+        return found.T
 
     def residuals(self, shares: Float) -> Float:
         """Return the residuals (s, n) at shares (s, k)."""
