@@ -21,7 +21,8 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain import increment as finite_increment
 from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings, snap_warnings
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
-from finger3d.mechanics.formulations import formulation_of, increment_to_force
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
@@ -132,8 +133,9 @@ def test_an_increment_to_a_force_ends_at_the_depth_that_has_it() -> None:
     workspace = formulation_of(problem.model).workspace()
     # the iteration begins half a millimetre off
     move = Move(ObjectPose(4.0), ObjectPose(6.5))
-    found = increment_to_force(problem, (frames[0].meshed_state, None), move, wanted, workspace)
-    assert found is not None
+    found = formulation_of(problem.model).increment_to_forces(
+        problem, (frames[0].meshed_state, None), move, GeneralisedForces((0,), np.array([wanted]), wanted), workspace
+    )
     end, solution = found
     # residuals of 5e-9 of both presses
     assert end.end.depth_mm == pytest.approx(6.0, rel=1e-7)
@@ -158,8 +160,9 @@ def test_the_path_is_followed_where_an_increment_does_not_converge_from_afar() -
     assert followed.state.body.unknowns == pytest.approx(damped, abs=1e-6)  # residuals of 5e-9; 14 mm long
     # a force is reached at a single go, too; it slips in other increments than the press in four
     wanted = measure(problem.points, frames[-1])["normal_force_N"]
-    found = increment_to_force(problem, (rest, None), move, wanted, formulation.workspace())
-    assert found is not None
+    found = formulation_of(problem.model).increment_to_forces(
+        problem, (rest, None), move, GeneralisedForces((0,), np.array([wanted]), wanted), formulation.workspace()
+    )
     assert found[0].start == move.start
     assert found[0].end.depth_mm == pytest.approx(14.0, rel=0.01)  # 4e-3
     assert -problem.world_force(found[1].state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-8)
@@ -169,7 +172,8 @@ def test_there_is_no_increment_to_a_force_out_of_reach() -> None:
     problem = build(large_fig9(0.45, 4.0))
     formulation, move = formulation_of(problem.model), Move(ObjectPose(0.0), ObjectPose(1.0))
     start = formulation.start(problem), None
-    assert increment_to_force(problem, start, move, 1e5, formulation.workspace()) is None
+    wanted = GeneralisedForces((0,), np.array([1e5]), 1e5)
+    assert not formulation.increment_to_forces(problem, start, move, wanted, formulation.workspace())[1].outcome.ok
 
 
 def test_a_faceted_object_without_friction_takes_few_factorisations() -> None:

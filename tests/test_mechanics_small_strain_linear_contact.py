@@ -10,7 +10,8 @@ import pytest
 from finger3d.contact.state import ContactState
 from finger3d.fem.tensors import bases_of, rotated_delassus
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.formulations import formulation_of, increment_to_force
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.results.history import measure
 from finger3d.mechanics.small_strain.linear_contact import LinearBody, carried_by_object, transported
@@ -86,13 +87,12 @@ def test_an_increment_to_a_force_ends_at_the_depth_that_has_it(thing: Sphere | P
     start = frames[0].meshed_state, None
     # the iteration begins a fifth of the depth off
     move = Move(frames[0].target, replace(frames[1].target, depth_mm=0.24))
-    found = increment_to_force(problem, start, move, wanted, workspace)
-    assert found is not None
+    found = formulation_of(problem.model).increment_to_forces(
+        problem, start, move, GeneralisedForces((0,), np.array([wanted]), wanted), workspace
+    )
     there, solution = found
     # both geometries are exact to 1e-9 of the depth
     assert there.end.depth_mm == pytest.approx(0.2, rel=1e-8)
     assert solution.state.contact.force == pytest.approx(frames[1].meshed_state.contact.force, abs=1e-7 * wanted)
     assert solution.state.body == pytest.approx(frames[1].meshed_state.body, abs=1e-8)
     assert -problem.world_force(solution.state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-10)
-    by_increments = replace(problem, model=replace(problem.model, rule="paper"))
-    assert increment_to_force(by_increments, start, move, wanted, workspace) is None

@@ -8,20 +8,24 @@ from typing import Final, Literal, Protocol
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.newton import force_of_sets
+from finger3d.contact.newton import ActiveSet, ActiveSetSystem, force_of_sets
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
 
-_SOLUTIONS = 4
-"""Largest number of solutions in a search for the depth of a prescribed force."""
+_SOLUTIONS = 6
+"""Largest number of solutions in a search for the pose of prescribed forces."""
+
+_SINGULAR, _UNREACHED = 1e-10, 1e-3
+"""Singular value, over the largest, of a stiffness that counts as none, and part of the missing forces, left by a step
+of Newton's method, from which the whole contact slips."""
 
 _INEXACT = 1e-2
-"""Error of that force, over that of the first solution, at which the search ends."""
+"""Error of those forces, over that of the first solution, at which the search ends."""
 
 
 def maeno_active_set(problem: ContactProblem, guess: Float | None = None) -> ContactSolution[ContactState]:
@@ -81,56 +85,98 @@ STEP_DEPENDENT_RULES: Final[frozenset[RuleName]] = frozenset({"paper"})
 
 
 @dataclass(frozen=True)
-class ForceCondition:
-    """Condition that the contact forces r add up to a prescribed normal force as the object is lowered further.
+class ForceConditions:
+    """Conditions that the contact forces r have k resultants as the object moves by as many coordinates.
 
     Attributes
     ----------
-    down : (c, d) relative displacement of the points, in their own directions, per distance that the object is lowered
-        The normal force is ``-sum(down * r)``, by duality.
-    force : N
-    rate : of the force by the depth, as far as it is known, N/mm
-    reach : mm, least and largest distance by which the object may be lowered
-    tolerance : relative error of the force that is sought
-    turned : (c, d) displacement of the points by forces that turn with the object's surface, per distance
+    motion : (c d, k) relative displacement of the points, in their own directions, by each coordinate
+    resultant : (c d, k), by which the resultants are ``-resultant.T r``; where no axis turns it is the motion
+    forces : (k,) N, N mm
+    scale : (k,) magnitudes to which errors of the forces are relative
+    reach : (k,) largest change of each coordinate
+    tolerance : relative error of the forces that is sought
+    approach : (k,) step towards the finger where the object does not touch it
+    turned : (c d, k) displacement of the points by forces that turn with the object's surface, by each coordinate
     """
 
-    down: Float
-    force: float
-    rate: float
-    reach: tuple[float, float]
+    motion: Float
+    resultant: Float
+    forces: Float
+    scale: Float
+    reach: Float
     tolerance: float
+    approach: Float
     turned: Float | float = 0.0
 
+    def missing(self, force: Float) -> Float:
+        """Return what contact forces (c, d) are short of (k,)."""
+        return np.asarray(self.forces + self.resultant.T @ force.ravel())
 
-def solve_to_force(
-    rule: RuleName, problem: ContactProblem, guess: Float | None, condition: ForceCondition
-) -> tuple[ContactSolution[ContactState], float, float]:
-    """Solve one increment, with the object lowered by the secant method until the forces meet a condition.
+    def stiffness(self, problem: ContactProblem, solution: ContactState, displacement: Float) -> Float:
+        """Return the derivatives (k, k) of the resultants by the coordinates at a solution."""
+        augmented = project_on_friction_cone(problem, solution.force, displacement)[2]
+        system = ActiveSetSystem.of(problem, ActiveSet.of(problem, solution.status, augmented))
+        moved = (self.motion + self.turned).T.reshape(-1, *solution.force.shape)
+        changes = [system.active.force(system.solve(-system.active.weighted(problem, one))) for one in moved]
+        return -self.resultant.T @ np.array(changes).reshape(len(moved), -1).T
 
-    The search ends early: at a hundredth of the first error, or after a few solutions.
+    def step(self, stiffness: Float, missing: Float) -> tuple[Float, bool]:
+        """Return the step (k,) of Newton's method, and whether no step leads to the forces: the whole contact slips."""
+        relative, wanted = stiffness * self.reach / self.scale[:, None], missing / self.scale
+        step = np.linalg.lstsq(relative, wanted, rcond=_SINGULAR)[0]
+        slips = bool(np.linalg.norm(wanted - relative @ step) > _UNREACHED * np.linalg.norm(wanted))
+        return np.asarray(self.reach * step / max(1.0, float(np.abs(step).max(initial=0.0)))), slips
+
+
+def solve_to_forces(
+    rule: RuleName, problem: ContactProblem, guess: Float | None, conditions: ForceConditions
+) -> tuple[ContactSolution[ContactState], Float, bool]:
+    """Solve one increment, with the object moved by Newton's method until the forces meet conditions.
+
+    A step that does not lower the error is halved.  The search ends early: at a hundredth of the first error, or after
+    a few solutions.
 
     Returns
     -------
     solution : of the increment
-    lowered : mm, by how much the object is lowered
-    rate : of the force by the depth, N/mm
+    moved : (k,) by how much the object is moved
+    slips : whether no motion leads to the forces
     """
-    lowered, rate, last, moved = 0.0, condition.rate, (0.0, 0.0), condition.down + condition.turned
-    allowed = condition.tolerance * condition.force
-    for number in range(_SOLUTIONS):
-        at_depth = replace(problem, free_motion=problem.free_motion + lowered * moved)
-        solution = RULES[rule](at_depth, guess)
-        if not solution.outcome.ok:
-            break
-        guess = solution.state.force
-        reached = -float(np.sum(condition.down * guess))
-        if number and (reached - last[1]) * (lowered - last[0]) > 0.0:
-            rate = (reached - last[1]) / (lowered - last[0])
-        error = abs(reached - condition.force)
-        allowed = allowed if number else max(allowed, _INEXACT * error)
-        last = lowered, reached
+    slips = False
+    best: tuple[float, Float, ContactSolution[ContactState]] | None = None
+    moved, step, allowed, spent = np.zeros(len(conditions.forces)), np.zeros(len(conditions.forces)), 0.0, 0
+    for _ in range(_SOLUTIONS):
+        motion = ((conditions.motion + conditions.turned) @ moved).reshape(problem.free_motion.shape)
+        there = replace(problem, free_motion=problem.free_motion + motion)
+        solution = RULES[rule](there, guess)
+        spent += solution.iterations
+        if not solution.outcome.ok and best is None:
+            return solution, moved, slips
+        missing = conditions.missing(solution.state.force)
+        error = float(np.abs(missing / conditions.scale).max()) if solution.outcome.ok else np.inf
+        touches = bool(solution.state.force.any())
+        if best is not None and error >= best[0] and best[2].state.force.any():
+            step = 0.5 * step
+            moved = best[1] + step
+            continue
+        best, guess = (error, moved, solution), solution.state.force
+        allowed = allowed or max(conditions.tolerance, _INEXACT * error)
         if error <= allowed:
             break
-        lowered = min(max(lowered + (condition.force - reached) / rate, condition.reach[0]), condition.reach[1])
-    return solution, last[0], rate
+        if not touches:
+            step = conditions.approach
+            if not step.any():
+                break
+        else:
+            try:
+                gaps = there.relative_displacement(guess)
+                stiffness = conditions.stiffness(there, solution.state, gaps)
+            except np.linalg.LinAlgError:
+                break
+            step, slips = conditions.step(stiffness, missing)
+            if slips:
+                break
+        moved = moved + step
+    assert best is not None
+    return replace(best[2], iterations=spent), best[1], slips

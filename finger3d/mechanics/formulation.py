@@ -13,6 +13,7 @@ from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.state import ContactSolution
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, ObjectPose
@@ -87,6 +88,28 @@ class Formulation(Protocol[B, W]):
             Contact forces where the iteration starts; those of `state` unless given.
         workspace : Workspace
             What `workspace` of this formulation returned; the increment may change it.
+        """
+        ...
+
+    def increment_to_forces(
+        self,
+        problem: Problem,
+        start: tuple[State[B], Float | None],
+        move: Move,
+        wanted: GeneralisedForces,
+        workspace: W,
+    ) -> tuple[Move, ContactSolution[State[B]]]:
+        """Advance a state to prescribed forces, with as many coordinates at the end as unknowns of the iteration.
+
+        Parameters
+        ----------
+        start : state before the increment, and (c, d) contact forces where the iteration begins, N
+        move : to a pose where the iteration begins
+
+        Returns
+        -------
+        Motion to the pose that is found, and the solution there; the forces nearest to those wanted where no pose has
+        these.
         """
         ...
 

@@ -39,8 +39,9 @@ class Leg:
     """Straight part of the path of the object, from the end of the leg before, in equal increments.
 
     With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
-    Likewise `force_x_N` and `force_z_N`, the forces applied to the object along x and z, determine the slides.  In
-    equilibrium they are the components of the contact force on the finger.
+    Likewise `force_x_N` and `force_z_N`, the forces applied to the object along x and z, determine the slides, and
+    `moment_x_Nmm`, `moment_y_Nmm` and `moment_z_Nmm`, about its reference point, the turns.  In equilibrium they are
+    those of the contact force on the finger.
 
     With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).
     This is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a
@@ -58,11 +59,15 @@ class Leg:
     force_N: float | None = None
     force_x_N: float | None = None
     force_z_N: float | None = None
+    moment_x_Nmm: float | None = None
+    moment_y_Nmm: float | None = None
+    moment_z_Nmm: float | None = None
 
     @property
-    def forces(self) -> tuple[float | None, float | None, float | None]:
-        """Normal force and forces along x and z (N) that are prescribed in place of depth and slides; None if not."""
-        return self.force_N, self.force_x_N, self.force_z_N
+    def forces(self) -> tuple[float | None, ...]:
+        """Normal force, forces along x and z (N) and moments (N mm) in place of depth, slides and turns, or None."""
+        moments = self.moment_x_Nmm, self.moment_y_Nmm, self.moment_z_Nmm
+        return self.force_N, self.force_x_N, self.force_z_N, *moments
 
     @property
     def is_under_force(self) -> bool:
@@ -72,8 +77,8 @@ class Leg:
     @property
     def moves_sideways(self) -> bool:
         """Whether the object is slid or turned at its end."""
-        slides = self.slide_x_mm or self.slide_z_mm or self.force_x_N is not None or self.force_z_N is not None
-        return bool(slides) or any((self.turn_x, self.turn_y, self.turn_z))
+        moved = self.slide_x_mm, self.slide_z_mm, self.turn_x, self.turn_y, self.turn_z
+        return any(moved) or any(force is not None for force in self.forces[1:])
 
     def end(self, start: ObjectPose) -> ObjectPose:
         """Return the pose at the end of the leg, which begins at `start`."""

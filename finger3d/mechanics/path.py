@@ -22,7 +22,8 @@ class Load:
 
     Attributes
     ----------
-    forces : (3,) N, normal force and forces along x and z at the end of the leg; NaN where none is prescribed
+    forces : (6,) N and N mm at the end of the leg, as `finger3d.mechanics.generalised.forces_on`; NaN where none is
+        prescribed
     share : of the way to them from the forces at the start of the leg
     begins : whether the increment is the first of its leg
     """
@@ -44,7 +45,7 @@ class Station:
     Attributes
     ----------
     pose : of the object
-    load : the forces to which depth and slides are found, if any is prescribed
+    load : the forces to which the pose is found, if any is prescribed
     share : of the leg that ends here
     """
 

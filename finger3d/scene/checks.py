@@ -130,7 +130,7 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
             continue
         if leg.depth_mm is None:
             pass
-        elif i == 0 and leg.depth_mm == 0.0 and any((*_target(leg)[4:], leg.force_x_N, leg.force_z_N)):
+        elif i == 0 and leg.depth_mm == 0.0 and any(_target(leg)[2:]):
             lines.append(f"{dotted(place)}: moves before first touch; give the first leg a depth_mm above 0")
         elif leg.depth_mm >= height or (i == 0 and leg.depth_mm == 0.0):
             lines.append(f"{dotted((*place, 'depth_mm'))} = {shown(leg.depth_mm)}: must be {allowed}")
@@ -148,35 +148,45 @@ def _legs(press: Tree, legs: tuple[LegTable, ...], design: Design, solid: bool) 
     return lines
 
 
+_FREE = (
+    ("force_x_N", "slide_x_mm", False), ("force_z_N", "slide_z_mm", True), ("moment_x_Nmm", "turn_x_deg", True),
+    ("moment_y_Nmm", "turn_y_deg", True), ("moment_z_Nmm", "turn_z_deg", False),
+)  # fmt: skip
+"""Forces and moments, the coordinates in place of which they stand, and whether only a solid has them."""
+
+
 def _tangential(place: Place, leg: LegTable, before: LegTable | None, solid: bool) -> list[str]:
-    """Return a line about every tangential force that cannot act, and a slide that is missing after one."""
+    """Return a line about every force and moment that cannot act, and a coordinate that is missing after one."""
     lines = []
-    for axis in "xz":
-        force, slide = (f"{name}_{axis}_{unit}" for name, unit in (("force", "N"), ("slide", "mm")))
+    for force, coordinate, only_solid in _FREE:
         what = f"{dotted((*place, force))} = {shown(value := getattr(leg, force))}"
         after_force = before is not None and getattr(before, force) is not None
         if value is None:
-            if after_force and leg.depth_mm != 0.0 and slide not in leg.model_fields_set:
+            if after_force and leg.depth_mm != 0.0 and coordinate not in leg.model_fields_set:
                 lines.append(
                     f"{dotted((*place, force))} is missing: the leg before has {force} = "
-                    f"{shown(getattr(before, force))}; give it here, too, or {slide} to which the object then moves"
+                    f"{shown(getattr(before, force))}; give it here, too, or {coordinate} to which the object then "
+                    "moves"
                 )
-        elif axis == "z" and not solid:
+        elif only_solid and not solid:
             lines.append(f"{what}: must be left out in a 2D domain")
-        elif getattr(leg, slide):
-            lines.append(
-                f"{what}: must not stand beside {slide} = {shown(getattr(leg, slide))}; give either a force or a slide"
-            )
+        elif getattr(leg, coordinate):
+            kind = ("force", "slide") if force.startswith("force") else ("moment", "turn")
+            other = f"{coordinate} = {shown(getattr(leg, coordinate))}"
+            lines.append(f"{what}: must not stand beside {other}; give either a {kind[0]} or a {kind[1]}")
         elif before is None or before.depth_mm == 0.0 or leg.depth_mm == 0.0:
-            lines.append(
-                f"{what}: there is no contact to hold it; give a tangential force in a leg that begins and ends pressed"
-            )
+            acts = "tangential force" if force.startswith("force") else "moment"
+            lines.append(f"{what}: there is no contact to hold it; give a {acts} in a leg that begins and ends pressed")
     return lines
 
 
 def _target(leg: LegTable) -> tuple[float | None, ...]:
     slides, turns = (leg.slide_x_mm, leg.slide_z_mm), (leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg)
-    return leg.force_N, leg.depth_mm, leg.force_x_N, leg.force_z_N, *slides, *turns
+    return leg.force_N, leg.depth_mm, *_sideways(leg), *slides, *turns
+
+
+def _sideways(leg: LegTable) -> tuple[float | None, ...]:
+    return tuple(getattr(leg, force) for force, _, _ in _FREE)
 
 
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:

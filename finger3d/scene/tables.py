@@ -111,6 +111,8 @@ class LegTable(TomlTable):
     depth_mm : of the object below the first touch, less than the finger's height
     force_N : normal force, in place of the depth, which follows
     force_x_N, force_z_N : force applied to the object along x, z, in place of a slide, which follows; 0 leaves it free
+    moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : moment applied to the object about its lowest point, in place of a turn,
+        which follows; 0 leaves it free
     slide_x_mm, slide_z_mm : where the object then is, from where it was at first
     turn_x_deg, turn_y_deg, turn_z_deg : how it then is turned about its lowest point, about x, then y, then z
     steps : equal parts of the leg; "auto": as errors of 1 % ask for
@@ -121,6 +123,9 @@ class LegTable(TomlTable):
     force_N: Force | None = None
     force_x_N: SignedForce | None = None
     force_z_N: SignedForce | None = None
+    moment_x_Nmm: SignedForce | None = None
+    moment_y_Nmm: SignedForce | None = None
+    moment_z_Nmm: SignedForce | None = None
     slide_x_mm: Place = 0.0
     slide_z_mm: Place = 0.0
     turn_x_deg: Angle = 0.0

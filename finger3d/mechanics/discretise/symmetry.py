@@ -28,9 +28,10 @@ def symmetry(model: Model) -> tuple[str, ...]:
     """Return the planes, "x" and "z", about which body, object and path are mirror images."""
     if model.symmetry is not None:
         return model.symmetry
+    free = [tuple(force is not None for force in leg.forces) for leg in model.legs]
     moves = {  # a turn about x is its own mirror image along x
-        "x": [(leg.slide_x_mm, leg.force_x_N is not None, leg.turn_y, leg.turn_z) for leg in model.legs],
-        "z": [(leg.slide_z_mm, leg.force_z_N is not None, leg.turn_x, leg.turn_y) for leg in model.legs],
+        "x": [(leg.slide_x_mm, leg.turn_y, leg.turn_z, f[1], *f[4:]) for leg, f in zip(model.legs, free, strict=True)],
+        "z": [(leg.slide_z_mm, leg.turn_x, leg.turn_y, *f[2:5]) for leg, f in zip(model.legs, free, strict=True)],
     }
     thing = PlacedObject.of(model.object, 0.0).mirrors()
     axes = ("x", "z") if model.domain == "solid" else ("x",)

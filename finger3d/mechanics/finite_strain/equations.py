@@ -251,9 +251,7 @@ class IncrementEquations:
             curvature = curvature_of(problem, problem.surface, u, self.move.end, local)
             geometric = now.contact.geometric_stiffness(force[:, 0], curvature)
             tangent = tangent.less(geometric)
-            if curvature is not None:  # the object is lowered as the body rises
-                rises = np.broadcast_to(np.eye(problem.dim)[1], u.shape).ravel()
-                turning = np.append(geometric @ rises, np.zeros(len(now.x) - u.size))
+            turning = None if curvature is None else geometric
         else:  # the gap is not read along the rows of the forces, since its normal turns
             normals = np.flatnonzero(active % problem.dim == 0)
             moved = self.displacement_of_object(now.contact.bases, force)
@@ -286,7 +284,7 @@ class IncrementEquations:
         Parameters
         ----------
         displacement : (r,) mm, of the rows that are read, under the forces out of balance alone
-        turned : (r,) of these rows, as the forces turn with the object, per distance that it is lowered
+        turned : (r, k) of these rows, as the forces turn with the object, by each free coordinate of its pose
 
         Returns
         -------
@@ -318,12 +316,15 @@ class IncrementEquations:
             self._augmentation,
             problem.surface.area,
         )
-        increment, solution = self._solved(now, force, contact, 0.0 if turned is None else at_points(turned))
+        turning = np.zeros((force.size, 0 if turned is None else turned.shape[1]))
+        for k, one in enumerate([] if turned is None else turned.T):
+            turning[:, k] = at_points(one).ravel()
+        increment, solution = self._solved(now, force, contact, turning)
         change = np.einsum("cij,ci->cj", rotation, solution.state.force - force)
         return increment, solution, change.ravel()[active]
 
     def _solved(
-        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float | float
+        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float
     ) -> tuple[Self, ContactSolution[ContactState]]:
         """Return the contact solution from a guess of the forces (c, d), N, and the increment that it is for."""
         return self, RULES[self.problem.model.rule](contact, force)

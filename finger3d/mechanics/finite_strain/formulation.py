@@ -22,10 +22,11 @@ from finger3d.fem.tensors import determinant
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.body import FiniteBody
 from finger3d.mechanics.finite_strain.equations import IncrementEquations
-from finger3d.mechanics.finite_strain.increment import FiniteIncrement, IncrementToForce
+from finger3d.mechanics.finite_strain.increment import FiniteIncrement, IncrementToForces
 from finger3d.mechanics.finite_strain.state import DeformedBody, FiniteStrainWorkspace, contact_of
 from finger3d.mechanics.finite_strain.together import solve_together
 from finger3d.mechanics.formulation import Loads
+from finger3d.mechanics.generalised import GeneralisedForces, forces_on
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.readings.columns import Column, of_kind
 from finger3d.mechanics.results.state import State
@@ -95,22 +96,25 @@ class FiniteStrain:
         increment = self.equations(problem, state, move, workspace)
         return self.accepted(increment, increment.solve(guess))
 
-    def increment_to_force(
+    def increment_to_forces(
         self,
         problem: Problem,
         start: tuple[State[DeformedBody], Float | None],
         move: Move,
-        wanted: float,
+        wanted: GeneralisedForces,
         workspace: FiniteStrainWorkspace,
-    ) -> tuple[Move, ContactSolution[State[DeformedBody]]] | None:
-        """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
-        plain = self.equations(problem, start[0], move, workspace)
-        increment = IncrementToForce(problem, plain.body, plain.start, move, workspace, wanted)
-        move, solution = increment.solve_to_force(start[1])
-        if not solution.outcome.ok or _moves_too_far(problem, start[0], move):
-            return None
-        solution = self._kept_outside(replace(plain, move=move), self._remembered(plain, solution))
-        return (move, solution) if solution.outcome.ok else None
+    ) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
+        """Iterate with the pose as an unknown."""
+        state, guess = start
+        plain = self.equations(problem, state, move, workspace)
+        before = forces_on(problem, state, self.loads(problem, state, move.start).moment, move.start)
+        increment = IncrementToForces(problem, plain.body, state, move, workspace, wanted, before[list(wanted.numbers)])
+        move, solution = increment.solve_to_forces(guess)
+        if not solution.outcome.ok:
+            return move, solution
+        if _moves_too_far(problem, state, move):
+            return move, replace(solution, state=state, outcome=Outcome.PASSED_THROUGH)
+        return move, self._kept_outside(replace(plain, move=move), self._remembered(plain, solution))
 
     def equations(
         self,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.rules import ForceCondition, solve_to_force
+from finger3d.contact.rules import ForceConditions, solve_to_forces
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
@@ -27,8 +27,9 @@ from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.finite_strain.equations import NEW_TANGENT, Configuration, IncrementEquations
 from finger3d.mechanics.finite_strain.failure import cause_of_failure
 from finger3d.mechanics.finite_strain.state import DeformedBody, Linearisation
+from finger3d.mechanics.generalised import GeneralisedForces, motions, resultants
 from finger3d.mechanics.results.state import State
-from finger3d.objects import Move
+from finger3d.objects import Move, ObjectPose
 
 _ITERATIONS, _FACTORS, _PATIENT_FACTORS = 60, 5, 15
 """Largest number of iterations and of new factors before an iteration is given up, and of those where the path cannot
@@ -110,17 +111,18 @@ class FiniteIncrement(IncrementEquations):
         is returned has the motion that was found, if that is unknown.
         """
         rough, spent = self.workspace.rough(), 0
-        begin = np.append(self.start.body.unknowns, self.move.start.depth_mm)
+        size = self.start.body.unknowns.size
+        begin = np.append(self.start.body.unknowns, self._free(self.move.start))
         points, shares = [(0.0, begin)], [1.0]
         while shares:
             last, share = points[-1][0], shares[-1]
             there = _extrapolated(points[-2:], share) if len(points) > 1 else None
-            part = self._part(share, self.move.at(share).depth_mm if there is None else float(there[-1]))
+            part = self._part(share, self._free(self.move.at(share)) if there is None else there[size:])
             part = part if share == 1.0 else replace(part, workspace=rough)
-            part, solution = part._iterate(guess, None if there is None else there[:-1])
+            part, solution = part._iterate(guess, None if there is None else there[:size])
             spent += solution.iterations
             if solution.outcome.ok:
-                points.append((shares.pop(), np.append(solution.state.body.unknowns, part.move.end.depth_mm)))
+                points.append((shares.pop(), np.append(solution.state.body.unknowns, self._free(part.move.end))))
                 guess = solution.state.contact.force
             elif solution.detail or share - last <= _SHORTEST:
                 break
@@ -134,8 +136,16 @@ class FiniteIncrement(IncrementEquations):
     def _may_snap(self) -> bool:
         return self.motion <= _SNAPS * self.length_scale
 
-    def _part(self, share: float, depth: float) -> Self:
-        """Return the increment up to a share of it, where a depth (mm) is expected."""
+    def _free(self, pose: ObjectPose) -> Float:
+        """Return the coordinates (k,) of a pose that are unknowns."""
+        return np.zeros(0)
+
+    def _at(self, coordinates: Float) -> Self:
+        """Return the increment with other free coordinates (k,) at its end."""
+        return self
+
+    def _part(self, share: float, coordinates: Float) -> Self:
+        """Return the increment up to a share of it, where free coordinates (k,) are expected."""
         return self if share == 1.0 else replace(self, move=self.move.cut(share)[0])
 
     def _iterate(
@@ -163,6 +173,8 @@ class FiniteIncrement(IncrementEquations):
             solution, after = increment._advance(now, (force, unbalanced), linearisation, longest, accelerating)
             spent += solution.iterations
             if after is None:
+                if factors and solution.outcome is Outcome.SLIPS:
+                    return increment, increment.failed(now, solution.outcome, errors[-1], spent, solution.detail)
                 if factors:
                     break
                 linearisation, (increment, now, force, unbalanced), errors = None, first, [math.inf]
@@ -216,16 +228,12 @@ class FiniteIncrement(IncrementEquations):
             damping = damping if damping > _LEAST_DAMPING else 0.0
         return self.failed(now, Outcome.NEWTON, error, spent)
 
-    def _to_depth(self, depth: float) -> Self:
-        """Return the increment with another depth (mm) at its end."""
-        return replace(self, move=Move(self.move.start, replace(self.move.end, depth_mm=depth)))
-
     def _error(self, now: Configuration, state: ContactState, unbalanced: Float) -> float:
         return self.residual(now, state, unbalanced)
 
-    def _turning(self, linearisation: Linearisation) -> Sequence[Float]:
-        """Return loads (N,) N/mm by which nodal contact forces change with the depth, if that is unknown."""
-        return ()
+    def _turning(self, now: Configuration, linearisation: Linearisation) -> Float:
+        """Return loads (N, k) by which nodal contact forces change with each free coordinate."""
+        return np.zeros((len(now.x), 0))
 
     def _advance(
         self,
@@ -241,24 +249,22 @@ class FiniteIncrement(IncrementEquations):
         if contact has no solution, a cell inverts, or a node moves further than the longest step, mm.
         """
         force, unbalanced = forces
-        loads = [-unbalanced, *self._turning(linearisation)]
-        eliminated = linearisation.condensation.eliminated(np.column_stack(loads))
-        increment, solution, change = self.contact(
-            now, force, linearisation, *eliminated.displacement[linearisation.reads].T
-        )
-        by = [1.0, increment.move.end.depth_mm - self.move.end.depth_mm][: len(loads)]
-        step = eliminated.unknowns(np.outer(change, np.eye(len(loads))[0])) @ by
+        turning = self._turning(now, linearisation)
+        eliminated = linearisation.condensation.eliminated(np.column_stack([-unbalanced, turning]))
+        read = eliminated.displacement[linearisation.reads]
+        increment, solution, change = self.contact(now, force, linearisation, read[:, 0], read[:, 1:])
+        by = np.append(1.0, (increment._free(increment.move.end) - self._free(self.move.end))[: turning.shape[1]])
+        step = eliminated.unknowns(np.outer(change, np.eye(len(by))[0])) @ by
         length = float(np.abs(step[: self.problem.mesh.points.size]).max())
         if not solution.outcome.ok or not np.isfinite(step).all() or length > longest:
             return solution, None
         if secants is not None:
-            depth = increment.move.end.depth_mm
-            reached = np.concatenate([now.x + step, solution.state.force.ravel(), [depth]])
+            reached = np.concatenate([now.x + step, solution.state.force.ravel(), increment._free(increment.move.end)])
             secants[:] = [*secants[-_SECANTS:], (reached, step)]
-            end = _accelerated(secants)
-            step, force = end[: len(step)] - now.x, end[len(step) : -1].reshape(force.shape)
+            end, coordinates = np.split(_accelerated(secants), [len(step) + force.size])
+            step, force = end[: len(step)] - now.x, end[len(step) :].reshape(force.shape)
             solution = replace(solution, state=replace(solution.state, force=force))
-            increment = increment if end[-1] == depth else increment._to_depth(float(end[-1]))
+            increment = increment._at(coordinates)
         try:
             return solution, (increment, *increment.moved(now, step, solution.state.force))
         except InvertedError:
@@ -286,67 +292,94 @@ def _extrapolated(points: Sequence[tuple[float, Float]], share: float) -> Float:
 
 
 @dataclass(frozen=True)
-class IncrementToForce(FiniteIncrement):
-    """An increment to a prescribed normal force, with the depth at its end as one more unknown of the iteration.
+class IncrementToForces(FiniteIncrement):
+    """An increment to prescribed forces, with as many coordinates of its end as more unknowns of the iteration.
 
-    In every iteration the object moves further down by the distance at which the contact forces f of the linearised
-    body add up to the force F ::
+    In every iteration the object moves further by coordinates with which the contact forces f of the linearised body
+    have the resultants Q ::
 
-        contact conditions of f and of the gaps and slips with the object lowered,    sum of f_y = F
+        contact conditions of f and of the gaps and slips with the object moved,    sum of f . v = Q
 
     Attributes
     ----------
-    wanted : F on the whole finger, N
-    rate : of the force by the depth in the last iteration, N/mm
+    wanted : Q on the whole finger
+    before : the same at the start
     """
 
-    wanted: float
-    rate: float = math.nan
+    wanted: GeneralisedForces
+    before: Float
 
-    def solve_to_force(self, guess: Float | None) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
-        """Return the motion to the depth that is found near the expected one, and the solution at its end.
+    def solve_to_forces(self, guess: Float | None) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
+        """Return the motion to the pose that is found near the expected one, and the solution at its end.
 
         The state of the solution is without internal variables.
         """
-        increment, solution = self._part(1.0, self.move.end.depth_mm)._followed(guess)
+        increment, solution = self._followed(guess)
         return increment.move, solution
 
-    def _part(self, share: float, depth: float) -> Self:
-        """Return the increment up to a share of the root of the force, with which the depth of contact grows."""
-        before = -float(self.problem.world_force(self.start.contact)[:, 1].sum())
-        wanted = (share * math.sqrt(self.wanted) + (1.0 - share) * math.sqrt(max(before, 0.0))) ** 2
-        pose = self.move.end if share == 1.0 else self.move.at(share)
-        start = self.move.start
-        rise, way = wanted - before, depth - start.depth_mm
-        rate = rise / way if rise * way > 0.0 else self.wanted / self.length_scale
-        move = Move(start, replace(pose, depth_mm=depth))
-        return replace(self, move=move, wanted=wanted, rate=rate)
+    def _free(self, pose: ObjectPose) -> Float:
+        return self.wanted.coordinates(pose)
+
+    def _at(self, coordinates: Float) -> Self:
+        return replace(self, move=Move(self.move.start, self.wanted.placed(self.move.end, coordinates)))
+
+    def _part(self, share: float, coordinates: Float) -> Self:
+        """Return the increment up to a share of the root of a normal force, with which the depth of contact grows."""
+        if share == 1.0:
+            return self
+        values = self.before + share * (self.wanted.values - self.before)
+        for i in np.flatnonzero(np.array(self.wanted.numbers) == 0):
+            before, end = (math.sqrt(max(force, 0.0)) for force in (self.before[i], self.wanted.values[i]))
+            values[i] = (before + share * (end - before)) ** 2
+        pose = self.wanted.placed(self.move.at(share), coordinates)
+        return replace(self, move=Move(self.move.start, pose), wanted=replace(self.wanted, values=values))
+
+    @cached_property
+    def _arm(self) -> float:
+        return self.problem.model.design.height_mm
+
+    def _fields(self, now: Configuration) -> tuple[Float, Float]:
+        """Return motions of the object and fields of the resultants (n d, k) at the nodes."""
+        problem, end, numbers = self.problem, self.move.end, self.wanted.numbers
+        places = problem.mesh.points + displacement(problem.mesh, now.x)
+        made = (field(problem, end, places, numbers) for field in (motions, resultants))
+        motion, resultant = (field.reshape(-1, len(numbers)) for field in made)
+        return motion, resultant
 
     def _error(self, now: Configuration, state: ContactState, unbalanced: Float) -> float:
-        return max(super()._error(now, state, unbalanced), abs(self._force(now, state.force) / self.wanted - 1.0))
+        reached = self._fields(now)[1].T @ now.contact.nodal_forces(state.force).ravel()
+        missing = self.wanted.values - 2.0 ** len(self.problem.axes) * reached
+        return max(super()._error(now, state, unbalanced), float(np.abs(missing / self.wanted.scale(self._arm)).max()))
 
-    def _force(self, now: Configuration, force: Float) -> float:
-        """Return the normal force (N) on the whole finger of contact forces (c, d) in the present directions."""
-        state = replace(self.start.contact, force=force, bases=now.contact.bases)
-        return -float(self.problem.world_force(state)[:, 1].sum())
-
-    def _turning(self, linearisation: Linearisation) -> Sequence[Float]:
-        return () if linearisation.turning is None else (linearisation.turning,)
+    def _turning(self, now: Configuration, linearisation: Linearisation) -> Float:
+        loads = np.zeros((len(now.x), len(self.wanted.numbers)))
+        if linearisation.turning is None:
+            return loads[:, :0]
+        motion = self._fields(now)[0]
+        loads[: len(motion)] = -(linearisation.turning @ motion)  # the object moves as the body moves back
+        return loads
 
     def _solved(
-        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float | float
+        self, now: Configuration, force: Float, contact: ContactProblem, turned: Float
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Lower the object until the linearised body has the force, by at most the largest step."""
-        depth, images, far = self.move.end.depth_mm, 2.0 ** len(self.problem.axes), self._largest_step
-        condition = ForceCondition(
-            down=self.active(now.contact.bases[:, :, 1].ravel()),
-            force=self.wanted / images,
-            rate=self.rate / images,
-            reach=(-far, far),
-            tolerance=_EXACT,
-            turned=turned,
+        """Move the object until the linearised body has the forces, by at most the largest step."""
+        images = 2.0 ** len(self.problem.axes)
+        motion, resultant = (
+            np.array([self.active(-one).ravel() for one in (now.contact.rows @ field).T]).T
+            for field in self._fields(now)
         )
-        solution, lowered, rate = solve_to_force(self.problem.model.rule, contact, force, condition)
-        if not solution.outcome.ok:
-            return self, solution
-        return replace(self._to_depth(depth + lowered), rate=images * rate), solution
+        reach = self.wanted.reach(self._largest_step, self._arm)
+        conditions = ForceConditions(
+            motion=motion,
+            resultant=resultant,
+            forces=self.wanted.values / images,
+            scale=self.wanted.scale(self._arm) / images,
+            reach=reach,
+            tolerance=_EXACT,
+            approach=reach * (np.array(self.wanted.numbers) == 0),
+            turned=turned if turned.size else 0.0,
+        )
+        solution, moved, slips = solve_to_forces(self.problem.model.rule, contact, force, conditions)
+        solution = self.wanted.checked(solution, now.contact.bases, images, slips)
+        end = self.wanted.moved(self.move.end, moved)
+        return replace(self, move=Move(self.move.start, end)), solution

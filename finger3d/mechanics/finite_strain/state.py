@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
+import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.laws.relaxation import InternalVariables
@@ -58,7 +59,8 @@ class Linearisation:
     reads : (r,) numbers of the rows that tell the displacement along each force
     bases : (c, d, d) directions of the contact points
     delassus : (c, d, c, d) mm/N, in these directions; symmetric beside a rigid object
-    turning : (N,) N/mm, change of the nodal contact forces as a curved object is lowered; None beside a flat one
+    turning : (n d, n d) N/mm, geometric stiffness by which nodal contact forces turn with the surface of a curved
+        object; None beside a flat one
     reusable : whether an increment may begin with it; otherwise only its sparsity pattern serves
     """
 
@@ -66,7 +68,7 @@ class Linearisation:
     reads: Int
     bases: Float
     delassus: Float
-    turning: Float | None = None
+    turning: sp.csr_matrix | None = None
     reusable: bool = True
 
     def rotation(self, bases: Float) -> Float:

@@ -1,212 +1,252 @@
-"""Pose of an object in equilibrium with the forces applied to it, by a quasi-Newton method."""
+"""Increments to a pose at which the object is in equilibrium with the forces and moments applied to it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import SLIP, STICK
+from finger3d.contact.friction import Coulomb
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.generalised import GeneralisedForces, forces_on
+from finger3d.mechanics.march.force_control import deepest
+from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, combined, solved_in_turn
 from finger3d.mechanics.results.state import State
+from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.objects import Move, ObjectPose
+from finger3d.progress import Progress
 
-_ITERATIONS, _HALVINGS, _REFUSED = 1000, 12, 12
-"""Most iterations of the contact, shorter trials of a step that does not lower the error, and such steps."""
+FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
+"""Largest relative error of prescribed forces that are reached, in small strain and where the stiffness is factored."""
 
-_LESS = 1.0 - 1e-3
-"""Ratio of successive errors below which the error has fallen."""
+_DEPTH_ITERATIONS = 12
+"""Largest number of depths in whose shares contact begins; each changes the next by a thousandth of its error."""
 
-_LAST_DIGITS = 100.0
-"""Largest error that is accepted where round-off keeps it above the target, over the target."""
+_DEPTHS = (1.0, 0.5, 0.25, 0.125)
+"""Shares of the way to the largest depth at which a force is looked for that is larger than those found."""
 
-_STRIDES, _CONSTANT = (1.0, 8.0, 64.0, 512.0, 4096.0), 1e-7
-"""Steps of the differences over the shortest, and change of a force over the scale in that step that counts as none."""
-
-_SLOW = 0.2
-"""Ratio of successive errors above which the stiffness is differenced anew."""
-
-_AT_LIMIT = 1e-9
-"""Relative distance from the largest force that friction transmits at which it counts as reached."""
-
-_MUCH = 1.1
-"""Largest tangential force that a contact holds over the one that it slips under, beyond which a slope drives it."""
+_HERTZ = 2.0 / 3.0
+"""Power of the force with which the depth grows under a ball (Hertz 1881)."""
 
 
 @dataclass(frozen=True)
-class PoseTrial:
-    """Increment to a trial pose.
+class ToForces:
+    """An increment of a press to forces and moments, with as many coordinates of the pose as unknowns of the iteration.
+
+    One that does not converge is halved and repeated.
 
     Attributes
     ----------
-    place : (k,) mm, depth and slides that are sought
-    solution : of the increment
-    forces : (k,) N, at its end, along these
+    problem, workspace : of the press
+    state : at the beginning
+    last : part of the increment before, if there is one
+    guess : function that returns the contact forces (c, d) N expected at a pose, if any are
+    cuts : times that it is halved, at most
+    report : receives a remark on the depth of each part
     """
 
-    place: Float
-    solution: ContactSolution[State[Any]]
-    forces: Float
+    problem: Problem
+    workspace: Any
+    state: State[Any]
+    last: Substep | None
+    guess: Callable[[ObjectPose], Float | None]
+    cuts: int
+    report: Progress
+
+    def run(self, move: Move, before: GeneralisedForces, after: GeneralisedForces) -> Advanced:
+        """Return the end of an increment as the forces change from those before to those after.
+
+        Where contact begins, it is solved in parts, to shares of the forces.  If the object is not held, the solution
+        says why, and state and pose are those at the beginning.
+        """
+        model = self.problem.model
+        begins = model.begins_in_parts and not self.state.contact.force.any()
+        ends = self._by_depths(move, before, after) if begins and not model.finite_strain else []
+        now, begin = before, move.start
+        for share in () if ends else ((*FIRST_PARTS, 1.0) if begins else (1.0,)):
+            wanted = after if share == 1.0 else replace(after, values=share * after.values)
+            end = move.end if share == 1.0 else self._of_share(move, share)
+            ends += self._parts(ends[-1] if ends else None, Move(begin, end), (now, wanted), self.cuts)
+            if not ends[-1].solution.outcome.ok:
+                return Advanced(combined([end.solution for end in ends], self.state), [], move.start)
+            now, begin = wanted, ends[-1].pose
+        solution = combined([end.solution for end in ends], ends[-1].solution.state)
+        return Advanced(solution, [part for end in ends for part in end.parts], ends[-1].pose)
+
+    def _by_depths(self, move: Move, before: GeneralisedForces, after: GeneralisedForces) -> list[Advanced]:
+        """Return the parts of an increment that begins contact, at shares of the depth that has the force at its end.
+
+        They are those of a press to that depth.  There are none where the iteration of the depth does not converge.
+        """
+        last = self._once(None, move, (before, after))
+        for _ in range(_DEPTH_ITERATIONS):
+            if not last.solution.outcome.ok:
+                return []
+            depth = last.pose.depth_mm
+            moves = Move(move.start, last.pose).cut(*FIRST_PARTS)[:-1]
+            found, parts = solved_in_turn(self.problem, self.workspace, self.state, moves, self.cuts)
+            first = Advanced(found, parts, moves[-1].end)
+            if not found.outcome.ok:
+                return []
+            reached = replace(after, values=self._forces(found.state, first.pose)[list(after.numbers)])
+            last = self._once(first, Move(first.pose, move.end), (reached, after))
+            if abs(last.pose.depth_mm - depth) <= FORCE_TOLERANCE * abs(depth):
+                return [first, last]
+        return []
+
+    def _of_share(self, move: Move, share: float) -> ObjectPose:
+        """Return the pose at which a share of the forces of an increment that begins contact is expected."""
+        return replace(move.at(share), depth_mm=by_power_law((0.0, 0.0), (move.end.depth_mm, 1.0), share))
+
+    def _parts(
+        self, before: Advanced | None, move: Move, forces: tuple[GeneralisedForces, GeneralisedForces], cuts: int
+    ) -> list[Advanced]:
+        """Return the parts of an increment after another one; the outcome of the last says why it ends there."""
+        begin, wanted = forces
+        found = self._once(before, move, forces)
+        if found.solution.outcome.ok or found.solution.outcome in (Outcome.SLIPS, Outcome.NOT_HELD):
+            return [found]
+        if cuts == 0:
+            return [self._ended(before, move, forces, found)]
+        half = replace(wanted, values=0.5 * (begin.values + wanted.values))
+        first = self._parts(before, Move(move.start, move.at(0.5)), (begin, half), cuts - 1)
+        last = first[-1]
+        if not last.solution.outcome.ok:
+            return first
+        return [*first, *self._parts(last, Move(last.pose, move.end), (half, wanted), cuts - 1)]
+
+    def _once(
+        self, before: Advanced | None, move: Move, forces: tuple[GeneralisedForces, GeneralisedForces]
+    ) -> Advanced:
+        state, wanted = (before.solution.state if before else self.state), forces[1]
+        problem, formulation = self.problem, formulation_of(self.problem.model)
+        begin = self._begin(before, move, forces)
+        guess = self.guess(begin.end) if before is None else None
+        there, solution = formulation.increment_to_forces(problem, (state, guess), begin, wanted, self.workspace)
+        failed = Advanced(replace(solution, state=state), [], move.start)
+        asked = str(wanted)
+        if not solution.outcome.ok:
+            self.report.remark(f"{asked} wanted, no solution at a depth of {there.end.depth_mm:.4g} mm")
+            return failed
+        reached = self._forces(solution.state, there.end)
+        missing = wanted.values - reached[list(wanted.numbers)]
+        error, round_off = np.abs(missing / wanted.scale(problem.model.design.height_mm)).max(), self._round_off
+        self.report.remark(f"{asked} wanted, {reached[0]:.5g} N at a depth of {there.end.depth_mm:.4g} mm")
+        if error > round_off:
+            return replace(failed, solution=replace(failed.solution, outcome=Outcome.NO_CONVERGENCE))
+        if there.end.depth_mm > self._deepest:
+            return replace(failed, solution=replace(failed.solution, outcome=Outcome.FORCE_NOT_REACHED))
+        if reached[0] <= round_off * wanted.size and self._touches(state, begin):
+            left = replace(failed.solution, outcome=Outcome.NOT_HELD, detail="the object leaves the finger")
+            return replace(failed, solution=left)
+        return Advanced(solution, [Substep(state, solution.state, there, solution.residual)], there.end)
+
+    def _begin(self, before: Advanced | None, move: Move, forces: tuple[GeneralisedForces, GeneralisedForces]) -> Move:
+        """Return the motion to a pose where the iteration begins: near the depth that is expected, else as it was."""
+        now, wanted = forces
+        end = wanted.placed(move.end, wanted.coordinates(move.start))
+        if 0 not in wanted.numbers:
+            return Move(move.start, end)
+        place = wanted.numbers.index(0)
+        last = before.parts[-1] if before else self.last
+        depth = move.end.depth_mm
+        if now.values[place] <= 0.0 and self.problem.model.finite_strain:
+            depth = self._in_small_strain(replace(end, depth_mm=depth), wanted.values[place])
+        elif last is not None:
+            there = last.move.start.depth_mm, normal_force(self.problem, last.before)
+            depth = by_power_law(there, (move.start.depth_mm, now.values[place]), wanted.values[place])
+        return Move(move.start, replace(end, depth_mm=min(depth, self._deepest)))
+
+    def _in_small_strain(self, pose: ObjectPose, wanted: float) -> float:
+        """Return the depth (mm) of a normal force in small strain, without friction."""
+        small, like = SmallStrain(), replace(self.problem, model=replace(self.problem.model, friction=Coulomb(0.0)))
+        force = GeneralisedForces((0,), np.array([wanted]), wanted)
+        start = small.start(like), None
+        found, _ = small.increment_to_forces(like, start, Move(like.origin, pose), force, small.workspace())
+        return found.end.depth_mm
+
+    @cached_property
+    def _deepest(self) -> float:
+        model = self.problem.model
+        return deepest(model.contact_path, self.problem.system.first_contact_mm, model.design.height_mm)
 
     @property
-    def ok(self) -> bool:
-        """Whether the increment converged."""
-        return self.solution.outcome.ok
-
-    @property
-    def slips(self) -> bool:
-        """Whether no point in contact sticks."""
-        status = self.solution.state.contact.status
-        return self.ok and bool((status == SLIP).any()) and not (status == STICK).any()
-
-    @property
-    def pressed_N(self) -> float:
-        """Sum of the normal forces of the points."""
-        return float(self.solution.state.contact.force[:, 0].sum())
-
-
-@dataclass
-class PoseSearch:
-    """Newton's method for the pose at which the object is in equilibrium with the forces applied to it.
-
-    The stiffness is found by differences and updated after every step (Broyden 1965).  A step that does not lower the
-    error is halved.  Where the whole contact slips and cannot transmit the forces, the search ends.  Without contact no
-    force is missing where none is prescribed: an object that has lost contact on the way is not held.
-
-    Attributes
-    ----------
-    increment : function of depth and slides (k,) mm and of the best trial before, which solves the increment
-    wanted : (k,) N
-    scale_N : force that errors are relative to
-    stride_mm : step of the differences
-    target : relative error at which the search ends
-    largest : function of a trial, the largest tangential force that its contact can transmit, over that wanted
-    asked_N : tangential force wanted, and that at the end of the leg
-    stiffness : (k, k) N/mm, of the increment before; None to begin with
-    """
-
-    increment: Callable[[Float, PoseTrial | None], PoseTrial]
-    wanted: Float
-    scale_N: float
-    stride_mm: float
-    target: float
-    largest: Callable[[PoseTrial], float]
-    asked_N: tuple[float, float]
-    stiffness: Float | None = None
-    iterations: int = field(default=0, init=False)
-
-    def run(self, start: Float) -> PoseTrial:
-        """Return the trial in equilibrium, or the best one with an outcome that says why there is none."""
-        best, refused = self._tried(start, None), 0
-        never_touched = not self._touches(best)
-        while best.ok and (error := self._error(best)) > self.target and self.iterations < _ITERATIONS:
-            fresh = self.stiffness is None
-            stiffness = self._differenced(best) if self.stiffness is None else self.stiffness
-            step = np.asarray(np.linalg.lstsq(stiffness, self.wanted - best.forces, rcond=1e-12)[0], dtype=np.float64)
-            trial = self._step(best, step)
-            if self._cannot_hold(trial):
-                return self._ended(trial, Outcome.SLIPS)
-            lowered = trial.ok and self._error(trial) < error
-            quick = lowered and self._error(trial) < _SLOW * error
-            kept = trial.ok and (quick or fresh or refused > 0)
-            self.stiffness = self._updated(stiffness, best, trial) if kept else None
-            # at a kink of the forces the stiffness in the direction of the step is that of the refused trial
-            refused = 0 if lowered else refused + (fresh or refused > 0)
-            if lowered:
-                best = trial
-            if refused > _REFUSED or not self._touches(best):
-                break
-        if not best.ok or (self._error(best) <= self._last_digits and (never_touched or self._touches(best))):
-            return best
-        return self._ended(best, Outcome.SLIPS if best.slips and self.asked_N[0] else Outcome.NOT_HELD)
-
-    def _tried(self, place: Float, near: PoseTrial | None) -> PoseTrial:
-        trial = self.increment(place, near)
-        self.iterations += trial.solution.iterations
-        return trial
-
-    @property
-    def _last_digits(self) -> float:
+    def _round_off(self) -> float:
         """Relative error of forces that are equal but for round-off."""
-        return _LAST_DIGITS * self.target
+        return FORCE_TOLERANCE_IF_FACTORED if self.problem.model.finite_strain else FORCE_TOLERANCE
 
-    def _touches(self, trial: PoseTrial) -> bool:
-        return trial.pressed_N > self._last_digits * self.scale_N
+    def _forces(self, state: State[Any], pose: ObjectPose) -> Float:
+        moment = formulation_of(self.problem.model).loads(self.problem, state, pose).moment
+        return forces_on(self.problem, state, moment, pose)
 
-    def _error(self, trial: PoseTrial) -> float:
-        return float(np.abs(trial.forces - self.wanted).max()) / self.scale_N
+    def _plainly(self, state: State[Any], move: Move) -> ContactSolution[State[Any]]:
+        return formulation_of(self.problem.model).increment(self.problem, state, move, None, self.workspace)
 
-    def _cannot_hold(self, trial: PoseTrial) -> bool:
-        return trial.slips and self.largest(trial) < 1.0 - _AT_LIMIT
+    def _touches(self, state: State[Any], move: Move) -> bool:
+        """Return whether the object touches at the end of a motion."""
+        found = self._plainly(state, move)
+        return found.outcome.ok and normal_force(self.problem, found.state) > 0.0
 
-    def _differenced(self, best: PoseTrial) -> Float:
-        """Return the stiffness by differences towards larger or smaller forces, as they are wanted.
-
-        Points that slip may stick if the object moves back, so that the two differ.  Where all points slip, some one
-        way and some the other, the force along a slide does not change until one of them turns: steps are then longer.
-        """
-        columns = []
-        for k, missing in enumerate(self.wanted - best.forces):
-            step, column = np.zeros(len(best.place)), np.zeros(len(best.place))
-            for longer in _STRIDES:
-                step[k] = np.copysign(longer * self.stride_mm, missing)
-                trial = self._tried(best.place + step, best)
-                if not trial.ok:
+    def _ended(
+        self,
+        before: Advanced | None,
+        move: Move,
+        forces: tuple[GeneralisedForces, GeneralisedForces],
+        found: Advanced,
+    ) -> Advanced:
+        """Return the end of an increment that does not converge, with the forces that are nearest to those wanted."""
+        wanted, solution = forces[1], found.solution
+        if wanted.numbers == (0,):
+            force, depth = normal_force(self.problem, solution.state), move.start.depth_mm
+            for share in _DEPTHS:  # the first that has a solution
+                deeper = depth + share * (self._deepest - depth)
+                found_there = self._plainly(solution.state, Move(move.start, replace(move.end, depth_mm=deeper)))
+                if found_there.outcome.ok:
+                    there = normal_force(self.problem, found_there.state)
+                    force, depth = (there, deeper) if there > force else (force, depth)
                     break
-                column = (trial.forces - best.forces) / step[k]
-                if abs(column[k]) * self.stride_mm > _CONSTANT * self.scale_N:
-                    break
-            columns.append(column)
-        return np.stack(columns, axis=1)
+            detail = f"{wanted.asked[0]:.6g} N asked; the largest force is {force:.6g} N, at a depth of {depth:.4g} mm"
+            if force <= 0.0:
+                detail = f"{wanted.asked[0]:.6g} N asked; the object does not touch the finger"
+            cycles = solution.outcome.is_cycle or solution.outcome is Outcome.NO_CONVERGENCE
+            outcome = Outcome.FORCE_NOT_REACHED if cycles else solution.outcome
+            detail = "; ".join(text for text in (solution.detail, detail) if text)
+            return replace(found, solution=replace(solution, outcome=outcome, detail=detail))
+        begin = self._begin(before, move, forces)
+        plain = self._plainly(solution.state, begin)
+        if not plain.outcome.ok:
+            return found
+        missing = wanted.values - self._forces(plain.state, begin.end)[list(wanted.numbers)]
+        detail = f"the nearest forces differ by {np.abs(missing).max():.3g} N"
+        return replace(found, solution=replace(solution, outcome=Outcome.NOT_HELD, detail=detail))
 
-    def _step(self, best: PoseTrial, step: Float) -> PoseTrial:
-        """Return the trial after a step, which is shortened until the error falls.
 
-        Where the largest missing force changes its sign, or the whole contact slips, the step went beyond a kink, and a
-        bisection finds what lies before it.  Where the whole contact slips, forces no longer tell the pose, so that
-        such a trial is taken only if there is no other.
-        """
-        k = int(np.argmax(np.abs(self.wanted - best.forces)))
-        before, beyond, share, slipping = 0.0, 0.0, 1.0, None
-        for _ in range(_HALVINGS):
-            trial = self._tried(best.place + share * step, best)
-            if self._cannot_hold(trial):
-                return trial
-            starts_to_slip = trial.slips and not best.slips
-            changes_sign = (self.wanted - trial.forces)[k] * (self.wanted - best.forces)[k] < 0.0
-            lowered = trial.ok and self._error(trial) < _LESS * self._error(best)
-            if lowered and (self._touches(trial) or not changes_sign):
-                if not starts_to_slip:
-                    return trial
-                slipping = slipping or trial
-            if not beyond or not trial.ok or starts_to_slip or changes_sign:
-                beyond = share
-            else:
-                before = share
-            share = 0.5 * (before + beyond)
-        return slipping or trial
+def normal_force(problem: Problem, state: State[Any]) -> float:
+    """Return the normal force (N)."""
+    return 0.0 - float(problem.world_force(state.contact)[:, 1].sum())
 
-    def _updated(self, stiffness: Float, best: PoseTrial, trial: PoseTrial) -> Float:
-        step, change = trial.place - best.place, trial.forces - best.forces
-        length = float(step @ step)
-        return stiffness + np.outer(change - stiffness @ step, step) / length if length else stiffness
 
-    def _ended(self, trial: PoseTrial, outcome: Outcome) -> PoseTrial:
-        if outcome is Outcome.SLIPS:
-            now, asked = self.asked_N
-            held = self.largest(trial) * now
-            if held <= 0.0:
-                holds = f"pushes {-held:.3g} N the other way"
-            elif held > _MUCH * asked:
-                holds = f"holds at most {held:.9g} N, but slides down its slope under less"
-            else:
-                holds = f"holds at most {held:.9g} N, {100.0 * held / asked:.4g} % of it"
-            detail = f"{asked:.6g} N asked; the contact {holds}"
-        elif self._touches(trial):
-            detail = f"the nearest forces differ by {self._error(trial) * self.scale_N:.3g} N"
-        else:
-            detail = "the object leaves the finger"
-        return replace(trial, solution=replace(trial.solution, outcome=outcome, detail=detail))
+def by_power_law(before: tuple[float, float], now: tuple[float, float], wanted: float) -> float:
+    """Return the depth (mm) at a force, by the power of the force with which the depth has changed.
+
+    The power is between 0 and 1, and that of Hertz's law where a force was none, or was the same.
+
+    Parameters
+    ----------
+    before, now : depths (mm) and forces (N)
+    wanted : N
+    """
+    (d0, f0), (d1, f1) = before, now
+    if d1 <= 0.0 or f1 <= 0.0:
+        return d1 + (d1 - d0)
+    is_known = d0 > 0.0 and f0 > 0.0 and f0 != f1
+    power = math.log(d1 / d0) / math.log(f1 / f0) if is_known else _HERTZ
+    return float(d1 * (wanted / f1) ** min(max(power, 0.0), 1.0))

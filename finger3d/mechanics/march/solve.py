@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
-from copy import copy
 from dataclasses import replace
 from threading import Event
 from typing import Any
@@ -18,22 +17,17 @@ from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.equilibrium import PoseSearch, PoseTrial
-from finger3d.mechanics.march.force_control import deepest, target
-from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, combined, energies, expecting, solved_in_turn
-from finger3d.mechanics.march.to_force import (
-    ToForce,
-    ToForceAtFiniteStrain,
-    expected_depth,
-    forces_on,
-)
+from finger3d.mechanics.generalised import GeneralisedForces, forces_on
+from finger3d.mechanics.march.equilibrium import ToForces
+from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, solved_in_turn
 from finger3d.mechanics.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
 from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.slip_limit import largest_force
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
+
+_SIDEWAYS = np.array([0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0])  # coordinates but depth and time
 
 CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
@@ -108,9 +102,8 @@ class Press:
         self._last_part: Substep | None = None
         self._work, self._dissipation = 0.0, 0.0
         self._station: Station | None = None
-        self._leg_start_N: Float = np.zeros(3)  # forces as in a Load
-        self._left: Float = np.zeros(2)  # slides at the start of the leg, less those of the path
-        self._stiffness: Float | None = None  # of the last increment under tangential forces
+        self._leg_start: Float = np.zeros(6)  # forces as in a Load
+        self._left: Float = np.zeros(7)  # coordinates at the start of the leg, less those of the path
         self._before: tuple[State[Any], float, float] | None = None  # None if the last increment was cut
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
@@ -145,7 +138,7 @@ class Press:
             if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
                 end = self._to_pose(move.end, None)
         else:
-            end = (self._to_force if station.load.is_normal else self._to_forces)(move, station.load)
+            end = self._to_forces(move, station.load)
         was_cut = len(end.parts) > len(self.moves_to(end.pose))
         self._before = None if was_cut else (self.state, self._work, self._dissipation)
         self._add_energies(end)
@@ -213,95 +206,38 @@ class Press:
             raise CancelledError
 
     def _pose_at(self, station: Station) -> ObjectPose:
-        """Return the pose at a station; a slide that forces have determined is taken back in proportion to the leg."""
+        """Return the pose at a station; what forces have determined is taken back in proportion to the leg."""
         if self._station is None or self._station.share == 1.0:
             planned = self._station.pose if self._station else self.problem.origin
-            self._left = self.pose.coordinates[1:3] - planned.coordinates[1:3]
+            self._left = _SIDEWAYS * (self.pose.coordinates - planned.coordinates)
         self._station = station
         if not self._left.any():
             return station.pose
-        x, z = (1.0 - station.share) * self._left
-        return replace(station.pose, slide_x_mm=station.pose.slide_x_mm + x, slide_z_mm=station.pose.slide_z_mm + z)
+        return station.pose.changed(np.arange(7), (1.0 - station.share) * self._left)
 
     def _wanted(self, load: Load) -> tuple[Float, Float]:
-        """Return the forces (3,) N now, and those prescribed at the end of the increment."""
-        forces = forces_on(self.problem, self.state)
+        """Return the forces (6,), N and N mm, now, and those prescribed at the end of the increment."""
+        moment = self.formulation.loads(self.problem, self.state, self.pose).moment
+        forces = forces_on(self.problem, self.state, moment, self.pose)
         if load.begins:
-            self._leg_start_N = forces
-        return forces, self._leg_start_N + load.share * (load.forces - self._leg_start_N)
-
-    @property
-    def _deepest(self) -> float:
-        model = self.problem.model
-        return deepest(model.contact_path, self.problem.system.first_contact_mm, model.design.height_mm)
-
-    def _to_force(self, move: Move, load: Load) -> Advanced:
-        """Advance to the depth where the normal force is the prescribed one; where contact begins, in parts."""
-        way = ToForceAtFiniteStrain if self.problem.model.finite_strain else ToForce
-        first = way.first_shares if len(self.moves_to(move.end)) > 1 else ()
-        now, wanted = (float(forces[0]) for forces in self._wanted(load))
-        press, ends = copy(self), list[Advanced]()
-        for share in (*first, 1.0):
-            part, forces = Move(press.pose, move.at(share) if share < 1.0 else move.end), (now, share * wanted)
-            depth = expected_depth(self.problem, press._last_part, part, forces, self._deepest)
-            end = way(press, part, forces, self._deepest, self._report).run(depth)
-            ends.append(end)
-            if not end.solution.outcome.ok:
-                return Advanced(combined([end.solution for end in ends], self.state), [], self.pose)
-            press._move_to(end)
-            now = share * wanted
-        solution = combined([end.solution for end in ends], press.state)
-        return Advanced(solution, [part for end in ends for part in end.parts], press.pose)
+            self._leg_start = forces
+        return forces, self._leg_start + load.share * (load.forces - self._leg_start)
 
     def _to_forces(self, move: Move, load: Load) -> Advanced:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
-        problem, state, parts = self.problem, self.state, dict[bytes, list[Substep]]()
         forces, wanted = self._wanted(load)
         free = np.flatnonzero(~np.isnan(wanted))
-        normal = float(wanted[0] if 0 in free else forces[0])
-        tangential = np.nan_to_num([wanted[1], 0.0, wanted[2]])
-        size = float(np.linalg.norm(tangential))
-        if normal <= 0.0:
-            detail = "nothing touches, and a tangential force is prescribed; press first"
-            ended = ContactSolution(state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
+        if (wanted[0] if 0 in free else forces[0]) <= 0.0:
+            detail = "nothing touches, and a tangential force or a moment is prescribed; press first"
+            ended = ContactSolution(self.state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
             return Advanced(ended, [], move.start)
-
-        def trial_at(place: Float, near: PoseTrial | None) -> PoseTrial:
-            coordinates = move.end.coordinates
-            coordinates[free] = place
-            there = Move(move.start, ObjectPose(*coordinates.tolist()))
-            start, guess = state, self.expected_force(there.end)
-            if near is not None:
-                guess = near.solution.state.contact.force
-                if problem.model.finite_strain:
-                    start = expecting(state, there, (near.solution.state, near.solution.state), 0.0)
-            found, parts[place.tobytes()] = self.solved(start, self.moves_to(there.end), guess)
-            reached = forces_on(problem, found.state)[free] if found.outcome.ok else np.full(len(free), np.nan)
-            return PoseTrial(place, found, reached)
-
-        def largest(trial: PoseTrial) -> float:
-            if not size:
-                return np.inf
-            whole, reached = problem.symmetry.unfold(trial.solution.state.contact), trial.forces
-            most = sum(largest_force(problem.points, whole, problem.model.friction, tangential / size)) / size
-            return most * (normal / reached[0] if 0 in free and reached[0] > 0.0 else 1.0)
-
-        search = PoseSearch(
-            trial_at,
-            wanted[free],
-            float(np.nanmax(np.abs([normal, *wanted]))),
-            1e-4 * max(move.end.depth_mm, move.start.depth_mm),
-            target(problem.model.finite_strain),
-            largest,
-            (size, float(np.linalg.norm(np.nan_to_num(load.forces[1:])))),
-            None if load.begins else self._stiffness,
-        )
-        last = search.run(move.start.coordinates[free])
-        self._stiffness = search.stiffness
-        if not last.ok:
-            return Advanced(replace(last.solution, state=state, iterations=search.iterations), [], move.start)
-        pose = parts[last.place.tobytes()][-1].move.end
-        return Advanced(replace(last.solution, iterations=search.iterations), parts[last.place.tobytes()], pose)
+        numbers = tuple(free.tolist())
+        size = float(np.nanmax(np.abs([*forces[:3], *wanted[:3]])))
+        asked = float(load.forces[0]), float(np.linalg.norm(np.nan_to_num(load.forces[1:3])))
+        before, after = (GeneralisedForces(numbers, values[free], size, asked) for values in (forces, wanted))
+        known = self.problem, self.workspace, self.state, self._last_part
+        way = ToForces(*known, self.expected_force, self._cuts, self._report)
+        return way.run(move, before, after)
 
     def _free_strain(self, station: Station) -> dict[Column, float]:
         """Strain of every gauge in the body without inclusions; NaN once it has failed."""

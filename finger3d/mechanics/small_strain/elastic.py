@@ -14,12 +14,13 @@ from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.discretise.contact_geometry import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Loads, Workspace
+from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.linear_contact import (
     LinearBody,
     solve_increment,
-    solve_increment_to_force,
+    solve_increment_to_forces,
 )
 from finger3d.objects import Move, ObjectPose
 
@@ -46,19 +47,17 @@ class SmallStrain:
         body = LinearBody(problem.delassus, np.zeros_like(state.body))
         return solve_increment(problem, state, move, body, guess, workspace)
 
-    def increment_to_force(
+    def increment_to_forces(
         self,
         problem: Problem,
         start: tuple[State[Float], Float | None],
         move: Move,
-        wanted: float,
+        wanted: GeneralisedForces,
         workspace: Workspace,
-    ) -> tuple[Move, ContactSolution[State[Float]]] | None:
-        """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
-        if problem.model.is_defined_by_increments:
-            return None
+    ) -> tuple[Move, ContactSolution[State[Float]]]:
+        """Solve contact with the pose as an unknown."""
         body = LinearBody(problem.delassus, np.zeros_like(start[0].body))
-        return solve_increment_to_force(problem, start, move, body, wanted, workspace)
+        return solve_increment_to_forces(problem, start, move, body, wanted, workspace)
 
     def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
         """Yield the unknowns from the forces, by one back-substitution for many states."""

@@ -16,16 +16,17 @@ from typing import Any, Self
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
-from finger3d.contact.rules import RULES, ForceCondition, solve_to_force
+from finger3d.contact.rules import RULES, ForceConditions, solve_to_forces
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace, length_scale
+from finger3d.mechanics.generalised import GeneralisedForces, motions, resultants
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.results.state import B, State
 from finger3d.objects import DistanceTracker, Move, vertical_frame
@@ -34,7 +35,7 @@ _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
 _EXACT = 1e-12
-"""Relative error of a prescribed force at which the contact of the body is solved."""
+"""Relative error of prescribed forces at which the contact of the body is solved."""
 
 _MOST_SOLUTIONS = 30
 """Largest number of solutions of an increment."""
@@ -94,23 +95,18 @@ def solve_increment(
     return Increment(problem, state, move, body, workspace.tracker).solve(guess)[1]
 
 
-def solve_increment_to_force(
+def solve_increment_to_forces(
     problem: Problem,
     start: tuple[State[Float], Float | None],
     move: Move,
     body: LinearBody,
-    wanted: float,
+    wanted: GeneralisedForces,
     workspace: Workspace,
-) -> tuple[Move, ContactSolution[State[Float]]] | None:
-    """Advance a state to a normal force; see `finger3d.mechanics.formulations.increment_to_force`."""
-    (state, guess), motion = start, move.end.depth_mm - move.start.depth_mm
-    rise = wanted + float(problem.world_force(state.contact)[:, 1].sum())
-    rate = rise / motion if rise * motion > 0.0 else wanted / length_scale(problem, move)
-    first = IncrementToForce(problem, state, move, body, workspace.tracker, wanted, rate)
-    increment, solution = first.solve(guess)
-    reached = -float(problem.world_force(solution.state.contact)[:, 1].sum())
-    is_there = solution.outcome.ok and abs(reached - wanted) <= 100.0 * _EXACT * wanted
-    return (increment.move, solution) if is_there else None
+) -> tuple[Move, ContactSolution[State[Float]]]:
+    """Advance a state to prescribed forces; see `finger3d.mechanics.formulations.increment_to_forces`."""
+    state, guess = start
+    increment, solution = IncrementToForces(problem, state, move, body, workspace.tracker, wanted).solve(guess)
+    return increment.move, solution
 
 
 def extrapolated(tried: list[Float], results: list[Float]) -> Float:
@@ -192,12 +188,12 @@ class Increment:
             if settled >= _HOLD_FROM:
                 change = np.linalg.norm(after.gradient - geometry.gradient, axis=1)
                 held |= (change > _HOLD_ABOVE) & (start[:, 0] > 0.0)
-            # as seen from the object, which may have been lowered
-            seen = expansion_point + before.lowered_by(self), displacement + increment.lowered_by(self)
+            # as seen from the object, which may have been moved
+            seen = expansion_point - before.moved_from(self), displacement - increment.moved_from(self)
             tried, displacements = [*tried, seen[0]][-_MEMORY:], [*displacements, seen[1]][-_MEMORY:]
             expansion_point, following = displacement, after
             if len(tried) > 1:
-                expansion_point = extrapolated(tried, displacements) - increment.lowered_by(self)
+                expansion_point = extrapolated(tried, displacements) + increment.moved_from(self)
                 following = increment.geometry(expansion_point)
             geometry = following.holding(held, geometry)
         if error > TOLERANCE:
@@ -218,16 +214,14 @@ class Increment:
         carried = carried_by_object(self.problem, self.move, self.state.body)
         return moves_too_far(self.problem, self.move, self.state.contact.gap, carried)
 
-    def lowered_by(self, other: Increment) -> Float:
-        """Return how far (d,) mm the points have moved up, as seen from the object, since another end of the motion."""
-        up = np.zeros(self.body.past.shape[1])
-        up[1] = self.move.end.depth_mm - other.move.end.depth_mm
-        return up
+    def moved_from(self, other: Increment) -> Float:
+        """Return the displacement (c, d) mm of the object, where the points are at rest, from another end."""
+        return carried_by_object(self.problem, Move(other.move.end, self.move.end), np.zeros_like(self.body.past))
 
     def distance_from(self, other: Increment) -> float:
-        """Return the distance of the ends of two motions of different depths, over the depth."""
-        apart = self.move.end.depth_mm - other.move.end.depth_mm
-        return abs(apart) / length_scale(self.problem, self.move)
+        """Return the distance of the ends of two motions, over the depth."""
+        apart = float(np.abs(self.moved_from(other)).max(initial=0.0)) if self is not other else 0.0
+        return apart / length_scale(self.problem, self.move)
 
     def solve_linearised(
         self, geometry: ContactGeometry, expansion_point: Float, guess: Float | None
@@ -243,22 +237,22 @@ class Increment:
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
             contact = ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area)
-            return self._solved(contact, guess, bases)
+            return self._solved(contact, guess, bases, np.arange(len(bases)))
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
         contact = ContactProblem.of(
             start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
         )
-        increment, part = self._solved(contact, expected[near], bases[near])
+        increment, part = self._solved(contact, expected[near], bases[near], near)
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
         return increment, replace(part, state=replace(start, force=force, status=status))
 
     def _solved(
-        self, contact: ContactProblem, guess: Float | None, bases: Float
+        self, contact: ContactProblem, guess: Float | None, bases: Float, points: Int
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Return the contact solution of points with bases (k, d, d), and the increment that it is for."""
+        """Return the contact solution of points by their numbers, with bases (k, d, d), and the increment it is for."""
         return self, RULES[self.problem.model.rule](contact, guess)
 
     def relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
@@ -302,27 +296,42 @@ class Increment:
 
 
 @dataclass(frozen=True)
-class IncrementToForce(Increment):
-    """An increment to a prescribed normal force, with the depth at its end as one more unknown of the iteration.
+class IncrementToForces(Increment):
+    """An increment to prescribed forces, with as many coordinates of its end as more unknowns of the iteration.
 
     Attributes
     ----------
-    wanted : on the whole finger, N
-    rate : of the force by the depth in the last iteration, N/mm
+    wanted : on the whole finger
     """
 
-    wanted: float
-    rate: float
+    wanted: GeneralisedForces
 
     def _solved(
-        self, contact: ContactProblem, guess: Float | None, bases: Float
+        self, contact: ContactProblem, guess: Float | None, bases: Float, points: Int
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Lower the object until the points have the force; no further than distances are exact."""
-        images, far = 2.0 ** len(self.problem.axes), _NEAR * length_scale(self.problem, self.move)
-        condition = ForceCondition(bases[:, :, 1], self.wanted / images, self.rate / images, (-far, far), _EXACT)
-        solution, lowered, rate = solve_to_force(self.problem.model.rule, contact, guess, condition)
-        end = replace(self.move.end, depth_mm=self.move.end.depth_mm + lowered)
-        return replace(self, move=Move(self.move.start, end), rate=images * rate), solution
+        """Move the object until the points have the forces; no further than distances are exact."""
+        problem, end, wanted = self.problem, self.move.end, self.wanted
+        at, images = problem.surface.centroids[points], 2.0 ** len(problem.axes)
+        design, is_flat = problem.model.design, problem.model.object.is_flat
+        far, arm = design.height_mm if is_flat else _NEAR * length_scale(problem, self.move), design.height_mm
+        size = bases[:, 0].size, len(wanted.numbers)
+        motion, resultant = (
+            -np.einsum("cak,ckj->caj", bases, field(problem, end, at, wanted.numbers)).reshape(size)
+            for field in (motions, resultants)
+        )
+        reach = wanted.reach(far, arm)
+        conditions = ForceConditions(
+            motion=motion,
+            resultant=resultant,
+            forces=wanted.values / images,
+            scale=wanted.scale(arm) / images,
+            reach=reach,
+            tolerance=_EXACT,
+            approach=reach * (np.array(wanted.numbers) == 0),
+        )
+        solution, moved, slips = solve_to_forces(problem.model.rule, contact, guess, conditions)
+        solution = wanted.checked(solution, bases, images, slips)
+        return replace(self, move=Move(self.move.start, wanted.moved(end, moved))), solution
 
 
 def motion_until_touch(problem: Problem, state: State[Any], move: Move) -> Float:
