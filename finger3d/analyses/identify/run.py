@@ -228,7 +228,7 @@ class _Misfit:
     def part_of_errors(self) -> Float:
         """Part (n, n) of the errors of the simulation in the covariance of whitened residuals."""
         inverse = solve_triangular(self.root, np.eye(len(self.root)), lower=True)
-        return np.eye(len(self.root)) - inverse @ inverse.T
+        return np.asarray(np.eye(len(self.root)) - inverse @ inverse.T)
 
     def whitened(self, difference: Float) -> Float:
         """Return differences (s, n) of numbers over their standard deviations, with the identity as covariance."""
