@@ -30,6 +30,9 @@ FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
 _DEPTH_ITERATIONS = 12
 """Largest number of depths in whose shares contact begins; each changes the next by a thousandth of its error."""
 
+_CUTS_IF_FACTORED = 3
+"""Times that an increment at large deformation is halved, at most."""
+
 _DEPTHS = (1.0, 0.5, 0.25, 0.125)
 """Shares of the way to the largest depth at which a force is looked for that is larger than those found."""
 
@@ -112,6 +115,7 @@ class ToForces:
         """Return the parts of an increment after another one; the outcome of the last says why it ends there."""
         begin, wanted = forces
         found = self._once(before, move, forces)
+        cuts = min(cuts, _CUTS_IF_FACTORED) if self.problem.model.finite_strain else cuts
         if found.solution.outcome.ok or found.solution.outcome in (Outcome.SLIPS, Outcome.NOT_HELD):
             return [found]
         if cuts == 0:
@@ -206,7 +210,8 @@ class ToForces:
         wanted, solution = forces[1], found.solution
         if wanted.numbers == (0,):
             force, depth = normal_force(self.problem, solution.state), move.start.depth_mm
-            for share in _DEPTHS:  # the first that has a solution
+            # the first that has a solution; at large deformation each that has none costs tens of factorisations
+            for share in () if self.problem.model.finite_strain else _DEPTHS:
                 deeper = depth + share * (self._deepest - depth)
                 found_there = self._plainly(solution.state, Move(move.start, replace(move.end, depth_mm=deeper)))
                 if found_there.outcome.ok:
