@@ -86,6 +86,7 @@ def test_where_friction_ceases_to_change_a_reading_the_interval_reaches_the_boun
     assert found.low[0] == pytest.approx(0.35)
     assert found.high[0] == pytest.approx(0.89, abs=0.02)
     assert found.stds[0] == pytest.approx(0.36, abs=0.02)
+    assert "the data do not bound friction.mu from above" in found.untold
 
 
 def test_a_flat_likelihood_is_told() -> None:

@@ -216,3 +216,6 @@ def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Pat
     monkeypatch.setattr(Journal, "append", lambda journal, row: (solved.append(row), whole(journal, row))[1])
     found = finger3d.identify(scene_file, measured, FREE, out)
     assert len(solved) == found.presses - 5
+    again = finger3d.identify(scene_file, measured, FREE, out)
+    assert len(solved) == again.presses - 5
+    assert again.fitted.values == pytest.approx(found.fitted.values, rel=1e-12)

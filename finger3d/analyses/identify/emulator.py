@@ -98,6 +98,11 @@ class Emulator:
             self._presses[point] = np.arcsinh(np.array(rows) / self._size)
         self.__dict__.pop("_interpolated", None)
 
+    @property
+    def count(self) -> int:
+        """Number of presses that were asked for, known or not: a repeated identification asks for the same ones."""
+        return len(self._presses) + len(self._failures)
+
     def check(self) -> None:
         """Raise what the first press that failed raised if too few did not."""
         if len(self._presses) <= len(self.pressed):

@@ -39,6 +39,7 @@ _BINS, _PLAUSIBLE = 40, 1.0
 """Bins of a share; chi-square beyond the least one at the 68 % limit of a likelihood ratio, and twice it between two
 ranges that are apart."""
 
+_TO_BOUND = 0.05  # distance of a share from a bound, and deviation of one, from which the data tell nothing beyond it
 _TAIL = 0.5 * special.erfc(np.sqrt(0.5))  # probability beyond one standard deviation, to one side
 
 LogLikelihood = Callable[[Float], Float]
@@ -200,5 +201,10 @@ def _maxima(scale: Scale, samples: Samples, number: int) -> list[str]:
         if lost <= _PLAUSIBLE:
             ranges = [*ranges, [begin, end]] if is_apart else [*ranges[:-1], [ranges[-1][0], end]]
         is_apart = (is_apart and lost > _PLAUSIBLE) or lost > 2.0 * _PLAUSIBLE
+    reaches = [
+        end for end, at in (("below", ranges[1][0] < _TO_BOUND), ("above", ranges[-1][1] > 1.0 - _TO_BOUND)) if at
+    ]
+    if len(reaches) == 1 and share.std() > _TO_BOUND:
+        return [f"the data do not bound {scale.key} from {reaches[0]}"]
     texts = [f"{scale.value(a):.3g} to {scale.value(b):.3g}" for a, b in ranges[1:]]
     return [f"{scale.key} = {' and '.join(texts)} fit about as well"] if len(texts) > 1 else []

@@ -46,7 +46,7 @@ _BAR = 1.645
 
 _SHARE = 0.02  # standard deviation in the first fit of a column without one, over its largest magnitude
 _LEAST_SHARE = 1e-4  # lower bound of the same when it is taken from the residuals
-_MOST = 12  # presses for each key that needs some, at most, and one more
+_MOST = 12  # presses for each key that needs some, at most, and one more: with that of the errors, and the last
 _FEW, _MANY = 256, 2048  # samples of the posterior while presses are chosen, and at the end
 _AGREES = 0.5  # difference of an emulator from a press, in standard deviations, that counts as none
 _NEAR = 1e-3  # distance of shares from a press at which there is no other
@@ -279,7 +279,7 @@ class _Misfit:
             unsure = np.sum(self.whitened(emulator.error(samples.shares)) ** 2, axis=1)
             gaps = []
             for shares in (best, samples.shares[np.argmax(unsure)]):
-                if emulator.distance(shares) > _NEAR and simulation.solved < _MOST * len(emulator.pressed):
+                if emulator.distance(shares) > _NEAR and emulator.count < _MOST * len(emulator.pressed) - 1:
                     before = emulator(shares[None])
                     emulator.press(shares)
                     gap = float(np.linalg.norm(self.whitened(emulator(shares[None]) - before)))
