@@ -79,10 +79,6 @@ class Outcome(Enum):
         "the prescribed force is not reached before finger or object come to the base; prescribe a smaller force, or "
         "a depth"
     )
-    FORCE_JUMPS = (
-        "the prescribed force is not reached: the force jumps with the depth, as where an edge slips off, or by "
-        "rule = 'paper' or kinetic friction; prescribe a depth"
-    )
     SLIPS = (
         "the whole contact slips: friction does not balance the prescribed tangential force; prescribe another one, or "
         "a larger normal force"

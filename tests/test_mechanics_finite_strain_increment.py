@@ -133,10 +133,10 @@ def test_an_increment_to_a_force_ends_at_the_depth_that_has_it() -> None:
     workspace = formulation_of(problem.model).workspace()
     # the iteration begins half a millimetre off
     move = Move(ObjectPose(4.0), ObjectPose(6.5))
-    found = formulation_of(problem.model).increment_to_forces(
-        problem, (frames[0].meshed_state, None), move, GeneralisedForces((0,), np.array([wanted]), wanted), workspace
-    )
-    end, solution = found
+    force = GeneralisedForces((0,), np.array([wanted]), wanted)
+    formulation = formulation_of(problem.model)
+    solution = formulation.increment(problem, frames[0].meshed_state, move, None, workspace, force)
+    end, _ = solution.state.last
     # residuals of 5e-9 of both presses
     assert end.end.depth_mm == pytest.approx(6.0, rel=1e-7)
     assert solution.state.body.unknowns == pytest.approx(frames[1].meshed_state.body.unknowns, abs=1e-6)
@@ -152,7 +152,7 @@ def test_the_path_is_followed_where_an_increment_does_not_converge_from_afar() -
     increment = formulation.equations(problem, rest, move, workspace)
     assert not increment._iterate(None)[1].outcome.ok
     before = workspace.factorizations
-    _, followed = increment._followed(None)
+    _, followed = increment.followed(None)
     assert followed.outcome.ok
     # 8 today; two for each of two points, and for the end, may come to more where round-off differs
     assert 4 <= workspace.factorizations - before <= 16
@@ -160,20 +160,19 @@ def test_the_path_is_followed_where_an_increment_does_not_converge_from_afar() -
     assert followed.state.body.unknowns == pytest.approx(damped, abs=1e-6)  # residuals of 5e-9; 14 mm long
     # a force is reached at a single go, too; it slips in other increments than the press in four
     wanted = measure(problem.points, frames[-1])["normal_force_N"]
-    found = formulation_of(problem.model).increment_to_forces(
-        problem, (rest, None), move, GeneralisedForces((0,), np.array([wanted]), wanted), formulation.workspace()
-    )
-    assert found[0].start == move.start
-    assert found[0].end.depth_mm == pytest.approx(14.0, rel=0.01)  # 4e-3
-    assert -problem.world_force(found[1].state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-8)
+    force = GeneralisedForces((0,), np.array([wanted]), wanted)
+    found = formulation.increment(problem, rest, move, None, formulation.workspace(), force)
+    there, _ = found.state.last
+    assert there.start == move.start
+    assert there.end.depth_mm == pytest.approx(14.0, rel=0.01)  # 4e-3
+    assert -problem.world_force(found.state.contact)[:, 1].sum() == pytest.approx(wanted, rel=1e-8)
 
 
 def test_there_is_no_increment_to_a_force_out_of_reach() -> None:
     problem = build(large_fig9(0.45, 4.0))
     formulation, move = formulation_of(problem.model), Move(ObjectPose(0.0), ObjectPose(1.0))
-    start = formulation.start(problem), None
-    wanted = GeneralisedForces((0,), np.array([1e5]), 1e5)
-    assert not formulation.increment_to_forces(problem, start, move, wanted, formulation.workspace())[1].outcome.ok
+    start, wanted = formulation.start(problem), GeneralisedForces((0,), np.array([1e5]), 1e5)
+    assert not formulation.increment(problem, start, move, None, formulation.workspace(), wanted).outcome.ok
 
 
 def test_a_faceted_object_without_friction_takes_few_factorisations() -> None:

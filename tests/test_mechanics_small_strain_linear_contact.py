@@ -84,13 +84,12 @@ def test_an_increment_to_a_force_ends_at_the_depth_that_has_it(thing: Sphere | P
     problem, frames = run(block(object=thing, legs=(Leg(0.2, steps=1), Leg(0.2, slide_x_mm=0.3, steps=1))))
     wanted = measure(problem.points, frames[1])["normal_force_N"]
     workspace = formulation_of(problem.model).workspace()
-    start = frames[0].meshed_state, None
     # the iteration begins a fifth of the depth off
     move = Move(frames[0].target, replace(frames[1].target, depth_mm=0.24))
-    found = formulation_of(problem.model).increment_to_forces(
-        problem, start, move, GeneralisedForces((0,), np.array([wanted]), wanted), workspace
-    )
-    there, solution = found
+    force = GeneralisedForces((0,), np.array([wanted]), wanted)
+    formulation = formulation_of(problem.model)
+    solution = formulation.increment(problem, frames[0].meshed_state, move, None, workspace, force)
+    there, _ = solution.state.last
     # both geometries are exact to 1e-9 of the depth
     assert there.end.depth_mm == pytest.approx(0.2, rel=1e-8)
     assert solution.state.contact.force == pytest.approx(frames[1].meshed_state.contact.force, abs=1e-7 * wanted)

@@ -236,6 +236,6 @@ def test_interfaces_stay_small(root: Path) -> None:
     members = {name for name in vars(Formulation) if not name.startswith("_")}
     mechanics = "".join(p.read_text(encoding="utf-8") for p in (root / "finger3d" / "mechanics").rglob("*.py"))
     effects = "".join(p.read_text(encoding="utf-8") for p in (root / "finger3d" / "effects").glob("*.py"))
-    assert 0 < len(members) <= 9  # advanced to a pose and to forces
+    assert 0 < len(members) <= 8
     assert mechanics.count("assert isinstance") <= 3
     assert effects.count("\n") <= 400

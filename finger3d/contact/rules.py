@@ -90,14 +90,14 @@ class ForceConditions:
 
     Attributes
     ----------
-    motion : (c d, k) relative displacement of the points, in their own directions, by each coordinate
-    resultant : (c d, k), by which the resultants are ``-resultant.T r``; where no axis turns it is the motion
+    motion : (c d, k) relative displacement of the points, in their own directions, by each coordinate, also by forces
+        that turn with the object's surface
+    resultant : (c d, k), by which the resultants are ``-resultant.T r``
     forces : (k,) N, N mm
     scale : (k,) magnitudes to which errors of the forces are relative
     reach : (k,) largest change of each coordinate
     tolerance : relative error of the forces that is sought
     approach : (k,) step towards the finger where the object does not touch it
-    turned : (c d, k) displacement of the points by forces that turn with the object's surface, by each coordinate
     """
 
     motion: Float
@@ -107,7 +107,6 @@ class ForceConditions:
     reach: Float
     tolerance: float
     approach: Float
-    turned: Float | float = 0.0
 
     def missing(self, force: Float) -> Float:
         """Return what contact forces (c, d) are short of (k,)."""
@@ -117,7 +116,7 @@ class ForceConditions:
         """Return the derivatives (k, k) of the resultants by the coordinates at a solution."""
         augmented = project_on_friction_cone(problem, solution.force, displacement)[2]
         system = ActiveSetSystem.of(problem, ActiveSet.of(problem, solution.status, augmented))
-        moved = (self.motion + self.turned).T.reshape(-1, *solution.force.shape)
+        moved = self.motion.T.reshape(-1, *solution.force.shape)
         changes = [system.active.force(system.solve(-system.active.weighted(problem, one))) for one in moved]
         return -self.resultant.T @ np.array(changes).reshape(len(moved), -1).T
 
@@ -147,7 +146,7 @@ def solve_to_forces(
     best: tuple[float, Float, ContactSolution[ContactState]] | None = None
     moved, step, allowed, spent = np.zeros(len(conditions.forces)), np.zeros(len(conditions.forces)), 0.0, 0
     for _ in range(_SOLUTIONS):
-        motion = ((conditions.motion + conditions.turned) @ moved).reshape(problem.free_motion.shape)
+        motion = (conditions.motion @ moved).reshape(problem.free_motion.shape)
         there = replace(problem, free_motion=problem.free_motion + motion)
         solution = RULES[rule](there, guess)
         spent += solution.iterations

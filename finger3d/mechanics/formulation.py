@@ -78,7 +78,13 @@ class Formulation(Protocol[B, W]):
         ...
 
     def increment(
-        self, problem: Problem, state: State[B], move: Move, guess: Float | None, workspace: W
+        self,
+        problem: Problem,
+        state: State[B],
+        move: Move,
+        guess: Float | None,
+        workspace: W,
+        wanted: GeneralisedForces | None = None,
     ) -> ContactSolution[State[B]]:
         """Advance a state as the object moves.
 
@@ -88,28 +94,9 @@ class Formulation(Protocol[B, W]):
             Contact forces where the iteration starts; those of `state` unless given.
         workspace : Workspace
             What `workspace` of this formulation returned; the increment may change it.
-        """
-        ...
-
-    def increment_to_forces(
-        self,
-        problem: Problem,
-        start: tuple[State[B], Float | None],
-        move: Move,
-        wanted: GeneralisedForces,
-        workspace: W,
-    ) -> tuple[Move, ContactSolution[State[B]]]:
-        """Advance a state to prescribed forces, with as many coordinates at the end as unknowns of the iteration.
-
-        Parameters
-        ----------
-        start : state before the increment, and (c, d) contact forces where the iteration begins, N
-        move : to a pose where the iteration begins
-
-        Returns
-        -------
-        Motion to the pose that is found, and the solution there; the forces nearest to those wanted where no pose has
-        these.
+        wanted : GeneralisedForces, optional
+            Forces at the end, with as many coordinates of the pose as unknowns of the iteration, which begins at that
+            of `move`.  The state has the motion that is found; where no pose has the forces, those nearest to them.
         """
         ...
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.friction import SLIP, STICK
+from finger3d.contact.rules import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
@@ -68,9 +69,21 @@ class GeneralisedForces:
         """Return a pose with given free coordinates (k,)."""
         return self.moved(pose, coordinates - self.coordinates(pose))
 
-    def reach(self, far: float, arm: float) -> Float:
-        """Return the changes (k,) of the coordinates that move a point at an arm (mm) from the axes so far (mm)."""
-        return far / np.where(np.array(self.numbers) > 2, arm, 1.0)
+    def conditions(
+        self, motion: Float, resultant: Float, images: float, reach: tuple[float, float], tolerance: float
+    ) -> ForceConditions:
+        """Return the conditions on the contact forces of a part of the finger.
+
+        Parameters
+        ----------
+        motion, resultant : (c d, k), see `ForceConditions`
+        images : number of mirror images of the part that make up the whole finger
+        reach : mm, largest motion of a point in an iteration, and its arm about the axes of the turns
+        """
+        (far, arm), numbers = reach, np.array(self.numbers)
+        step = far / np.where(numbers > 2, arm, 1.0)
+        values, scale = self.values / images, self.scale(arm) / images
+        return ForceConditions(motion, resultant, values, scale, step, tolerance, approach=step * (numbers == 0))
 
     def scale(self, arm: float) -> Float:
         """Return the magnitudes (k,) to which errors are relative: the largest force, and its moment at an arm (mm)."""

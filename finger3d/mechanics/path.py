@@ -32,11 +32,6 @@ class Load:
     share: float
     begins: bool
 
-    @property
-    def is_normal(self) -> bool:
-        """Whether the normal force alone is prescribed."""
-        return bool(np.isnan(self.forces[1:]).all())
-
 
 @dataclass(frozen=True)
 class Station:

@@ -89,32 +89,20 @@ class FiniteStrain:
         move: Move,
         guess: Float | None,
         workspace: FiniteStrainWorkspace,
+        wanted: GeneralisedForces | None = None,
     ) -> ContactSolution[State[DeformedBody]]:
         """Iterate until equilibrium and contact conditions hold in the deformed configuration."""
-        if _moves_too_far(problem, state, move):
+        if wanted is None and _moves_too_far(problem, state, move):
             return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
         increment = self.equations(problem, state, move, workspace)
-        return self.accepted(increment, increment.solve(guess))
-
-    def increment_to_forces(
-        self,
-        problem: Problem,
-        start: tuple[State[DeformedBody], Float | None],
-        move: Move,
-        wanted: GeneralisedForces,
-        workspace: FiniteStrainWorkspace,
-    ) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
-        """Iterate with the pose as an unknown."""
-        state, guess = start
-        plain = self.equations(problem, state, move, workspace)
+        if wanted is None:
+            return self.accepted(increment, increment.solve(guess))
         before = forces_on(problem, state, self.loads(problem, state, move.start).moment, move.start)
-        increment = IncrementToForces(problem, plain.body, state, move, workspace, wanted, before[list(wanted.numbers)])
-        move, solution = increment.solve_to_forces(guess)
-        if not solution.outcome.ok:
-            return move, solution
-        if _moves_too_far(problem, state, move):
-            return move, replace(solution, state=state, outcome=Outcome.PASSED_THROUGH)
-        return move, self._kept_outside(replace(plain, move=move), self._remembered(plain, solution))
+        known = problem, increment.body, state, move, workspace
+        found, solution = IncrementToForces(*known, wanted, before[list(wanted.numbers)]).followed(guess)
+        if solution.outcome.ok and _moves_too_far(problem, state, found.move):
+            return replace(solution, state=state, outcome=Outcome.PASSED_THROUGH)
+        return self.accepted(replace(increment, move=found.move), solution)
 
     def equations(
         self,

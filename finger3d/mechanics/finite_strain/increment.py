@@ -19,7 +19,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.rules import ForceConditions, solve_to_forces
+from finger3d.contact.rules import solve_to_forces
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement
@@ -93,7 +93,7 @@ class FiniteIncrement(IncrementEquations):
 
     def _solved_in_steps(self, guess: Float | None) -> ContactSolution[State[DeformedBody]]:
         patiently, spent = partial(self._iterate, patient=True), 0
-        for attempt in (patiently,) if self._may_snap else (self._followed, patiently):
+        for attempt in (patiently,) if self._may_snap else (self.followed, patiently):
             _, solution = attempt(guess)
             spent += solution.iterations
             if solution.outcome.ok or solution.detail:
@@ -104,7 +104,7 @@ class FiniteIncrement(IncrementEquations):
             detail = cause_of_failure(self.problem, displacement(self.problem.mesh, self.start.body.unknowns))
         return replace(damped, iterations=spent + damped.iterations, detail=detail)
 
-    def _followed(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
+    def followed(self, guess: Float | None) -> tuple[Self, ContactSolution[State[DeformedBody]]]:
         """Iterate to the end of the increment; where that does not converge, roughly to a point halfway to it first.
 
         The solution is that of the whole increment, as the points serve to extrapolate from only.  The increment that
@@ -309,14 +309,6 @@ class IncrementToForces(FiniteIncrement):
     wanted: GeneralisedForces
     before: Float
 
-    def solve_to_forces(self, guess: Float | None) -> tuple[Move, ContactSolution[State[DeformedBody]]]:
-        """Return the motion to the pose that is found near the expected one, and the solution at its end.
-
-        The state of the solution is without internal variables.
-        """
-        increment, solution = self._followed(guess)
-        return increment.move, solution
-
     def _free(self, pose: ObjectPose) -> Float:
         return self.wanted.coordinates(pose)
 
@@ -368,17 +360,10 @@ class IncrementToForces(FiniteIncrement):
             np.array([self.active(-one).ravel() for one in (now.contact.rows @ field).T]).T
             for field in self._fields(now)
         )
-        reach = self.wanted.reach(self._largest_step, self._arm)
-        conditions = ForceConditions(
-            motion=motion,
-            resultant=resultant,
-            forces=self.wanted.values / images,
-            scale=self.wanted.scale(self._arm) / images,
-            reach=reach,
-            tolerance=_EXACT,
-            approach=reach * (np.array(self.wanted.numbers) == 0),
-            turned=turned if turned.size else 0.0,
-        )
+        if turned.size:
+            motion = motion + turned
+        reach = self._largest_step, self._arm
+        conditions = self.wanted.conditions(motion, resultant, images, reach, _EXACT)
         solution, moved, slips = solve_to_forces(self.problem.model.rule, contact, force, conditions)
         solution = self.wanted.checked(solution, now.contact.bases, images, slips)
         end = self.wanted.moved(self.move.end, moved)

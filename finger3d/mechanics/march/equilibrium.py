@@ -134,12 +134,13 @@ class ToForces:
         problem, formulation = self.problem, formulation_of(self.problem.model)
         begin = self._begin(before, move, forces)
         guess = self.guess(begin.end) if before is None else None
-        there, solution = formulation.increment_to_forces(problem, (state, guess), begin, wanted, self.workspace)
+        solution = formulation.increment(problem, state, begin, guess, self.workspace, wanted)
         failed = Advanced(replace(solution, state=state), [], move.start)
         asked = str(wanted)
         if not solution.outcome.ok:
-            self.report.remark(f"{asked} wanted, no solution at a depth of {there.end.depth_mm:.4g} mm")
+            self.report.remark(f"{asked} wanted, no solution near a depth of {begin.end.depth_mm:.4g} mm")
             return failed
+        there = _reached_by(solution)
         reached = self._forces(solution.state, there.end)
         missing = wanted.values - reached[list(wanted.numbers)]
         error, round_off = np.abs(missing / wanted.scale(problem.model.design.height_mm)).max(), self._round_off
@@ -164,6 +165,8 @@ class ToForces:
         depth = move.end.depth_mm
         if now.values[place] <= 0.0 and self.problem.model.finite_strain:
             depth = self._in_small_strain(replace(end, depth_mm=depth), wanted.values[place])
+        elif abs(wanted.values[place] - now.values[place]) <= self._round_off * wanted.size:
+            depth = move.start.depth_mm  # what is held moves nothing
         elif last is not None:
             there = last.move.start.depth_mm, normal_force(self.problem, last.before)
             depth = by_power_law(there, (move.start.depth_mm, now.values[place]), wanted.values[place])
@@ -173,9 +176,8 @@ class ToForces:
         """Return the depth (mm) of a normal force in small strain, without friction."""
         small, like = SmallStrain(), replace(self.problem, model=replace(self.problem.model, friction=Coulomb(0.0)))
         force = GeneralisedForces((0,), np.array([wanted]), wanted)
-        start = small.start(like), None
-        found, _ = small.increment_to_forces(like, start, Move(like.origin, pose), force, small.workspace())
-        return found.end.depth_mm
+        found = small.increment(like, small.start(like), Move(like.origin, pose), None, small.workspace(), force)
+        return _reached_by(found).end.depth_mm if found.outcome.ok else pose.depth_mm
 
     @cached_property
     def _deepest(self) -> float:
@@ -232,6 +234,12 @@ class ToForces:
         missing = wanted.values - self._forces(plain.state, begin.end)[list(wanted.numbers)]
         detail = f"the nearest forces differ by {np.abs(missing).max():.3g} N"
         return replace(found, solution=replace(solution, outcome=Outcome.NOT_HELD, detail=detail))
+
+
+def _reached_by(solution: ContactSolution[State[Any]]) -> Move:
+    """Return the motion of an increment to forces."""
+    assert solution.state.last is not None
+    return solution.state.last[0]
 
 
 def normal_force(problem: Problem, state: State[Any]) -> float:

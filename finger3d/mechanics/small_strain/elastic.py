@@ -17,11 +17,7 @@ from finger3d.mechanics.formulation import Loads, Workspace
 from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import (
-    LinearBody,
-    solve_increment,
-    solve_increment_to_forces,
-)
+from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_increment
 from finger3d.objects import Move, ObjectPose
 
 
@@ -41,23 +37,17 @@ class SmallStrain:
         return State(at_rest(problem), np.zeros_like(problem.surface.points))
 
     def increment(
-        self, problem: Problem, state: State[Float], move: Move, guess: Float | None, workspace: Workspace
+        self,
+        problem: Problem,
+        state: State[Float],
+        move: Move,
+        guess: Float | None,
+        workspace: Workspace,
+        wanted: GeneralisedForces | None = None,
     ) -> ContactSolution[State[Float]]:
         """Solve contact along the normals of the object."""
         body = LinearBody(problem.delassus, np.zeros_like(state.body))
-        return solve_increment(problem, state, move, body, guess, workspace)
-
-    def increment_to_forces(
-        self,
-        problem: Problem,
-        start: tuple[State[Float], Float | None],
-        move: Move,
-        wanted: GeneralisedForces,
-        workspace: Workspace,
-    ) -> tuple[Move, ContactSolution[State[Float]]]:
-        """Solve contact with the pose as an unknown."""
-        body = LinearBody(problem.delassus, np.zeros_like(start[0].body))
-        return solve_increment_to_forces(problem, start, move, body, wanted, workspace)
+        return solve_increment(problem, state, move, body, guess, workspace, wanted)
 
     def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
         """Yield the unknowns from the forces, by one back-substitution for many states."""

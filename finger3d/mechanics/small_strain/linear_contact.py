@@ -19,7 +19,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
-from finger3d.contact.rules import RULES, ForceConditions, solve_to_forces
+from finger3d.contact.rules import RULES, solve_to_forces
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
@@ -83,8 +83,9 @@ def solve_increment(
     body: LinearBody,
     guess: Float | None,
     workspace: Workspace,
+    wanted: GeneralisedForces | None = None,
 ) -> ContactSolution[State[Float]]:
-    """Advance a state as the object moves.
+    """Advance a state as the object moves, or to forces that are wanted.
 
     Returns
     -------
@@ -92,21 +93,9 @@ def solve_increment(
         Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
         directions at the displacement found agree with those that the forces were solved with.
     """
-    return Increment(problem, state, move, body, workspace.tracker).solve(guess)[1]
-
-
-def solve_increment_to_forces(
-    problem: Problem,
-    start: tuple[State[Float], Float | None],
-    move: Move,
-    body: LinearBody,
-    wanted: GeneralisedForces,
-    workspace: Workspace,
-) -> tuple[Move, ContactSolution[State[Float]]]:
-    """Advance a state to prescribed forces; see `finger3d.mechanics.formulations.increment_to_forces`."""
-    state, guess = start
-    increment, solution = IncrementToForces(problem, state, move, body, workspace.tracker, wanted).solve(guess)
-    return increment.move, solution
+    if wanted is None:
+        return Increment(problem, state, move, body, workspace.tracker).solve(guess)
+    return IncrementToForces(problem, state, move, body, workspace.tracker, wanted).solve(guess)
 
 
 def extrapolated(tried: list[Float], results: list[Float]) -> Float:
@@ -147,11 +136,11 @@ class Increment:
 
         return contact_geometry(distance, problem.surface, displacement, problem.axes, object_share)
 
-    def solve(self, guess: Float | None) -> tuple[Self, ContactSolution[State[Float]]]:
-        """Return the increment with the motion that was found, where that is unknown, and the solution at its end."""
+    def solve(self, guess: Float | None) -> ContactSolution[State[Float]]:
+        """Return the solution at the end of the increment, whose motion, where it is unknown, its state has."""
         problem, state, body, increment = self.problem, self.state, self.body, self
         if self._moves_too_far:
-            return self, ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
+            return ContactSolution(state, Outcome.PASSED_THROUGH, np.inf, 0, "none")
         flat = problem.model.object.is_flat
         expansion_point = np.zeros_like(body.past)
         if not flat:
@@ -168,7 +157,7 @@ class Increment:
             increment, solution = before.solve_linearised(geometry, expansion_point, start)
             spent += solution.iterations
             if not (solution.outcome.ok or solution.outcome.is_cycle):
-                return self, replace(solution.with_state(state), iterations=spent)
+                return replace(solution.with_state(state), iterations=spent)
             start = solution.state.force
             displacement, apart = body.displacement(start, geometry.bases), increment.distance_from(before)
             if flat or solution.outcome.is_cycle:
@@ -197,7 +186,7 @@ class Increment:
                 following = increment.geometry(expansion_point)
             geometry = following.holding(held, geometry)
         if error > TOLERANCE:
-            return self, ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
+            return ContactSolution(state, Outcome.NO_CONVERGENCE, float(error), spent, "none")
         gap = None
         if not (flat and increment is self):
             gap = increment.geometry(displacement, np.inf).holding(held, geometry).gap
@@ -205,9 +194,8 @@ class Increment:
         through = passes_through(problem, increment.move, state.body, displacement, state.contact.gap)
         through |= increment is not self and increment._moves_too_far
         if through or pulls(problem, state.contact, after_state.contact, increment.move):
-            return self, ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
-        found = replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
-        return increment, found
+            return ContactSolution(state, Outcome.PASSED_THROUGH, float(error), spent, "none")
+        return replace(solution.with_state(after_state), residual=max(solution.residual, error), iterations=spent)
 
     @property
     def _moves_too_far(self) -> bool:
@@ -319,16 +307,7 @@ class IncrementToForces(Increment):
             -np.einsum("cak,ckj->caj", bases, field(problem, end, at, wanted.numbers)).reshape(size)
             for field in (motions, resultants)
         )
-        reach = wanted.reach(far, arm)
-        conditions = ForceConditions(
-            motion=motion,
-            resultant=resultant,
-            forces=wanted.values / images,
-            scale=wanted.scale(arm) / images,
-            reach=reach,
-            tolerance=_EXACT,
-            approach=reach * (np.array(wanted.numbers) == 0),
-        )
+        conditions = wanted.conditions(motion, resultant, images, (far, arm), _EXACT)
         solution, moved, slips = solve_to_forces(problem.model.rule, contact, guess, conditions)
         solution = wanted.checked(solution, bases, images, slips)
         return replace(self, move=Move(self.move.start, wanted.moved(end, moved))), solution

@@ -13,7 +13,7 @@ displacement in place of f_e: one factorisation of K_b + alpha K_s for each leng
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.readings.columns import Column, of_kind
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import at_rest, linear_gap, linear_loads
-from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_increment, solve_increment_to_forces
+from finger3d.mechanics.small_strain.linear_contact import LinearBody, solve_increment
 from finger3d.mechanics.small_strain.viscoelastic_body import (
     ConstantBulkModulus,
     ConstantPoissonRatio,
@@ -82,49 +82,19 @@ class Viscoelastic:
         move: Move,
         guess: Float | None,
         workspace: RelaxationWorkspace,
+        wanted: GeneralisedForces | None = None,
     ) -> ContactSolution[State[ViscousBody]]:
         """Apply the contact rule once, with the compliance for this time step and the displacement due to the past."""
-
-        def solved(before: State[Float], linear: LinearBody) -> tuple[Move, ContactSolution[State[Float]]]:
-            return move, solve_increment(problem, before, move, linear, guess, workspace)
-
-        return self._remembered(problem, state, move.duration_s, solved, workspace)[1]
-
-    def increment_to_forces(
-        self,
-        problem: Problem,
-        start: tuple[State[ViscousBody], Float | None],
-        move: Move,
-        wanted: GeneralisedForces,
-        workspace: RelaxationWorkspace,
-    ) -> tuple[Move, ContactSolution[State[ViscousBody]]]:
-        """Do the same with the pose as an unknown."""
-        state, guess = start
-
-        def solved(before: State[Float], linear: LinearBody) -> tuple[Move, ContactSolution[State[Float]]]:
-            return solve_increment_to_forces(problem, (before, guess), move, linear, wanted, workspace)
-
-        return self._remembered(problem, state, move.duration_s, solved, workspace)
-
-    def _remembered(
-        self,
-        problem: Problem,
-        state: State[ViscousBody],
-        duration_s: float,
-        solved: Callable[[State[Float], LinearBody], tuple[Move, ContactSolution[State[Float]]]],
-        workspace: RelaxationWorkspace,
-    ) -> tuple[Move, ContactSolution[State[ViscousBody]]]:
-        """Return the motion and the solution of an increment, with the internal variables at its end."""
-        memory, step = state.body.memory, Step(self.relaxation.prony, duration_s)
+        memory, step = state.body.memory, Step(self.relaxation.prony, move.duration_s)
         body, linear = self.respond(problem, memory, step, workspace)
         before = State(state.contact, state.body.displacement, state.last)
-        move, solution = solved(before, linear)
+        solution = solve_increment(problem, before, move, linear, guess, workspace, wanted)
         if solution.state is before:
-            return move, solution.with_state(state)
+            return solution.with_state(state)
         contact = problem.row_forces(problem.upright_force(solution.state.contact))
         rows = problem.inclusions.with_spring_forces(body.compliance, contact, body.moved)
         after = ViscousBody(solution.state.body, step.after(memory, body.shape(rows)))
-        return move, solution.with_state(State(solution.state.contact, after, solution.state.last))
+        return solution.with_state(State(solution.state.contact, after, solution.state.last))
 
     def respond(
         self, problem: Problem, memory: InternalVariables, step: Step, workspace: RelaxationWorkspace
