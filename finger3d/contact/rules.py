@@ -120,17 +120,22 @@ class ForceConditions:
         changes = [system.active.force(system.solve(-system.active.weighted(problem, one))) for one in moved]
         return -self.resultant.T @ np.array(changes).reshape(len(moved), -1).T
 
-    def step(self, stiffness: Float, missing: Float) -> tuple[Float, bool]:
-        """Return the step (k,) of Newton's method, and whether no step leads to the forces: the whole contact slips."""
+    def step(self, stiffness: Float, missing: Float) -> tuple[Float, Float | None]:
+        """Return the step (k,) of Newton's method, and the forces (k,), over their magnitudes, to which none leads.
+
+        There are such forces, with the motion of the same coordinates, where the whole contact slips.
+        """
         relative, wanted = stiffness * self.reach / self.scale[:, None], missing / self.scale
         step = np.linalg.lstsq(relative, wanted, rcond=_SINGULAR)[0]
-        slips = bool(np.linalg.norm(wanted - relative @ step) > _UNREACHED * np.linalg.norm(wanted))
-        return np.asarray(self.reach * step / max(1.0, float(np.abs(step).max(initial=0.0)))), slips
+        lacking = wanted - relative @ step
+        slips = np.linalg.norm(lacking) > _UNREACHED * np.linalg.norm(wanted)
+        step = self.reach * step / max(1.0, float(np.abs(step).max(initial=0.0)))
+        return np.asarray(step), np.asarray(lacking) if slips else None
 
 
 def solve_to_forces(
     rule: RuleName, problem: ContactProblem, guess: Float | None, conditions: ForceConditions
-) -> tuple[ContactSolution[ContactState], Float, bool]:
+) -> tuple[ContactSolution[ContactState], Float, Float | None]:
     """Solve one increment, with the object moved by Newton's method until the forces meet conditions.
 
     A step that does not lower the error is halved.  The search ends early: at a hundredth of the first error, or after
@@ -140,9 +145,9 @@ def solve_to_forces(
     -------
     solution : of the increment
     moved : (k,) by how much the object is moved
-    slips : whether no motion leads to the forces
+    lacking : (k,) forces over their magnitudes to which no motion leads, if there are any
     """
-    slips = False
+    lacking = None
     best: tuple[float, Float, ContactSolution[ContactState]] | None = None
     moved, step, allowed, spent = np.zeros(len(conditions.forces)), np.zeros(len(conditions.forces)), 0.0, 0
     for _ in range(_SOLUTIONS):
@@ -151,7 +156,7 @@ def solve_to_forces(
         solution = RULES[rule](there, guess)
         spent += solution.iterations
         if not solution.outcome.ok and best is None:
-            return solution, moved, slips
+            return solution, moved, lacking
         missing = conditions.missing(solution.state.force)
         error = float(np.abs(missing / conditions.scale).max()) if solution.outcome.ok else np.inf
         touches = bool(solution.state.force.any())
@@ -173,9 +178,9 @@ def solve_to_forces(
                 stiffness = conditions.stiffness(there, solution.state, gaps)
             except np.linalg.LinAlgError:
                 break
-            step, slips = conditions.step(stiffness, missing)
-            if slips:
+            step, lacking = conditions.step(stiffness, missing)
+            if lacking is not None:
                 break
         moved = moved + step
     assert best is not None
-    return replace(best[2], iterations=spent), best[1], slips
+    return replace(best[2], iterations=spent), best[1], lacking

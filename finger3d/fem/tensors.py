@@ -58,14 +58,22 @@ def turned_towards(mean: Float, own: Float, share: Float) -> Float:
     return np.asarray((1.0 - share[:, None]) * mean - share[:, None] * size * own / own_size)
 
 
-def bases_of(normal: Float) -> Float:
+_FACES_DOWN = -0.5
+"""Component along y of a surface's normal below which the surface faces down."""
+
+
+def bases_of(normal: Float, surface: Float | None = None) -> Float:
     """Return orthonormal bases (c, d, d) with unit normals (c, d), turned from that of an upright object the short way.
 
-    The normal of an upright object is -y, and its tangents are x and z.
+    The normal of an upright object is -y, and its tangents are x and z.  On a surface that faces down, by its normals
+    (c, d) at rest, they are the mirror images of those on one that faces up.
     """
     d = normal.shape[1]
     n = np.zeros((len(normal), 3))
     n[:, :d] = normal
+    if surface is not None and (down := surface[:, 1] < _FACES_DOWN).any():
+        flip = np.where(down[:, None], np.array([1.0, -1.0, 1.0])[:d], 1.0)
+        return np.asarray(bases_of(normal * flip) * flip[:, None, :])
     # Rodrigues' formula for the rotation that takes -y to n
     cosine = -n[:, 1]
     half = np.maximum(1.0 + cosine, 0.0)

@@ -61,6 +61,11 @@ class Loads(NamedTuple):
         products[: self.force.shape[1], : self.force.shape[1]] = self.places.T @ self.force
         return np.array([products[i, j] - products[j, i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
+    @property
+    def forces(self) -> tuple[Float, Float]:
+        """Places and forces."""
+        return self.places, self.force
+
     def work_from(self, before: Loads) -> float:
         """Work (mJ) since other loads of the same points, by the trapezoidal rule."""
         return float(np.sum(0.5 * (before.force + self.force) * (self.displacement - before.displacement)))

@@ -1,15 +1,15 @@
 """Generalised coordinates of a rigid object, and the generalised forces that do work with them.
 
-The coordinates are the depth, the slides along x and z and the turns about x, y and z; with them go the normal force,
-the forces along x and z that are applied to the object, and the moments about its reference point.  In equilibrium the
-forces applied to the object are those of the contact on the finger.
+The coordinates are the depth, the slides along x and z, the turns about x, y and z, and the rise of an object between
+two fingers; with them go the normal force, the forces along x and z that are applied to the object, the moments about
+its reference point, and the force along y.  In equilibrium the forces applied to the object are those of the contact on
+the finger.  Between two fingers the normal force is the sum of both.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
 import numpy as np
 
 from finger3d._types import Float
@@ -18,16 +18,22 @@ from finger3d.contact.rules import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose
 from finger3d.objects.rigid import rotation
 
-_PLACES = np.array([0, 1, 2, 4, 5, 6])
+_PLACES = np.array([0, 1, 2, 4, 5, 6, 7])
 """Places of the coordinates among those of an `ObjectPose`."""
 
-_DIRECTIONS = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-"""Motion of the object by the first three coordinates."""
+COORDINATES = range(len(_PLACES))
 
+_DIRECTIONS = {0: (0.0, -1.0, 0.0), 1: (1.0, 0.0, 0.0), 2: (0.0, 0.0, 1.0), 6: (0.0, 1.0, 0.0)}
+"""Motion of the object by the coordinates that do not turn it."""
+
+_ACROSS = {"x": (1, 4, 5), "z": (2, 3, 4)}
+"""Coordinates whose forces change sign at a symmetry plane."""
+
+_MOTIONS = "closes", "slides along x", "slides along z", "turns about x", "turns about y", "turns about z", "moves along y"
+"""What the object does as a coordinate changes."""
 
 _AT_LIMIT = 1e-9
 """Relative distance from the largest force that friction transmits at which it counts as reached."""
@@ -42,7 +48,7 @@ class GeneralisedForces:
 
     Attributes
     ----------
-    numbers : (k,) of the free coordinates, among depth, slides along x, z and turns about x, y, z
+    numbers : (k,) of the free coordinates, among depth, slides along x, z, turns about x, y, z, and rise
     values : (k,) N and N mm, on the whole finger
     size : largest of all forces that act, N, to which errors are relative
     asked : normal and tangential force at the end of the leg, N
@@ -54,7 +60,7 @@ class GeneralisedForces:
     asked: tuple[float, float] = (0.0, 0.0)
 
     def __str__(self) -> str:
-        units = ("N" if number < 3 else "N mm" for number in self.numbers)
+        units = ("N" if number in _DIRECTIONS else "N mm" for number in self.numbers)
         return ", ".join(f"{value:.5g} {unit}" for value, unit in zip(self.values, units, strict=True))
 
     def coordinates(self, pose: ObjectPose) -> Float:
@@ -80,17 +86,21 @@ class GeneralisedForces:
         images : number of mirror images of the part that make up the whole finger
         reach : mm, largest motion of a point in an iteration, and its arm about the axes of the turns
         """
-        (far, arm), numbers = reach, np.array(self.numbers)
-        step = far / np.where(numbers > 2, arm, 1.0)
+        far, arm = reach
+        step = far / self._arms(arm)
         values, scale = self.values / images, self.scale(arm) / images
-        return ForceConditions(motion, resultant, values, scale, step, tolerance, approach=step * (numbers == 0))
+        approach = step * (np.array(self.numbers) == 0)
+        return ForceConditions(motion, resultant, values, scale, step, tolerance, approach)
 
     def scale(self, arm: float) -> Float:
         """Return the magnitudes (k,) to which errors are relative: the largest force, and its moment at an arm (mm)."""
-        return self.size * np.where(np.array(self.numbers) > 2, arm, 1.0)
+        return self.size * self._arms(arm)
+
+    def _arms(self, arm: float) -> Float:
+        return np.array([1.0 if number in _DIRECTIONS else arm for number in self.numbers])
 
     def checked(
-        self, solution: ContactSolution[ContactState], bases: Float, images: float, slips: bool
+        self, solution: ContactSolution[ContactState], bases: Float, images: float, lacking: Float | None
     ) -> ContactSolution[ContactState]:
         """Return a solution of contact, as not held if all of it slips and cannot transmit the tangential forces.
 
@@ -98,19 +108,23 @@ class GeneralisedForces:
         ----------
         bases : (c, d, d) directions of the points
         images : number of mirror images of the points that make up the whole finger
-        slips : whether no motion leads to the forces
+        lacking : (k,) forces over their magnitudes to which no motion leads, if there are any
         """
         status = solution.state.status
         if not solution.outcome.ok or (status == STICK).any() or not (status == SLIP).any():
             return solution
-        detail = self._slips_under(solution.state.force, bases, images, slips)
+        if 6 in self.numbers:  # between two fingers
+            motion = None if lacking is None else _MOTIONS[self.numbers[int(np.abs(lacking).argmax())]]
+            detail = f"the object {motion}" if motion else ""
+        else:
+            detail = self._slips_under(solution.state.force, bases, images, lacking is not None)
         return replace(solution, outcome=Outcome.SLIPS, detail=detail) if detail else solution
 
     def _slips_under(self, force: Float, bases: Float, images: float, slips: bool) -> str:
         """Say how much a contact with forces (c, d) N holds that slips as a whole; nothing if that is enough."""
         wanted = np.zeros(3)
         for number, value in zip(self.numbers, self.values, strict=True):
-            wanted += value * _DIRECTIONS[number] if number in (1, 2) else 0.0
+            wanted += value * np.array(_DIRECTIONS[number]) if number in (1, 2) else 0.0
         now = float(np.linalg.norm(wanted))
         asked = self.asked[1]
         if not now or not asked:
@@ -130,39 +144,45 @@ class GeneralisedForces:
 
 
 def reference_point(problem: Problem, pose: ObjectPose) -> Float:
-    """Return the point (3,) mm about which the object turns."""
-    obj = problem.model.object
-    return np.array([obj.x_mm, problem.system.first_contact_mm, obj.z_mm]) + pose.displacement
+    """Return the point (3,) mm about which the object turns: between two fingers its centre of mass."""
+    obj, second = problem.model.object, problem.system.second
+    first = np.array([obj.x_mm, problem.system.first_contact_mm, obj.z_mm]) if second is None else second.centre
+    return np.asarray(first + pose.displacement)
 
 
-def motions(problem: Problem, pose: ObjectPose, points: Float, numbers: tuple[int, ...]) -> Float:
+def motions(problem: Problem, pose: ObjectPose, points: Float, numbers: Sequence[int]) -> Float:
     """Return the displacement (n, d, k) of the object's material at points (n, d) by each coordinate."""
     last = rotation(0.0, 0.0, pose.turn_z)
     axes = np.array([rotation(0.0, pose.turn_y, pose.turn_z)[:, 0], last[:, 1], [0.0, 0.0, 1.0]])
-    return _fields(reference_point(problem, pose), points, numbers, axes)
+    return _fields(problem, pose, points, numbers, axes)
 
 
-def resultants(problem: Problem, pose: ObjectPose, points: Float, numbers: tuple[int, ...]) -> Float:
+def resultants(problem: Problem, pose: ObjectPose, points: Float, numbers: Sequence[int]) -> Float:
     """Return the fields v (n, d, k) by which forces f (n, d) at points (n, d) have the generalised forces sum(f v)."""
-    return _fields(reference_point(problem, pose), points, numbers, np.eye(3))
+    return _fields(problem, pose, points, numbers, np.eye(3))
 
 
-def _fields(reference: Float, points: Float, numbers: tuple[int, ...], axes: Float) -> Float:
-    d = points.shape[1]
+def _fields(problem: Problem, pose: ObjectPose, points: Float, numbers: Sequence[int], axes: Float) -> Float:
+    """Return the motions of points (n, d) in a body that turns about axes (3, 3) through its reference point."""
+    d, placed = points.shape[1], problem.placed(pose)
     arm = np.zeros((len(points), 3))
-    arm[:, :d] = points
-    arm -= reference
-    found = [np.broadcast_to(_DIRECTIONS[j], arm.shape) if j < 3 else np.cross(axes[j - 3], arm) for j in numbers]
+    arm[:, :d] = placed.brought_together(points)
+    arm -= reference_point(problem, pose)
+    found = [np.tile(_DIRECTIONS[j], (len(arm), 1)) if j in _DIRECTIONS else np.cross(axes[j - 3], arm) for j in numbers]
+    if placed.second is not None and 0 in numbers:  # which closes from the other side
+        found[list(numbers).index(0)][placed.of_second(points)] *= -1.0
     return np.stack(found, axis=2)[:, :d]
 
 
-def forces_on(problem: Problem, state: State[Any], moment: Float, pose: ObjectPose) -> Float:
-    """Return the generalised forces (6,), N and N mm, of the contact on the whole finger.
+def forces_on(problem: Problem, loads: tuple[Float, Float], pose: ObjectPose) -> Float:
+    """Return the generalised forces (7,), N and N mm, of the contact on the whole finger.
 
     Parameters
     ----------
-    moment : (3,) N mm, of the contact on the part about the middle of the base
+    loads : places (n, d) mm of the contact forces on the part, and these (n, d) N
     """
-    force = problem.world_force(state.contact).sum(axis=0)
-    moment = problem.symmetry.total_moment(moment) - np.cross(reference_point(problem, pose), force)
-    return np.array([0.0 - force[1], force[0], force[2], *moment])
+    places, force = loads
+    values = np.einsum("nk,nkj->j", force, resultants(problem, pose, places, COORDINATES))
+    for axis in problem.axes:
+        values *= np.where(np.isin(COORDINATES, _ACROSS[axis]), 0.0, 2.0)
+    return np.asarray(values)

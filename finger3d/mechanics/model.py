@@ -41,7 +41,8 @@ class Leg:
     With a `force_N` the increments are equal in the normal force, which determines the depth; `depth_mm` is a forecast.
     Likewise `force_x_N` and `force_z_N`, the forces applied to the object along x and z, determine the slides, and
     `moment_x_Nmm`, `moment_y_Nmm` and `moment_z_Nmm`, about its reference point, the turns.  In equilibrium they are
-    those of the contact force on the finger.
+    those of the contact force on the finger.  Between two fingers `force_N` is the sum of both normal forces, and
+    `force_y_N` the force on the object from one towards the other.
 
     With ``steps = "auto"`` their number is chosen by the estimated error (`finger3d.mechanics.march.step_halving`).
     This is the default of a scene; a leg made in Python has 10.  `turn_x`, `turn_y` and `turn_z` are in radians; a
@@ -62,12 +63,13 @@ class Leg:
     moment_x_Nmm: float | None = None
     moment_y_Nmm: float | None = None
     moment_z_Nmm: float | None = None
+    force_y_N: float | None = None
 
     @property
     def forces(self) -> tuple[float | None, ...]:
-        """Normal force, forces along x and z (N) and moments (N mm) in place of depth, slides and turns, or None."""
+        """Forces (N) and moments (N mm) in place of depth, slides, turns and rise, or None where none is prescribed."""
         moments = self.moment_x_Nmm, self.moment_y_Nmm, self.moment_z_Nmm
-        return self.force_N, self.force_x_N, self.force_z_N, *moments
+        return self.force_N, self.force_x_N, self.force_z_N, *moments, self.force_y_N
 
     @property
     def is_under_force(self) -> bool:
@@ -78,7 +80,7 @@ class Leg:
     def moves_sideways(self) -> bool:
         """Whether the object is slid or turned at its end."""
         moved = self.slide_x_mm, self.slide_z_mm, self.turn_x, self.turn_y, self.turn_z
-        return any(moved) or any(force is not None for force in self.forces[1:])
+        return any(moved) or any(force is not None for force in self.forces[1:6])
 
     def end(self, start: ObjectPose) -> ObjectPose:
         """Return the pose at the end of the leg, which begins at `start`."""
@@ -153,6 +155,7 @@ class Model:
     object_compliance : material of an elastic object; None if it is rigid
     held_ends : both end faces held in z (plane strain realised in 3D; Python only)
     symmetry : symmetry planes that are used, "x" and "z"; None determines them
+    centre_of_mass_mm : of an object held between two fingers, from its middle; None: one finger presses the object
     parts : label and material of every solid of the design whose material is another
     filled : slots that an effect has set, as pairs (slot, effect)
     warnings : entries of the summary
@@ -176,6 +179,7 @@ class Model:
     rule: RuleName = "projection"
     held_ends: bool = False
     symmetry: tuple[str, ...] | None = None
+    centre_of_mass_mm: tuple[float, float, float] | None = None
     parts: tuple[tuple[str, Material], ...] = ()
     filled: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()

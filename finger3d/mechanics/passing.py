@@ -107,6 +107,7 @@ def pulls(problem: Problem, before: ContactState, after: ContactState, move: Mov
     moved = move.end.displacement - move.start.displacement
     if (
         thing.is_flat
+        or problem.system.second is not None
         or not thing.is_convex
         or move.start.turns != move.end.turns
         or moved[0]

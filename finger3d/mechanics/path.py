@@ -22,7 +22,7 @@ class Load:
 
     Attributes
     ----------
-    forces : (6,) N and N mm at the end of the leg, as `finger3d.mechanics.generalised.forces_on`; NaN where none is
+    forces : (7,) N and N mm at the end of the leg, as `finger3d.mechanics.generalised.forces_on`; NaN where none is
         prescribed
     share : of the way to them from the forces at the start of the leg
     begins : whether the increment is the first of its leg

@@ -278,7 +278,7 @@ def _no_side(way: ContactPath, first_contact_mm: float) -> None:
     before = ObjectPose(0.0)
     for pose in way.poses:
         change = pose.coordinates - before.coordinates
-        stride = math.hypot(change[1], change[2]) + reach * float(np.abs(change[4:]).sum())
+        stride = math.hypot(change[1], change[2]) + reach * float(np.abs(change[4:7]).sum())
         count = max(1, math.ceil(_STRIDES * stride / way.half_length_mm))
         over = None
         for fraction in np.linspace(0.0, 1.0, count + 1) if stride else ():

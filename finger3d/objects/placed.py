@@ -11,6 +11,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.geometry.surface import Triangles
@@ -29,7 +30,9 @@ _SAME = 0.1
 class ObjectPose:
     """Pose of the object: depth, slides along x and z, and turns (rad) about its reference point, at a time (s).
 
-    It is turned about x, then y, then z, all fixed axes, from its orientation at the start.
+    It is turned about x, then y, then z, all fixed axes, from its orientation at the start.  Between two fingers the
+    depth is the distance by which each of them has closed, and `rise_mm` how far the object has moved from the middle
+    between them towards the second one.
     """
 
     depth_mm: float
@@ -39,11 +42,12 @@ class ObjectPose:
     turn_x: float = 0.0
     turn_y: float = 0.0
     turn_z: float = 0.0
+    rise_mm: float = 0.0
 
     @property
     def displacement(self) -> Float:
         """Displacement (3,) mm of the reference point along x, y and z since first touch."""
-        return np.array([self.slide_x_mm, -self.depth_mm, self.slide_z_mm])
+        return np.array([self.slide_x_mm, self.rise_mm - self.depth_mm, self.slide_z_mm])
 
     @property
     def turns(self) -> tuple[float, float, float]:
@@ -62,8 +66,8 @@ class ObjectPose:
 
     @property
     def coordinates(self) -> Float:
-        """Depth and slides (mm), time (s) and turns (rad): array (7,)."""
-        return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s, *self.turns])
+        """Depth and slides (mm), time (s), turns (rad) and rise (mm): array (8,)."""
+        return np.array([self.depth_mm, self.slide_x_mm, self.slide_z_mm, self.time_s, *self.turns, self.rise_mm])
 
     def changed(self, numbers: Sequence[int] | Int, change: Sequence[float] | Float) -> ObjectPose:
         """Return the pose with some of its `coordinates` changed."""
@@ -81,7 +85,7 @@ class Move:
 
     @property
     def change(self) -> Float:
-        """Change of the coordinates: array (7,)."""
+        """Change of the coordinates: array (8,)."""
         return self.end.coordinates - self.start.coordinates
 
     @property
@@ -130,6 +134,27 @@ _LOWEST_START = 1e7
 
 
 @dataclass(frozen=True)
+class SecondFinger:
+    """A second finger that faces the first one across the object, as its mirror image at a horizontal plane.
+
+    It comes down as the fingers close, while its points are told where they are at rest.
+
+    Attributes
+    ----------
+    above_mm : height above which points belong to it
+    lowered_mm : by which it has come down at first touch
+    centre : (3,) mm, place at first touch of the object's centre of mass, about which the object turns
+    """
+
+    above_mm: float
+    lowered_mm: float
+    centre: Float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+
+@dataclass(frozen=True)
 class PlacedObject:
     """A rigid object in a pose.
 
@@ -138,29 +163,52 @@ class PlacedObject:
     object : RigidObject
     turned : (3, 3) rotation of the object's own coordinates, that of its initial pose included
     place : (3,) mm, where the origin of its own coordinates is
+    second : the finger that faces the first one, as far down as it is; None without it
     """
 
     object: RigidObject
     turned: Float
     place: Float
+    second: SecondFinger | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
     @classmethod
-    def of(cls, obj: RigidObject, first_contact_mm: float, pose: ObjectPose | None = None) -> PlacedObject:
+    def of(
+        cls,
+        obj: RigidObject,
+        first_contact_mm: float,
+        pose: ObjectPose | None = None,
+        second: SecondFinger | None = None,
+    ) -> PlacedObject:
         """Return an object in a pose.
 
         Parameters
         ----------
         first_contact_mm : height of its lowest point at first touch
         pose : since first touch; that of first touch unless given
+        second : the finger that faces the first one at first touch, if there is one
         """
         pose = pose or ObjectPose(0.0)
         initial = obj.initial_rotation
         turned = pose.turn @ initial if pose.is_turned else initial
-        reference = np.array([obj.x_mm, first_contact_mm, obj.z_mm]) + pose.displacement
-        return cls(obj, turned, reference - turned @ obj.lowest_point(initial))
+        lowest = np.array([obj.x_mm, first_contact_mm, obj.z_mm])
+        if second is None:
+            return cls(obj, turned, lowest + pose.displacement - turned @ obj.lowest_point(initial))
+        place = second.centre + pose.displacement - pose.turn @ (second.centre - lowest + initial @ obj.lowest_point(initial))
+        down = replace(second, lowered_mm=second.lowered_mm + 2.0 * pose.depth_mm)
+        return cls(obj, turned, place, down)
+
+    def of_second(self, points: Float) -> NDArray[np.bool_]:
+        """Return which points (n, d) belong to the second finger."""
+        return points[:, 1] > (np.inf if self.second is None else self.second.above_mm)
+
+    def brought_together(self, points: Float) -> Float:
+        """Return points (n, d) with those of the second finger where it has come down to."""
+        if self.second is None:
+            return points
+        return points - np.outer(self.of_second(points), self.second.lowered_mm * np.eye(points.shape[1])[1])
 
     @property
     def is_upright(self) -> bool:
@@ -169,6 +217,7 @@ class PlacedObject:
 
     def to_own(self, points: Float) -> Float:
         """Return points (n, 3) in the object's own coordinates."""
+        points = self.brought_together(points)
         return (points - self.place) if self.is_upright else (points - self.place) @ self.turned
 
     def to_scene(self, points: Float) -> Float:
@@ -247,7 +296,11 @@ class PlacedObject:
 
     def moved_from(self, before: PlacedObject, points: Float) -> Float:
         """Return how far (n, 3) mm the object's material at points (n, 3) has moved since a pose before."""
-        return points - before.to_scene(self.to_own(points))
+        now = self.brought_together(points)
+        moved = now - before.to_scene(self.to_own(points))
+        if self.second is not None and before.second is not None:  # as seen from its finger, which has come down
+            moved[self.of_second(points), 1] += self.second.lowered_mm - before.second.lowered_mm
+        return moved
 
     def mirrors(self) -> tuple[str, ...]:
         """Return the axes, "x" and "z", along which the object is its own mirror image about the finger's middle."""

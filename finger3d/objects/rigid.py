@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -171,6 +171,20 @@ class RigidObject(ABC):
         It is the reference point for a body that then extends downwards without end.
         """
         return np.zeros(3)
+
+    @property
+    def highest_point(self) -> Float:
+        """The point (3,) mm, in own coordinates, that is highest at the start."""
+        return self.lowest_point(np.diag([1.0, -1.0, -1.0]) @ self.initial_rotation)
+
+    @property
+    def middle(self) -> Float:
+        """The middle (3,) mm of a closed body, in own coordinates."""
+        return 0.5 * (self.lowest_point(np.eye(3)) + self.lowest_point(np.diag([1.0, -1.0, -1.0])))
+
+    def mirrored(self, x_mm: float, z_mm: float) -> Self:
+        """Return the mirror image at a horizontal plane, with its lowest point at another place."""
+        return replace(self, x_mm=x_mm, z_mm=z_mm, turn_x=-self.turn_x, turn_z=-self.turn_z)
 
     def probes(self) -> Float:
         """Return points (k, 3) mm, in own coordinates, at which mirror images are compared."""

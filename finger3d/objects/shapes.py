@@ -16,6 +16,9 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.rigid import CROSSWISE, DRAWN, Axis, Detail, HeldBody, Prism, RigidObject, sheet
 
+_LEVEL = 1e-12
+"""Sine of an angle below which an edge or a face is level."""
+
 
 @dataclass(frozen=True)
 class Plane(RigidObject):
@@ -60,20 +63,47 @@ class Cylinder(Prism):
     ----------
     radius_mm : radius
     axis : direction of the cylinder's line
+    length_mm : of a closed cylinder; endless unless given
     """
 
     is_face: ClassVar[bool] = False
 
     radius_mm: Length = field(kw_only=True)
     axis: Axis = field(default="z", kw_only=True)
+    length_mm: Length | None = field(default=None, kw_only=True)
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the distance in the section across the axis, and beyond the flat ends of a closed cylinder."""
+        side, gradient = super().distance(points)
+        if self.length_mm is None:
+            return side, gradient
+        along = points @ self.direction
+        end = np.abs(along) - 0.5 * self.length_mm
+        outward = np.sign(along)[:, None] * self.direction
+        beside_rim, beyond = (side > 0.0) & (end > 0.0), end > side
+        value, to_rim = np.where(beyond, end, side), np.hypot(side, end)
+        value[beside_rim] = to_rim[beside_rim]
+        normal = np.where(beyond[:, None], outward, gradient)
+        both = side[:, None] * gradient + end[:, None] * outward
+        normal[beside_rim] = both[beside_rim] / to_rim[beside_rim, None]
+        return value, normal
+
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height of the section; nan beyond the ends."""
+        along = x if self.axis == "x" else z
+        return np.where(np.abs(along) <= 0.5 * (self.length_mm or np.inf), super().profile(x, z), np.nan)
 
     def section_distance(self, r: Float, y: Float) -> tuple[Float, Float, Float]:
         """Return the distance to a circle."""
         return _circle_distance(r, y, self.radius_mm)
 
     def mean_chord(self, direction: Float) -> float:
-        """Return the mean chord of a circle, lengthened by the angle to the axis."""
-        across = math.sqrt(max(1.0 - float(direction @ self.direction) ** 2, 0.0))
+        """Return the mean chord of a circle, lengthened by the angle to the axis, or that of a closed cylinder."""
+        along = abs(float(direction @ self.direction))
+        across = math.sqrt(max(1.0 - along**2, 0.0))
+        if self.length_mm is not None:
+            disc = math.pi * self.radius_mm**2
+            return disc * self.length_mm / (2.0 * self.radius_mm * self.length_mm * across + disc * along)
         return 0.5 * math.pi * self.radius_mm / across if across > 0.0 else math.inf
 
     def section_profile(self, r: Float) -> Float:
@@ -81,8 +111,17 @@ class Cylinder(Prism):
         return _arc(r, self.radius_mm)
 
     def lowest_point(self, turned: Float) -> Float:
-        """Return the point of the circle that is lowest, if the axis is horizontal."""
-        return _lowest_of_sphere(turned, self.radius_mm) if self.is_level(turned) else np.zeros(3)
+        """Return the point of the circle that is lowest, if the axis is horizontal, or that of a closed cylinder."""
+        if self.is_level(turned):
+            return _lowest_of_sphere(turned, self.radius_mm)
+        if self.length_mm is None:
+            return np.zeros(3)
+        down = -turned[1]
+        along = float(down @ self.direction)
+        across = down - along * self.direction
+        rim = np.linalg.norm(across)
+        side = across * (self.radius_mm / rim if rim > _LEVEL else 0.0)
+        return np.asarray([0.0, self.radius_mm, 0.0] + side + math.copysign(0.5 * self.length_mm, along) * self.direction)
 
     @property
     def detail(self) -> Detail:
@@ -102,9 +141,17 @@ class Cylinder(Prism):
         return HeldBody(design=along_x, turn=CROSSWISE, place=np.array([0.0, 0.0, self.z_mm]))
 
     def drawing(self, reach_mm: float) -> Triangles:
-        """Return the mantle, all around if its radius is within the reach."""
+        """Return the mantle, all around if its radius is within the reach, and the ends of a closed cylinder."""
         polar = _polar(self.radius_mm, reach_mm)
-        return self._swept(self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar)), reach_mm)
+        r, y = self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar))
+        if self.length_mm is None:
+            return self._swept(r, y, reach_mm)
+        half = 0.5 * self.length_mm
+        shares = np.array([0.0, 1.0, 1.0, 0.0])[:, None]  # of the radius, from the middle of an end to that of the other
+        level = self.radius_mm + shares * (y - self.radius_mm)
+        along = np.broadcast_to(np.array([-half, -half, half, half])[:, None], level.shape)
+        ring = np.stack([shares * r, level, along], axis=-1)
+        return sheet(ring[::-1] if self.axis == "z" else ring[..., ::-1])
 
 
 @dataclass(frozen=True)
@@ -165,6 +212,84 @@ class Sphere(RigidObject):
         r, y = self.radius_mm * np.sin(polar), self.radius_mm * (1.0 - np.cos(polar))
         level = np.broadcast_to(y[:, None], (len(polar), len(turn)))
         return sheet(np.stack([np.outer(r, np.cos(turn)), level, np.outer(r, np.sin(turn))], axis=-1))
+
+
+@dataclass(frozen=True)
+class Box(RigidObject):
+    """A box, with its lowest face at the bottom.
+
+    Attributes
+    ----------
+    size_mm : lengths along x, y and z
+    """
+
+    is_face: ClassVar[bool] = False
+
+    size_mm: tuple[Length, Length, Length] = field(kw_only=True)
+
+    @property
+    def _half(self) -> Float:
+        return 0.5 * np.array(self.size_mm)
+
+    @property
+    def _centre(self) -> Float:
+        return np.array([0.0, 0.5 * self.size_mm[1], 0.0])
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """Return the distance to the nearest face, edge or corner."""
+        from_centre = points - self._centre
+        beyond, sign = np.abs(from_centre) - self._half, np.where(from_centre < 0.0, -1.0, 1.0)
+        out = np.maximum(beyond, 0.0)
+        length, nearest = np.linalg.norm(out, axis=1), beyond.argmax(axis=1)
+        outside = length > 0.0
+        face = np.eye(3)[nearest]
+        towards = np.where(outside[:, None], out / np.where(outside, length, 1.0)[:, None], face)
+        return np.where(outside, length, beyond.max(axis=1)), sign * towards
+
+    def mean_chord(self, direction: Float) -> float:
+        """Return the volume over the projected area."""
+        volume = math.prod(self.size_mm)
+        return volume / float(np.abs(direction) @ (volume / np.array(self.size_mm)))
+
+    def profile(self, x: Float, z: Float) -> Float:
+        """Return the height of the lower face, 0."""
+        return np.where((np.abs(x) <= self._half[0]) & (np.abs(z) <= self._half[2]), 0.0, np.nan)
+
+    def lowest_point(self, turned: Float) -> Float:
+        """Return the lowest corner after a rotation, or the middle of the lowest edge or face."""
+        down = np.where(np.abs(turned[1]) > _LEVEL, -np.sign(turned[1]), 0.0)
+        return np.asarray(self._centre + down * self._half)
+
+    def landmarks(self) -> Float:
+        """Return the corners."""
+        corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        return np.asarray(self._centre + corners * self._half)
+
+    @property
+    def probe_reach(self) -> float:
+        """Half edge length (mm) of the box of `probes`: the longest side."""
+        return max(self.size_mm)
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether contact may end at sharp edges of the object: yes."""
+        return True
+
+    @property
+    def held_height_mm(self) -> float:
+        """Height (mm) of the box."""
+        return self.size_mm[1]
+
+    def drawing(self, reach_mm: float) -> Triangles:
+        """Return the faces."""
+        corners, faces = self.landmarks(), []
+        for axis, step in enumerate((4, 2, 1)):
+            others = [s for s in (4, 2, 1) if s != step]
+            for first in (0, step):
+                a, b, c, d = first, first + others[0], first + others[0] + others[1], first + others[1]
+                turn = (a, b, c, d) if (first > 0) == (axis != 1) else (a, d, c, b)
+                faces += [(turn[0], turn[1], turn[2]), (turn[0], turn[2], turn[3])]
+        return Triangles(corners, np.array(faces))
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -81,6 +81,16 @@ class MeshObject(RigidObject):
         """Return the lowest point after a rotation."""
         used = self.triangles.points[np.unique(self.triangles.faces)]
         return np.asarray(_lowest(used @ turned.T, self.surface.size) @ turned)
+
+    @property
+    def middle(self) -> Float:
+        """The middle of the box around the body as it was drawn."""
+        return 0.5 * (self.surface.low + self.surface.high) - self.origin
+
+    def mirrored(self, x_mm: float, z_mm: float) -> Self:
+        """Return the mirror image at a horizontal plane, with its lowest point at another place."""
+        surface = Triangles(self.surface.points * [1.0, -1.0, 1.0], self.surface.faces[:, ::-1])
+        return replace(super().mirrored(x_mm, z_mm), surface=surface)
 
     def landmarks(self) -> Float:
         """Return the corners of the triangles."""

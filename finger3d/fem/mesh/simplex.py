@@ -202,6 +202,15 @@ def reflected(mesh: Mesh, axis: int) -> Mesh:
     return replace(mesh, points=points, cells=mesh.cells[:, of_cell], facets=facets)
 
 
+def side_by_side(mesh: Mesh, other: Mesh) -> Mesh:
+    """Two meshes with the same parts as one; the nodes of the second follow those of the first."""
+    n = len(mesh.points)
+    facets = {label: np.vstack([f, other.facets[label] + n]) for label, f in mesh.facets.items()}
+    part = None if mesh.part is None or other.part is None else np.concatenate([mesh.part, other.part])
+    cells = np.vstack([mesh.cells, other.cells + n])
+    return replace(mesh, points=np.vstack([mesh.points, other.points]), cells=cells, facets=facets, part=part)
+
+
 def axis_numbers(axes: Iterable[str]) -> tuple[int, ...]:
     """Return the numbers of the axes named "x", "y" and "z"."""
     return tuple("xyz".index(axis) for axis in axes)

@@ -241,7 +241,7 @@ def deformed_contact(
         size = np.linalg.norm(own, axis=1)
         turns = -(object_share * slope / size)[:, None, None] * _across(own / size[:, None])
         mean = turned_towards(mean, own, object_share)
-    bases = bases_of(unit_normals(mean))
+    bases = bases_of(unit_normals(mean), face.normals)
     if object_share is not None:
         turns = _across(bases[:, 0]) @ turns / np.linalg.norm(mean, axis=1)[:, None, None]
     slope = np.maximum(slope, LEAST_SLOPE)

@@ -144,4 +144,4 @@ def geometry_of_means(
         mean = turned_towards(mean, in_symmetry_planes(surface.normals, surface.points, axes), object_share)
     normal = unit_normals(mean)
     offset = np.zeros_like(normal) if displacement is None else displacement - means[:, 1 + d :]
-    return ContactGeometry(means[:, 0], length, offset, bases_of(normal))
+    return ContactGeometry(means[:, 0], length, offset, bases_of(normal, surface.normals))

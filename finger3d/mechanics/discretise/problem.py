@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.reading import MeshedBody
 from finger3d.meshing.report import MeshReport
-from finger3d.objects import ObjectPose, PlacedObject, vertical_frame
+from finger3d.objects import ObjectPose, PlacedObject, SecondFinger, vertical_frame
 
 _AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as much in between
 
@@ -87,6 +87,7 @@ class ContactSystem:
     object_compliance : (c, d, c, d) mm/N, the part of an elastic object in `delassus`; None if it is rigid
     object_share : (c,) share of an elastic object in the normal compliance of each point; None if it is rigid
     object_mesh : of an elastic object
+    second : the finger that faces the first one, where both are pressed at once
     """
 
     surface: BoundarySurface
@@ -100,6 +101,7 @@ class ContactSystem:
     object_compliance: Float | None = None
     object_share: Float | None = None
     object_mesh: MeshedObject | None = None
+    second: SecondFinger | None = None
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -193,7 +195,7 @@ class Problem:
 
     def placed(self, pose: ObjectPose) -> PlacedObject:
         """Return the object in a pose."""
-        return PlacedObject.of(self.model.object, self.system.first_contact_mm, pose)
+        return PlacedObject.of(self.model.object, self.system.first_contact_mm, pose, self.system.second)
 
     def gap(
         self, target: ObjectPose, surface: BoundarySurface | None = None, displacement: Float | None = None

@@ -30,7 +30,7 @@ def symmetry(model: Model) -> tuple[str, ...]:
         return model.symmetry
     free = [tuple(force is not None for force in leg.forces) for leg in model.legs]
     moves = {  # a turn about x is its own mirror image along x
-        "x": [(leg.slide_x_mm, leg.turn_y, leg.turn_z, f[1], *f[4:]) for leg, f in zip(model.legs, free, strict=True)],
+        "x": [(leg.slide_x_mm, leg.turn_y, leg.turn_z, f[1], *f[4:6]) for leg, f in zip(model.legs, free, strict=True)],
         "z": [(leg.slide_z_mm, leg.turn_x, leg.turn_y, *f[2:5]) for leg, f in zip(model.legs, free, strict=True)],
     }
     thing = PlacedObject.of(model.object, 0.0).mirrors()

@@ -97,7 +97,7 @@ class FiniteStrain:
         increment = self.equations(problem, state, move, workspace)
         if wanted is None:
             return self.accepted(increment, increment.solve(guess))
-        before = forces_on(problem, state, self.loads(problem, state, move.start).moment, move.start)
+        before = forces_on(problem, self.loads(problem, state, move.start).forces, move.start)
         known = problem, increment.body, state, move, workspace
         found, solution = IncrementToForces(*known, wanted, before[list(wanted.numbers)]).followed(guess)
         if solution.outcome.ok and _moves_too_far(problem, state, found.move):

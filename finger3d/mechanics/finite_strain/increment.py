@@ -364,7 +364,7 @@ class IncrementToForces(FiniteIncrement):
             motion = motion + turned
         reach = self._largest_step, self._arm
         conditions = self.wanted.conditions(motion, resultant, images, reach, _EXACT)
-        solution, moved, slips = solve_to_forces(self.problem.model.rule, contact, force, conditions)
-        solution = self.wanted.checked(solution, now.contact.bases, images, slips)
+        solution, moved, lacking = solve_to_forces(self.problem.model.rule, contact, force, conditions)
+        solution = self.wanted.checked(solution, now.contact.bases, images, lacking)
         end = self.wanted.moved(self.move.end, moved)
         return replace(self, move=Move(self.move.start, end)), solution

@@ -76,7 +76,8 @@ class ToForces:
         now, begin = before, move.start
         for share in () if ends else ((*FIRST_PARTS, 1.0) if begins else (1.0,)):
             wanted = after if share == 1.0 else replace(after, values=share * after.values)
-            end = move.end if share == 1.0 else self._of_share(move, share)
+            by_force = 0 in after.numbers and share < 1.0
+            end = self._of_share(move, share) if by_force else move.at(share)
             ends += self._parts(ends[-1] if ends else None, Move(begin, end), (now, wanted), self.cuts)
             if not ends[-1].solution.outcome.ok:
                 return Advanced(combined([end.solution for end in ends], self.state), [], move.start)
@@ -168,7 +169,7 @@ class ToForces:
         elif abs(wanted.values[place] - now.values[place]) <= self._round_off * wanted.size:
             depth = move.start.depth_mm  # what is held moves nothing
         elif last is not None:
-            there = last.move.start.depth_mm, normal_force(self.problem, last.before)
+            there = last.move.start.depth_mm, self._normal_force(last.before, last.move.start)
             depth = by_power_law(there, (move.start.depth_mm, now.values[place]), wanted.values[place])
         return Move(move.start, replace(end, depth_mm=min(depth, self._deepest)))
 
@@ -190,8 +191,10 @@ class ToForces:
         return FORCE_TOLERANCE_IF_FACTORED if self.problem.model.finite_strain else FORCE_TOLERANCE
 
     def _forces(self, state: State[Any], pose: ObjectPose) -> Float:
-        moment = formulation_of(self.problem.model).loads(self.problem, state, pose).moment
-        return forces_on(self.problem, state, moment, pose)
+        return forces_on(self.problem, formulation_of(self.problem.model).loads(self.problem, state, pose).forces, pose)
+
+    def _normal_force(self, state: State[Any], pose: ObjectPose) -> float:
+        return float(self._forces(state, pose)[0])
 
     def _plainly(self, state: State[Any], move: Move) -> ContactSolution[State[Any]]:
         return formulation_of(self.problem.model).increment(self.problem, state, move, None, self.workspace)
@@ -199,7 +202,7 @@ class ToForces:
     def _touches(self, state: State[Any], move: Move) -> bool:
         """Return whether the object touches at the end of a motion."""
         found = self._plainly(state, move)
-        return found.outcome.ok and normal_force(self.problem, found.state) > 0.0
+        return found.outcome.ok and self._normal_force(found.state, move.end) > 0.0
 
     def _ended(
         self,
@@ -211,13 +214,13 @@ class ToForces:
         """Return the end of an increment that does not converge, with the forces that are nearest to those wanted."""
         wanted, solution = forces[1], found.solution
         if wanted.numbers == (0,):
-            force, depth = normal_force(self.problem, solution.state), move.start.depth_mm
+            force, depth = self._normal_force(solution.state, move.start), move.start.depth_mm
             # the first that has a solution; at large deformation each that has none costs tens of factorisations
             for share in () if self.problem.model.finite_strain else _DEPTHS:
                 deeper = depth + share * (self._deepest - depth)
                 found_there = self._plainly(solution.state, Move(move.start, replace(move.end, depth_mm=deeper)))
                 if found_there.outcome.ok:
-                    there = normal_force(self.problem, found_there.state)
+                    there = self._normal_force(found_there.state, replace(move.end, depth_mm=deeper))
                     force, depth = (there, deeper) if there > force else (force, depth)
                     break
             detail = f"{wanted.asked[0]:.6g} N asked; the largest force is {force:.6g} N, at a depth of {depth:.4g} mm"
@@ -240,11 +243,6 @@ def _reached_by(solution: ContactSolution[State[Any]]) -> Move:
     """Return the motion of an increment to forces."""
     assert solution.state.last is not None
     return solution.state.last[0]
-
-
-def normal_force(problem: Problem, state: State[Any]) -> float:
-    """Return the normal force (N)."""
-    return 0.0 - float(problem.world_force(state.contact)[:, 1].sum())
 
 
 def by_power_law(before: tuple[float, float], now: tuple[float, float], wanted: float) -> float:

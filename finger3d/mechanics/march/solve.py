@@ -19,6 +19,7 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import GeneralisedForces, forces_on
 from finger3d.mechanics.march.equilibrium import ToForces
+from finger3d.mechanics.march.grip import Grip
 from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, solved_in_turn
 from finger3d.mechanics.path import Load, Station, stations
 from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
@@ -27,7 +28,7 @@ from finger3d.mechanics.results.state import State
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 
-_SIDEWAYS = np.array([0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0])  # coordinates but depth and time
+_SIDEWAYS = np.array([0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0])  # coordinates but depth and time
 
 CUTS = 6
 """Times that an increment which does not converge is halved, at most."""
@@ -93,18 +94,20 @@ class Press:
         report: Progress = QUIET,
         cuts: int = CUTS,
     ) -> None:
-        model, self.problem, self.formulation = problem.model, problem, formulation_of(problem.model)
+        model, self.formulation = problem.model, formulation_of(problem.model)
+        self._grip = None if model.centre_of_mass_mm is None else Grip.of(problem)
+        self.problem = problem = self._grip.problem if self._grip else problem
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
         self.has_failed, self._cancel, self._report = False, cancel, report
         self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else cuts
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None
-        self._work, self._dissipation = 0.0, 0.0
+        self._energies: Float = np.zeros((2, 2))  # work and dissipation of each finger
         self._station: Station | None = None
-        self._leg_start: Float = np.zeros(6)  # forces as in a Load
-        self._left: Float = np.zeros(7)  # coordinates at the start of the leg, less those of the path
-        self._before: tuple[State[Any], float, float] | None = None  # None if the last increment was cut
+        self._leg_start: Float = np.zeros(7)  # forces as in a Load
+        self._left: Float = np.zeros(8)  # coordinates at the start of the leg, less those of the path
+        self._before: tuple[State[Any], Float] | None = None  # None if the last increment was cut
         body = problem.without_inclusions
         self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
 
@@ -140,7 +143,7 @@ class Press:
         else:
             end = self._to_forces(move, station.load)
         was_cut = len(end.parts) > len(self.moves_to(end.pose))
-        self._before = None if was_cut else (self.state, self._work, self._dissipation)
+        self._before = None if was_cut else (self.state, self._energies)
         self._add_energies(end)
         self._move_to(end)
         outcome = end.solution.outcome
@@ -153,9 +156,20 @@ class Press:
         self.state, self.pose = end.solution.state, end.pose
 
     def _add_energies(self, end: Advanced) -> None:
-        work, lost = energies(self.problem, end.parts)
-        self._work += work
-        self._dissipation += lost
+        more = np.zeros_like(self._energies)
+        for number, problem in enumerate(self._fingers):
+            more[number] = energies(problem, [self._seen(number, part) for part in end.parts])
+        self._energies = self._energies + more
+
+    @property
+    def _fingers(self) -> tuple[Problem, ...]:
+        return self._grip.fingers if self._grip else (self.problem,)
+
+    def _seen(self, number: int, part: Substep) -> Substep:
+        """Return a part of an increment as one of the fingers has it."""
+        start, before = self._at(number, part.move.start, part.before)
+        end, after = self._at(number, part.move.end, part.after)
+        return Substep(before, after, Move(start, end), part.residual)
 
     def _last_in_halves(self) -> bool:
         """Repeat the last increment in halves, and return whether they converge.
@@ -164,11 +178,11 @@ class Press:
         """
         if self._before is None or self._previous is None or not self._cuts:
             return False
-        (state, work, dissipation), whole = self._before, self._previous[0]
+        (state, energies_before), whole = self._before, self._previous[0]
         found, parts = solved_in_turn(self.problem, self.workspace, state, whole.cut(0.5), self._cuts - 1)
         if not found.outcome.ok:
             return False
-        self.state, self._work, self._dissipation = found.state, work, dissipation
+        self.state, self._energies = found.state, energies_before
         self._add_energies(Advanced(found, parts, whole.end))
         return True
 
@@ -213,12 +227,11 @@ class Press:
         self._station = station
         if not self._left.any():
             return station.pose
-        return station.pose.changed(np.arange(7), (1.0 - station.share) * self._left)
+        return station.pose.changed(np.arange(8), (1.0 - station.share) * self._left)
 
     def _wanted(self, load: Load) -> tuple[Float, Float]:
-        """Return the forces (6,), N and N mm, now, and those prescribed at the end of the increment."""
-        moment = self.formulation.loads(self.problem, self.state, self.pose).moment
-        forces = forces_on(self.problem, self.state, moment, self.pose)
+        """Return the forces (7,), N and N mm, now, and those prescribed at the end of the increment."""
+        forces = forces_on(self.problem, self.formulation.loads(self.problem, self.state, self.pose).forces, self.pose)
         if load.begins:
             self._leg_start = forces
         return forces, self._leg_start + load.share * (load.forces - self._leg_start)
@@ -227,17 +240,24 @@ class Press:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
         forces, wanted = self._wanted(load)
         free = np.flatnonzero(~np.isnan(wanted))
-        if (wanted[0] if 0 in free else forces[0]) <= 0.0:
+        closes = self._grip and move.end.depth_mm > move.start.depth_mm
+        if (wanted[0] if 0 in free else forces[0]) <= 0.0 and not closes:
             detail = "nothing touches, and a tangential force or a moment is prescribed; press first"
             ended = ContactSolution(self.state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
             return Advanced(ended, [], move.start)
         numbers = tuple(free.tolist())
-        size = float(np.nanmax(np.abs([*forces[:3], *wanted[:3]])))
+        acting = np.abs([*forces[:3], *wanted[:3], forces[6], wanted[6]])
+        size = max(float(np.nanmax(acting)), self._least_force(move) if self._grip else 0.0)
         asked = float(load.forces[0]), float(np.linalg.norm(np.nan_to_num(load.forces[1:3])))
         before, after = (GeneralisedForces(numbers, values[free], size, asked) for values in (forces, wanted))
         known = self.problem, self.workspace, self.state, self._last_part
         way = ToForces(*known, self.expected_force, self._cuts, self._report)
         return way.run(move, before, after)
+
+    def _least_force(self, move: Move) -> float:
+        """Return the force (N) on a single point that is displaced as far as the fingers close in an increment."""
+        normal = np.einsum("caca->ca", self.problem.delassus)[:, 0]
+        return (move.end.depth_mm - move.start.depth_mm) / float(normal.max())
 
     def _free_strain(self, station: Station) -> dict[Column, float]:
         """Strain of every gauge in the body without inclusions; NaN once it has failed."""
@@ -250,7 +270,29 @@ class Press:
         return {free: step.readings[own] if step and known else np.nan for own, free in columns}
 
     def _result(self, end: Advanced, free_strain: dict[Column, float]) -> StepResult:
-        problem, state, pose, solution = self.problem, self.state, self.pose, end.solution
+        parts = tuple((part.move.end, part.after) for part in end.parts)
+        first, *others = (
+            self._result_of(number, end.solution, [self._at(number, *part) for part in parts], free_strain)
+            for number in range(len(self._fingers))
+        )
+        return replace(first, other=others[0], pose=self.pose) if others else first
+
+    def _at(self, number: int, pose: ObjectPose, state: State[Any]) -> tuple[ObjectPose, State[Any]]:
+        """Return pose and state as one of the fingers has them."""
+        if self._grip is None:
+            return pose, state
+        state, pose = self._grip.seen(number, state, pose)
+        return pose, state
+
+    def _result_of(
+        self,
+        number: int,
+        solution: ContactSolution[State[Any]],
+        parts: Sequence[tuple[ObjectPose, State[Any]]],
+        free_strain: dict[Column, float],
+    ) -> StepResult:
+        problem, (pose, state) = self._fingers[number], self._at(number, self.pose, self.state)
+        work, lost = self._energies[number].tolist()
         moment = self.formulation.loads(problem, state, pose).moment
         return StepResult(
             target=pose,
@@ -259,13 +301,13 @@ class Press:
             lowest=problem.placed(pose).lowest,
             moment=problem.symmetry.total_moment(moment),
             readings=in_order(self.formulation.readings(problem, state) | free_strain),
-            external_work_mJ=self._work,
-            dissipation_mJ=self._dissipation,
+            external_work_mJ=work,
+            dissipation_mJ=lost,
             outcome=solution.outcome,
             residual=solution.residual,
             iterations=solution.iterations,
             method=solution.method,
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
-            parts=tuple((part.move.end, part.after) for part in end.parts),
+            parts=tuple(parts),
         )

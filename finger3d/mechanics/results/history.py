@@ -32,7 +32,8 @@ class StepResult:
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface
     (`finger3d.mechanics.postprocess.penetration`); `detail` describes a failure.  `parts` are the pose and the state of
-    the meshed part at the end of every part that the increment was solved in, the last one included.
+    the meshed part at the end of every part that the increment was solved in, the last one included.  Between two
+    fingers `other` is the result of the second one, each in a frame of its own, and `pose` that of the object.
     """
 
     target: ObjectPose
@@ -50,6 +51,8 @@ class StepResult:
     penetration_mm: float
     detail: str = ""
     parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
+    other: StepResult | None = None
+    pose: ObjectPose | None = None
 
     @property
     def failure(self) -> str:

@@ -308,8 +308,8 @@ class IncrementToForces(Increment):
             for field in (motions, resultants)
         )
         conditions = wanted.conditions(motion, resultant, images, (far, arm), _EXACT)
-        solution, moved, slips = solve_to_forces(problem.model.rule, contact, guess, conditions)
-        solution = wanted.checked(solution, bases, images, slips)
+        solution, moved, lacking = solve_to_forces(problem.model.rule, contact, guess, conditions)
+        solution = wanted.checked(solution, bases, images, lacking)
         return replace(self, move=Move(self.move.start, wanted.moved(end, moved))), solution
 
 
@@ -361,7 +361,7 @@ def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Floa
     The displacement of a point is the mean over its hat function; the mean of a turn is that of the centroid.
     """
     d, start, end = displacement.shape[1], move.start, move.end
-    if start.turns == end.turns:
+    if start.turns == end.turns and problem.system.second is None:
         return np.broadcast_to((end.displacement - start.displacement)[:d], displacement.shape)
     points = np.zeros((len(displacement), 3))
     points[:, :d] = problem.surface.centroids + displacement
