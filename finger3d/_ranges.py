@@ -36,6 +36,7 @@ Poisson = Annotated[float, Ge(0), Le(0.5)]
 Friction = Annotated[float, Ge(0), Le(1e6)]
 Force = Annotated[float, Ge(1e-12), Le(1e12)]  # N
 SignedForce = Annotated[float, Ge(-1e12), Le(1e12)]  # N
+Mass = Annotated[float, Ge(0), Le(1e9)]  # g
 Dimension = Annotated[float, Ge(SMALLEST_MM), Le(LARGEST_MM)]  # of a finger
 Length = Annotated[float, Ge(1e-6), Le(1e6)]  # mm
 Place = Annotated[float, Ge(-FARTHEST_MM), Le(FARTHEST_MM)]  # mm

@@ -190,7 +190,7 @@ def cost(
     forecasts = Forecasts.of(model, report)
     chosen = forecasts.numbers(goals)
     rows = (forecasts.row(1.0), *(forecasts.wanted(error, chosen) for error in ERRORS))
-    rows = tuple(replace(row, has_legs="leg" in scene.given["press"]) for row in rows)
+    rows = tuple(replace(row, has_legs="leg" in scene.given.get("press", {})) for row in rows)
     tabled = tuple(of) if of and ALL not in of else forecasts.main[:_MOST_COLUMNS]
     found = Costs(scene.title, chosen, rows, tabled, time.perf_counter() - start)
     if png is not None:

@@ -20,6 +20,7 @@ from finger3d.scene import files
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown
 from finger3d.scene.tables import (
     AutoTable,
+    GripTable,
     LegsTable,
     LegTable,
     PressTable,
@@ -128,7 +129,13 @@ def named(
 
 
 def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | LegsTable | None:
-    press = document.get("press")
+    press, grip = document.get("press"), document.get("grip")
+    if press is None and grip is None:
+        mistakes["press",] = "press is missing: a table is required, or [grip] for two fingers"
+    if press is not None and grip is not None:
+        mistakes["press",] = "press: must not stand beside [grip], whose fingers close by themselves; take one of the two out"
+    if isinstance(grip, Mapping):
+        return _closing(grip, mistakes)
     if not isinstance(press, Mapping):
         return None  # found by the check of the whole file
     if "leg" not in press:
@@ -140,6 +147,17 @@ def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | Leg
         )
         return None
     return checked(LegsTable, press, ("press",), mistakes)
+
+
+def _closing(grip: TreeView, mistakes: dict[Place, str]) -> PressTable | None:
+    """Return the press of each of two fingers as they close."""
+    table = checked(GripTable, grip, ("grip",), {})
+    if table is None:
+        return None  # found by the check of the whole file
+    if (table.force_N is None) == (table.closing_mm is None):
+        mistakes["grip",] = "grip: must have either force_N or closing_mm, by which its fingers close"
+        return None
+    return PressTable(depth_mm=table.closing_mm, force_N=table.force_N, steps=table.steps)
 
 
 def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:

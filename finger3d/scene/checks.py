@@ -46,7 +46,7 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
         if tables.mesh.mesher == "swept":
             lines.append(f'mesh.mesher = "swept": {lacks}; must be "ftetwild"')
     lines += check_parts(tables, design)
-    lines += _legs(tables.press, legs, design, solid)
+    lines += _legs(tables.press, legs, design, solid) + _grip(tables, solid)
     lines += _sizes(tables.mesh, design, solid)
     lines += _goal(tables, legs, solid)
     lines += _names(tables)
@@ -59,6 +59,30 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
         lines += _marker_grid(tables.marker_grid.spacing_mm, design, solid)
     for i, taxel in enumerate(tables.taxel):
         lines += _taxel(i, taxel, design, solid)
+    return lines
+
+
+_HELD_SHAPES = "box", "cylinder", "mesh", "sphere"
+"""Objects that two fingers can hold."""
+
+_NOT_HELD = "elastic_object", "embedded_gauge", "viscosity"
+"""Effects that a press by two fingers does not know."""
+
+
+def _grip(tables: SceneTable, solid: bool) -> list[str]:
+    """Return a line about what two fingers cannot do."""
+    grip, shape = tables.grip, (tables.object or {}).get("shape", "plane")
+    if grip is None:
+        return []
+    lines = []
+    if shape not in _HELD_SHAPES or (shape == "cylinder" and solid and "length_mm" not in (tables.object or {})):
+        closed = "a cylinder with length_mm" if shape == "cylinder" else f"one of {', '.join(_HELD_SHAPES)}"
+        lines.append(f"object.shape = {shown(shape)}: two fingers hold a closed body; must be {closed}")
+    lines += [f"effects.{name}: not with [grip]; take one of the two out" for name in _NOT_HELD if tables.effects.get(name)]
+    if grip.mass_g and not any(grip.down):
+        lines.append("grip.down: must be a direction, not 0, 0, 0")
+    across = {"down": grip.mass_g * grip.down[2], "load_N": grip.load_N[2], "load_Nmm": any(grip.load_Nmm[:2])}
+    lines += [] if solid else [f"grip.{key}: must act in the plane of a 2D domain" for key, value in across.items() if value]
     return lines
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
-from finger3d._types import TreeView
+import numpy as np
+
+from finger3d._types import Float, TreeView
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
 from finger3d.geometry.design import Design
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Leg, contact_path
-from finger3d.objects import RigidObject
+from finger3d.objects import PlacedObject, RigidObject
 from finger3d.scene.material import mistakes
 from finger3d.scene.messages import dotted, shown, unknown
-from finger3d.scene.tables import SceneTable
+from finger3d.scene.tables import LegTable, SceneTable
 
 _NU_OF_RIGID = 0.3  # of a material that hardly deforms, any does
 
@@ -71,9 +74,47 @@ def check_parts(tables: SceneTable, design: Design) -> list[str]:
     return lines
 
 
-def legs_of(legs: Iterable[TreeView], design: Design, obj: RigidObject, tables: SceneTable) -> tuple[Leg, ...]:
-    """Return the legs of a press, angles in radians, with a forecast of the depth where a force is given."""
-    return tuple(_leg(leg, design, obj, tables) for leg in legs)
+def path_of(legs: Iterable[TreeView], design: Design, obj: RigidObject, tables: SceneTable) -> tuple[Leg, ...]:
+    """Return the legs of a press or a grip, angles in radians, with a forecast of the depth where a force is given."""
+    grip = tables.grip
+    if grip is None:
+        return tuple(_leg(leg, design, obj, tables) for leg in legs)
+    closing = LegTable(depth_mm=grip.closing_mm, force_N=grip.force_N, steps=grip.steps)
+    close = replace(_leg(dict(closing), design, obj, tables), force_y_N=0.0)
+    if grip.force_N is not None:
+        close = replace(close, force_N=2.0 * grip.force_N)
+    down = np.array(grip.down) / (np.linalg.norm(grip.down) or 1.0)
+    weight, load = GRAVITY * 1e-3 * grip.mass_g * down, np.array(grip.load_N)
+    moment = np.array(grip.load_Nmm)
+    solid, mirrors = tables.model.domain == "solid", _mirrors_of_load(tables, design, obj)
+    legs_under = [(weight, 0.0 * moment)] * bool(weight.any()) + [(weight + load, moment)] * bool(load.any() or moment.any())
+    return (close, *(replace(close, **_loads(force, about, solid, mirrors)) for force, about in legs_under))
+
+
+GRAVITY = 9.80665
+"""Standard acceleration of free fall, m/s2."""
+
+
+def _mirrors_of_load(tables: SceneTable, design: Design, obj: RigidObject) -> set[str]:
+    """Return the axes along which fingers, object and its load are their own mirror images."""
+    grip = tables.grip
+    assert grip is not None
+    found = {*design.mirrors(), "z" if tables.model.domain != "solid" else ""} & {*PlacedObject.of(obj, 0.0).mirrors()}
+    moment = np.array(grip.load_Nmm)
+    for axis, i in (("x", 0), ("z", 2)):
+        along = (grip.mass_g * grip.down[i], grip.load_N[i], grip.centre_mm[i])
+        if any(along) or np.delete(moment, i).any():
+            found -= {axis}
+    return found
+
+
+def _loads(force: Float, moment: Float, solid: bool, mirrors: set[str]) -> dict[str, float]:
+    """Return the forces and moments of a leg, but for those of coordinates that a symmetry holds."""
+    held = {"x": {"force_x_N", "moment_y_Nmm", "moment_z_Nmm"}, "z": {"force_z_N", "moment_x_Nmm", "moment_y_Nmm"}}
+    loads = {f"force_{axis}_N": float(force[i]) for i, axis in enumerate("xyz")}
+    loads |= {f"moment_{axis}_Nmm": float(moment[i]) for i, axis in enumerate("xyz")}
+    out = set[str]().union(*(held[axis] for axis in mirrors)) | (set() if solid else held["z"])
+    return {key: value for key, value in loads.items() if key not in out}
 
 
 def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) -> Leg:

@@ -22,7 +22,7 @@ from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
-from finger3d.scene.derived import legs_of, parts_of
+from finger3d.scene.derived import parts_of, path_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place
 from finger3d.scene.tables import (
@@ -116,7 +116,7 @@ class Scene:
     def legs(self) -> tuple[Leg, ...]:
         """Targets of the press; the shorthand is one leg."""
         press = self.tables.press
-        return legs_of(press.get("leg", (press,)), self.design, self.object, self.tables)
+        return path_of(press.get("leg", (press,)), self.design, self.object, self.tables)
 
     @property
     def constants(self) -> ElasticConstants:
@@ -176,6 +176,7 @@ class Scene:
             markers=tuple(record_of(Marker, marker) for marker in t.marker),
             taxels=tuple(record_of(Taxel, taxel) for taxel in t.taxel),
             domain=t.model.domain,
+            centre_of_mass_mm=t.grip.centre_mm if t.grip else None,
             rule=t.contact.rule,
             parts=parts_of(t),
             warnings=checks.unusual(self.given, self.constants.E_MPa, self.design.height_mm),
@@ -192,7 +193,8 @@ class Scene:
 
     def to_toml(self, defaults: bool = True) -> str:
         """Return TOML text that loads as this scene: with every default, or just what was given."""
-        return tree.written(self.tables.model_dump() if defaults else self.given)
+        tables = {name: table for name, table in self.tables.model_dump().items() if name != "press" or table}
+        return tree.written(tables if defaults else self.given)
 
 
 def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | Mapping[str, str] = ()) -> Scene:
@@ -261,7 +263,7 @@ class _Parts:
             If the contact conditions cannot describe the object's motion into the finger.
         """
         domain = self.tables.model.domain
-        legs = legs_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
+        legs = path_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
         box = first_contact(self.design, self.object, legs, domain).contact_box
         linear = not set(self.settings) - {"kinetic_friction"}
         # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
@@ -276,7 +278,7 @@ class _Parts:
                 "material": material.filled_in(self.tables.material),
                 "parts": {label: material.filled_in(part) for label, part in self.tables.parts.items()},
                 "object": {"shape": self.shape, **dict(self.placed)},
-                "press": self.press.model_dump(),
+                "press": {} if self.tables.grip else self.press.model_dump(),
                 # with a tolerance the press finds the sizes
                 "mesh": self.tables.mesh
                 if self.tables.mesh.tolerance

@@ -55,6 +55,7 @@ def schema() -> Tree:
         name: {"oneOf": [{"type": "boolean"}, _documented(effect_type(name))]} for name in effect_names()
     }
     keys["effects"] = {"type": "object", "additionalProperties": False, "properties": effects}
+    root["oneOf"] = [{"required": ["press"]}, {"required": ["grip"]}]
     for name, description in descriptions(SceneTable).items():
         keys[name] |= {"description": description}
     return {"$schema": DIALECT, "title": "A scene of finger3d"} | root

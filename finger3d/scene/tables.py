@@ -19,6 +19,7 @@ from finger3d._ranges import (
     Force,
     Friction,
     Length,
+    Mass,
     Modulus,
     Name,
     Place,
@@ -147,6 +148,32 @@ class LegsTable(TomlTable):
     leg: Annotated[tuple[LegTable, ...], MinLen(1)]
 
 
+class GripTable(TomlTable):
+    """[grip], in place of [press]: two fingers, mirror images of each other, hold the object, which is free.
+
+    They close on it, then its weight acts, then any other load.
+
+    Attributes
+    ----------
+    force_N : by which each finger presses on the object, kept as the weight acts
+    closing_mm : in place of the force: by which each finger moves from first touch
+    mass_g : of the object
+    down : direction of its weight
+    centre_mm : its centre of mass, from its middle
+    load_N, load_Nmm : another force at the centre of mass, and a moment about it, which act after the weight
+    steps : increments of each of these; "auto": as errors of 1 % ask for
+    """
+
+    force_N: Force | None = None
+    closing_mm: Length | None = None
+    mass_g: Mass = 0.0
+    down: tuple[Place, Place, Place] = (0.0, 0.0, -1.0)
+    centre_mm: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
+    load_N: tuple[SignedForce, SignedForce, SignedForce] = (0.0, 0.0, 0.0)
+    load_Nmm: tuple[SignedForce, SignedForce, SignedForce] = (0.0, 0.0, 0.0)
+    steps: Steps = "auto"
+
+
 class ContactTable(TomlTable):
     """[contact].
 
@@ -269,6 +296,7 @@ class SceneTable(TomlTable):
     material : elastic constants of the finger
     parts : other materials of solids of the finger, by their labels
     friction : Coulomb friction; absent: none
+    grip : two fingers that hold a free object, in place of a press
     contact : how stick and slip are settled
     model : the body, or its section
     mesh : edge lengths and mesher; chosen from the scene unless given
@@ -284,7 +312,8 @@ class SceneTable(TomlTable):
     parts: dict[str, PartTable] = {}
     object: Tree | None = None
     friction: FrictionTable = FrictionTable(mu=0.0)
-    press: Tree
+    press: Tree = {}
+    grip: GripTable | None = None
     contact: ContactTable = ContactTable()
     model: DomainTable = DomainTable()
     mesh: MeshTable = MeshTable()
