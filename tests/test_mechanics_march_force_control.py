@@ -22,14 +22,15 @@ from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.finite_strain.increment import FiniteIncrement
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.equilibrium import normal_force
 from finger3d.mechanics.march.force_control import at_depth_reached, forecast_depth
 from finger3d.mechanics.march.parts import solved_in_turn
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, contact_path
 from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, Plane
 from finger3d.scene import load
 from tests.logs import Log
@@ -131,10 +132,10 @@ def test_a_press_by_force_at_large_deformation_is_the_press_through_its_poses_at
     through, again = solved_in_turn(problem, workspace, state, moves, 0)
     assert through.outcome.ok
     for (_, found), part in zip(parts, again, strict=True):  # to the residual of 5e-9 of the forces
-        assert normal_force(problem, found) == pytest.approx(normal_force(problem, part.after), rel=1e-8)
+        assert _normal_force(problem, found) == pytest.approx(_normal_force(problem, part.after), rel=1e-8)
         friction, expected = (np.linalg.norm(state.contact.force[:, 1:], axis=1).sum() for state in (found, part.after))
         assert friction == pytest.approx(expected, rel=1e-6)
-    first = [normal_force(problem, state) for _, state in by_force[0].parts]
+    first = [_normal_force(problem, state) for _, state in by_force[0].parts]
     assert first == pytest.approx(np.multiply((1 / 16, 1 / 4, 1), wanted / steps), rel=1e-7)
     # a first increment to a depth is cut at other depths: forces differ by no more than the error of the increments
     forces = [[measure(problem.points, step)["normal_force_N"] for step in found] for found in (by_force, by_depth)]
@@ -247,3 +248,7 @@ def test_a_force_for_which_an_inclined_plane_would_reach_the_base_is_an_outcome(
     assert float(largest[1]) == pytest.approx(0.99 * 5.0 * (math.sqrt(2.0) - 1.0), rel=0.02)
     assert main(["press", str(path), "--out", str(tmp_path / "deep"), "--set", "press.depth_mm=2.2", *SMALL]) == 2
     assert "incline it less" in capsys.readouterr().err
+
+
+def _normal_force(problem: Problem, state: State[Any]) -> float:
+    return -float(problem.world_force(state.contact)[:, 1].sum())

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.march.step_halving import StepEstimate
+    from finger3d.results.states import States
     from finger3d.scene import Scene, Source
 
 
@@ -229,7 +230,7 @@ def _remark(problem: Problem, step: StepResult) -> str:
 # --- recover and estimate -----------------------------------------------------------------------------------------
 
 
-def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fields | None:
+def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> States | None:
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
     from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
@@ -238,21 +239,21 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Fie
 
     begin = time.perf_counter()
     report.stage("writing fields")
-    fields, good, problem = None, record.converged_steps, record.problem
+    states, good, problem = None, record.converged_steps, record.problem
     if any(leg.force_N is not None for leg in problem.model.legs):
         record.warnings += depth_warning(problem, good)
     if good:
-        u, strain, stress = formulation_of(problem.model).fields(problem, good[-1].meshed_state)
+        formulation = formulation_of(problem.model)
+        fields = [Fields.of(own, *formulation.fields(own, steps[-1].meshed_state)) for own, steps in record.fingers()]
         record.warnings += penetration_warnings(problem, record.surface_checks) + fold_warnings(problem, good)
         record.warnings += snap_warnings(good)
-        record.largest_strain = largest_principal_strain(strain)
+        record.largest_strain = max(largest_principal_strain(one.strain) for one in fields)
         _advise(record)
-        fields = Fields.of(record, u, strain, stress)
-        record.warnings += cavity_warnings(fields.mesh, fields.displacement)
-        writer.fields(record, fields)
+        record.warnings += cavity_warnings(fields[0].mesh, fields[0].displacement)
+        states = writer.fields(record, fields)
     record.warnings += point_count_warning(record) + increments_without_contact(problem, record.steps)
     record.seconds["output"] += time.perf_counter() - begin
-    return fields
+    return states
 
 
 def _estimate_errors(record: PressRecord, report: Progress, companions: CompanionThread) -> None:

@@ -19,13 +19,15 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.march.grip import two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
 from finger3d.mechanics.results.history import StepResult, contact_table, row_of_entry
-from finger3d.results.states import object_drawing, states_of, write_states
+from finger3d.results.states import States, facing, object_drawing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
 if TYPE_CHECKING:
     from finger3d.analyses.press_record import PressRecord
+    from finger3d.mechanics.discretise.problem import Problem
 
 
 _WRITE_EVERY_S = 0.5
@@ -33,6 +35,9 @@ _WRITE_EVERY_S = 0.5
 
 _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
+
+FINGERS = "lower", "upper"
+"""Names of two fingers."""
 
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"
@@ -63,14 +68,18 @@ class Fields:
     stress: Float
 
     @classmethod
-    def of(cls, record: PressRecord, u: Float, strain: Float, stress: Float) -> Fields:
+    def of(cls, problem: Problem, u: Float, strain: Float, stress: Float) -> Fields:
         """Unfold fields of the meshed part: displacements (p, d) mm, strain and stress (p, 3, 3)."""
-        problem = record.problem
         mesh, image_of, sign = unfold(problem.mesh, axis_numbers(problem.axes))
         flip = np.ones((len(image_of), 3))
         flip[:, : problem.dim] = sign
         both = flip[:, :, None] * flip[:, None, :]
         return cls(mesh, image_of, sign, u[image_of] * sign, strain[image_of] * both, stress[image_of] * both)
+
+    @property
+    def at_points(self) -> dict[str, Array]:
+        """Displacement, strain and stress by name, symmetric tensors in the order of VTK."""
+        return {"displacement": self.displacement, "strain": _voigt(self.strain), "stress": _voigt(self.stress)}
 
 
 class ResultWriter:
@@ -112,7 +121,7 @@ class ResultWriter:
         if record.steps:
             write_csv(self.folder / "history.csv", history_table(record.steps, map(record.entry, record.steps)))
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
-            write_csv(self.folder / "contact.csv", contact_table(record.problem.points, last.state))
+            write_csv(self.folder / "contact.csv", _contact_table(record, last))
         self._written = time.perf_counter()
         self._seconds = self._written - begin
 
@@ -140,28 +149,34 @@ class ResultWriter:
         if markers := _markers(record):
             write_csv(self.folder / "markers.csv", markers)
 
-    def fields(self, record: PressRecord, fields: Fields) -> None:
-        """Write fields.vtu, fields after the last converged increment, and steps.npz, states of chosen increments."""
-        good = record.converged_steps
-        mesh, step = fields.mesh, good[-1]
-        surface = _on_surface(mesh, record.problem.points, step)
-        states = states_of(record.problem, good, mesh, fields.image_of, fields.mirror_sign, fields.displacement)
-        write_states(self.folder / "steps.npz", states)
+    def fields(self, record: PressRecord, fields: Sequence[Fields]) -> States:
+        """Write fields.vtu, fields after the last converged increment, and steps.npz, states of chosen increments.
+
+        Parameters
+        ----------
+        fields : of the finger, or of both
+        """
+        mesh, states, surface = fields[0].mesh, list[States](), list[dict[str, Array]]()
+        for (problem, steps), of_finger in zip(record.fingers(), fields, strict=True):
+            whole = of_finger.mesh, of_finger.image_of, of_finger.mirror_sign, of_finger.displacement
+            states.append(states_of(problem, steps, *whole))
+            surface.append(of_finger.at_points | _on_surface(of_finger.mesh, problem.points, steps[-1]))
+        at_points, shown = surface[0], states[0]
+        if record.grip:
+            closed = [2.0 * step.pose.depth_mm for step in record.converged_steps if step.pose]
+            mesh = two(mesh, record.grip.apart_mm)
+            shown = facing((states[0], states[1]), record.grip.apart_mm, np.array(closed)[shown.step - 1])
+            at_points = {
+                name: np.concatenate([surface[0][name], _mirrored(name, surface[1][name])]) for name in at_points
+            }
+            at_points["displacement"][len(fields[0].displacement) :, 1] -= closed[-1]
+        write_states(self.folder / "steps.npz", shown)
         self.markers(record)
-        write_vtu(
-            self.folder / "fields.vtu",
-            mesh,
-            {
-                "displacement": fields.displacement,
-                "strain": _voigt(fields.strain),
-                "stress": _voigt(fields.stress),
-                **surface,
-            },
-            {} if mesh.part is None else {"part": mesh.part},
-        )
+        write_vtu(self.folder / "fields.vtu", mesh, at_points, {} if mesh.part is None else {"part": mesh.part})
+        return shown
 
     @contextmanager
-    def pictures(self, record: PressRecord, fields: Fields) -> Iterator[Callable[[], None]]:
+    def pictures(self, record: PressRecord, fields: States) -> Iterator[Callable[[], None]]:
         """Draw finger.png, contact.png, force.png, and markers.png if there are markers.
 
         Yields
@@ -173,7 +188,11 @@ class ResultWriter:
         from finger3d.plotting.gauges import marks_of
         from finger3d.plotting.layout import save
 
-        problem, good, mesh = record.problem, record.converged_steps, fields.mesh
+        problem, good = record.problem, record.converged_steps
+        facets = {label: fields.facets[fields.facet_face == k] for k, label in enumerate(FREE_FACES)}
+        others = {"base": fields.facets[fields.facet_face < 0]}
+        part = fields.part if fields.part.any() else None
+        mesh = Mesh(fields.points.astype(float), fields.cells, facets | others, part)
         steps = [record.entry(step) for step in good]
         table = contact_table(problem.points, good[-1].state)
         placed = problem.placed(good[-1].target)
@@ -183,16 +202,16 @@ class ResultWriter:
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
         finger = DeformedFinger(
             mesh=mesh,
-            displacement=fields.displacement,
-            pressure=table["pressure_MPa"],
-            shear=np.column_stack([table[f"shear_{axis}_MPa"] for axis in "xyz"]),
-            status=good[-1].state.status.astype(int),
-            nodes=problem.points.nodes,
-            faces=problem.points.face.astype(int),
+            displacement=fields.displacement[-1].astype(float),
+            pressure=fields.pressure[-1].astype(float),
+            shear=np.stack([fields.shear_x[-1], fields.shear_y[-1], fields.shear_z[-1]], axis=1).astype(float),
+            status=fields.status[-1].astype(int),
+            nodes=fields.nodes,
+            faces=fields.face.astype(int),
             thing=placed.to_scene(thing.points)[thing.faces],
             title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
             marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
-            zones=problem.points.zones(good[-1].state),
+            zones=fields.zones(-1),
         )
 
         def draw() -> None:
@@ -213,6 +232,16 @@ def _markers(record: PressRecord) -> Tree | None:
     if not good or not (record.problem.model.markers or grid):
         return None
     return marker_table(record.problem, good, grid, record.marker_errors)
+
+
+def _contact_table(record: PressRecord, step: StepResult) -> Tree:
+    """Return the columns of contact.csv; those of two fingers, each in its own frame, one after the other."""
+    first = contact_table(record.problem.points, step.state)
+    if step.other is None:
+        return first
+    second = contact_table(record.problem.points, step.other.state)
+    fingers = np.repeat(FINGERS, len(first["face"]))
+    return {"finger": fingers, **{name: np.concatenate([first[name], second[name]]) for name in first}}
 
 
 def history_table(steps: Sequence[StepResult], entries: Iterable[TreeView]) -> dict[str, ArrayLike]:
@@ -243,6 +272,18 @@ def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str
     out["status"] = np.zeros(len(mesh.points))
     out["status"][points.nodes[own]] = step.state.status[own]
     out["status"][between] = out["status"][ends].min(axis=1)
+    return out
+
+
+_ODD_COMPONENTS = {"displacement": [1], "normal": [1], "strain": [3, 4], "stress": [3, 4]}
+"""Components that change sign in the mirror image of a finger."""
+
+
+def _mirrored(name: str, values: Array) -> Array:
+    """Return the values of a field in the mirror image of a finger."""
+    out = -values if name == "shear_y" else values.copy()
+    if name in _ODD_COMPONENTS:
+        out[:, _ODD_COMPONENTS[name]] *= -1.0
     return out
 
 

@@ -5,18 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
+from finger3d.analyses.press_files import FINGERS
 from finger3d.contact.friction import OPEN
+from finger3d.errors import Outcome
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.discretise.size_advice import size_advice
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.grip import Grip
 from finger3d.mechanics.results.history import History, StepResult, measure
 from finger3d.mechanics.results.slip_limit import slip_limit
+from finger3d.objects import ObjectPose
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
@@ -120,6 +125,18 @@ class PressRecord:
         """Increments that converged; all but the last of a press that failed."""
         return [step for step in self.steps if step.outcome.ok]
 
+    @cached_property
+    def grip(self) -> Grip | None:
+        """Both fingers, where there are two."""
+        return None if self.problem.model.centre_of_mass_mm is None else Grip.of(self.problem)
+
+    def fingers(self) -> list[tuple[Problem, list[StepResult]]]:
+        """Return the problem of each finger, and its converged increments."""
+        good = self.converged_steps
+        if self.grip is None:
+            return [(self.problem, good)]
+        return [(self.grip.fingers[0], good), (self.grip.fingers[1], [step.other for step in good if step.other])]
+
     def entry(self, step: StepResult) -> Tree:
         """Return the entry of an increment in summary.json, which is measured once."""
         key = id(step)  # of an object that stays, as it is kept beside its entry
@@ -150,6 +167,19 @@ class PressRecord:
         limit = slip_limit(self.problem.points, good[-1].state, self.problem.model.friction) if good else None
         return limit.as_dict() if limit else None
 
+    def _grip_summary(self, outcome: str) -> Tree:
+        """Return what two fingers have besides: the increments of each, the object's pose, and whether it is held."""
+        if self.grip is None:
+            return {}
+        held = [step for step in self.converged_steps if step.pose and step.other]
+        fingers = [[self.entry(step) for step in held], [self.entry(step.other) for step in held if step.other]]
+        pose, failed = held[-1].pose if held else None, next((s.detail for s in self.steps if not s.outcome.ok), "")
+        return {
+            "fingers": [{"finger": name, "steps": steps} for name, steps in zip(FINGERS, fingers, strict=True)],
+            "object_pose": None if pose is None else _object_pose(pose),
+            "held": True if outcome == str(Outcome.CONVERGED) else (failed or None),
+        }
+
     def summary(self, outcome: str) -> Tree:
         """Return the content of summary.json."""
         return {
@@ -160,6 +190,7 @@ class PressRecord:
             "advice": self.advice,
             "steps": [self.entry(step) for step in self.steps],
             "slip_limit": self._slip_limit(),
+            **self._grip_summary(outcome),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
             "model_error": {name: found.as_dict() for name, found in self.model_error.items()},
@@ -171,6 +202,13 @@ class PressRecord:
             "cost": _cost(self),
             "versions": versions(),
         }
+
+
+def _object_pose(pose: ObjectPose) -> Tree:
+    """Return where an object between two fingers is, from where it was at first, and how far they have closed."""
+    turns = zip("xyz", np.degrees(pose.turns).tolist(), strict=True)
+    moved = {"x_mm": pose.slide_x_mm, "y_mm": pose.rise_mm, "z_mm": pose.slide_z_mm}
+    return {"closing_mm": pose.depth_mm, **moved, **{f"turn_{axis}_deg": turn for axis, turn in turns}}
 
 
 def _mesh(problem: Problem) -> Tree:

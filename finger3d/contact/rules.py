@@ -8,14 +8,18 @@ from typing import Final, Literal, Protocol
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.acceleration import assemble_in_place, warm_start
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.newton import ActiveSet, ActiveSetSystem, force_of_sets
+from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, force_of_sets
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution, ContactState, next_state
+from finger3d.contact.state import ContactSolution, ContactState, next_state, pressure
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
+
+_BORDERED = 15
+"""Largest number of iterations for contact forces and coordinates at once; few that converge need more."""
 
 _SOLUTIONS = 6
 """Largest number of solutions in a search for the pose of prescribed forces."""
@@ -136,10 +140,11 @@ class ForceConditions:
 def solve_to_forces(
     rule: RuleName, problem: ContactProblem, guess: Float | None, conditions: ForceConditions
 ) -> tuple[ContactSolution[ContactState], Float, Float | None]:
-    """Solve one increment, with the object moved by Newton's method until the forces meet conditions.
+    """Solve one increment, with the object moved until the forces meet conditions.
 
-    A step that does not lower the error is halved.  The search ends early: at a hundredth of the first error, or after
-    a few solutions.
+    Contact forces and coordinates are found at once by the semismooth Newton method.  Where it does not converge, the
+    object is moved by Newton's method between solutions of the contact.  A step that does not lower the error is
+    halved.  The search ends early: at a hundredth of the first error, or after a few solutions.
 
     Returns
     -------
@@ -147,6 +152,8 @@ def solve_to_forces(
     moved : (k,) by how much the object is moved
     lacking : (k,) forces over their magnitudes to which no motion leads, if there are any
     """
+    if rule == "projection" and (found := _at_once(problem, guess, conditions)):
+        return *found, None
     lacking = None
     best: tuple[float, Float, ContactSolution[ContactState]] | None = None
     moved, step, allowed, spent = np.zeros(len(conditions.forces)), np.zeros(len(conditions.forces)), 0.0, 0
@@ -184,3 +191,48 @@ def solve_to_forces(
         moved = moved + step
     assert best is not None
     return replace(best[2], iterations=spent), best[1], lacking
+
+
+def _at_once(
+    problem: ContactProblem, guess: Float | None, conditions: ForceConditions
+) -> tuple[ContactSolution[ContactState], Float] | None:
+    """Solve one increment by Newton's method for contact forces and coordinates, bordered by those of the coordinates.
+
+    Returns
+    -------
+    The solution and by how much the object is moved (k,); None where the iteration does not converge.
+    """
+    if problem.refusal:
+        return None
+    moved, shape = np.zeros(len(conditions.forces)), problem.free_motion.shape
+    motion = conditions.motion.T.reshape(len(moved), *shape)
+    force, there = warm_start(problem, problem.previous.force if guess is None else guess), problem
+    for iteration in range(1, _BORDERED + 1):
+        current = Iterate.of(there, force)
+        active = ActiveSet.of(there, current.status, current.augmented_force)
+        if not active.size:
+            return None
+        try:
+            system = ActiveSetSystem.of(there, active, assembly=assemble_in_place)
+            at_rest = system.solution()
+            changes = np.array([active.force(system.solve(-active.weighted(problem, one))) for one in motion])
+            stiffness = -conditions.resultant.T @ changes.reshape(len(moved), force.size).T
+            step, lacking = conditions.step(stiffness, conditions.missing(at_rest))
+        except np.linalg.LinAlgError:
+            return None
+        if lacking is not None:
+            return None
+        moved, force = moved + step, at_rest + np.einsum("k,kcd->cd", step, changes)
+        there = replace(problem, free_motion=problem.free_motion + np.einsum("k,kcd->cd", moved, motion))
+        after = Iterate.of(there, force)
+        error = float(np.abs(conditions.missing(force) / conditions.scale).max())
+        if error <= conditions.tolerance and after.satisfies(there, current.status):
+            mu = problem.law.friction.updated(problem.friction, current.status, pressure(force, problem.area))
+            if (mu != problem.friction).any():
+                return None
+            missed = residual(force, after.displacement, current.status, mu, problem.length_scale)
+            state = next_state(problem.previous, force, after.displacement, current.status)
+            return ContactSolution(state, Outcome.CONVERGED, missed, iteration, "newton"), moved
+        if not np.isfinite(after.mismatch):
+            return None
+    return None

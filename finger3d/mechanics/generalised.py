@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
 import numpy as np
 
 from finger3d._types import Float
@@ -32,11 +33,22 @@ _DIRECTIONS = {0: (0.0, -1.0, 0.0), 1: (1.0, 0.0, 0.0), 2: (0.0, 0.0, 1.0), 6: (
 _ACROSS = {"x": (1, 4, 5), "z": (2, 3, 4)}
 """Coordinates whose forces change sign at a symmetry plane."""
 
-_MOTIONS = "closes", "slides along x", "slides along z", "turns about x", "turns about y", "turns about z", "moves along y"
+_MOTIONS = (
+    "closes",
+    "slides along x",
+    "slides along z",
+    "turns about x",
+    "turns about y",
+    "turns about z",
+    "moves along y",
+)
 """What the object does as a coordinate changes."""
 
 _AT_LIMIT = 1e-9
 """Relative distance from the largest force that friction transmits at which it counts as reached."""
+
+_UNBALANCED = 0.1
+"""Relative error of the normal force up to which the largest tangential force is in proportion to it."""
 
 _MUCH = 1.1
 """Largest tangential force that a contact holds over the one that it slips under, beyond which a slope drives it."""
@@ -113,11 +125,9 @@ class GeneralisedForces:
         status = solution.state.status
         if not solution.outcome.ok or (status == STICK).any() or not (status == SLIP).any():
             return solution
-        if 6 in self.numbers:  # between two fingers
-            motion = None if lacking is None else _MOTIONS[self.numbers[int(np.abs(lacking).argmax())]]
-            detail = f"the object {motion}" if motion else ""
-        else:
-            detail = self._slips_under(solution.state.force, bases, images, lacking is not None)
+        detail = self._slips_under(solution.state.force, bases, images, lacking is not None)
+        if not detail and lacking is not None:
+            detail = f"the object {_MOTIONS[self.numbers[int(np.abs(lacking).argmax())]]}"
         return replace(solution, outcome=Outcome.SLIPS, detail=detail) if detail else solution
 
     def _slips_under(self, force: Float, bases: Float, images: float, slips: bool) -> str:
@@ -133,7 +143,11 @@ class GeneralisedForces:
         friction, across = (np.linalg.norm(one[:, 1:], axis=1) for one in (force, along))
         held = images * float(friction @ across + force[:, 0] @ along[:, 0])
         if 0 in self.numbers:
-            held *= self.values[self.numbers.index(0)] / -(images * np.einsum("ca,ca->", force, bases[:, :, 1]))
+            pressed = np.where(bases[:, 0, 1] > 0.0, 1.0, -1.0) * np.einsum("ca,ca->c", force, bases[:, :, 1])
+            ratio = self.values[self.numbers.index(0)] / (images * pressed.sum())
+            if abs(ratio - 1.0) > _UNBALANCED:  # an iterate far from equilibrium tells nothing
+                return ""
+            held *= ratio
         if held >= now * (1.0 - _AT_LIMIT) and not slips:
             return ""
         if held <= 0.0:
@@ -168,7 +182,9 @@ def _fields(problem: Problem, pose: ObjectPose, points: Float, numbers: Sequence
     arm = np.zeros((len(points), 3))
     arm[:, :d] = placed.brought_together(points)
     arm -= reference_point(problem, pose)
-    found = [np.tile(_DIRECTIONS[j], (len(arm), 1)) if j in _DIRECTIONS else np.cross(axes[j - 3], arm) for j in numbers]
+    found = [
+        np.tile(_DIRECTIONS[j], (len(arm), 1)) if j in _DIRECTIONS else np.cross(axes[j - 3], arm) for j in numbers
+    ]
     if placed.second is not None and 0 in numbers:  # which closes from the other side
         found[list(numbers).index(0)][placed.of_second(points)] *= -1.0
     return np.stack(found, axis=2)[:, :d]

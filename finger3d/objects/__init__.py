@@ -10,7 +10,15 @@ from finger3d.objects.shapes import Box, Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.objects.triangulated import MeshObject, ObjectFile
 
 OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
-    {"plane": Plane, "cylinder": Cylinder, "box": Box, "sphere": Sphere, "wedge": Wedge, "wave": Wave, "mesh": ObjectFile}
+    {
+        "plane": Plane,
+        "cylinder": Cylinder,
+        "box": Box,
+        "sphere": Sphere,
+        "wedge": Wedge,
+        "wave": Wave,
+        "mesh": ObjectFile,
+    }
 )
 """The objects that a scene's ``[object]`` table may name, by shape. A new object is one more entry."""
 

@@ -196,7 +196,8 @@ class PlacedObject:
         lowest = np.array([obj.x_mm, first_contact_mm, obj.z_mm])
         if second is None:
             return cls(obj, turned, lowest + pose.displacement - turned @ obj.lowest_point(initial))
-        place = second.centre + pose.displacement - pose.turn @ (second.centre - lowest + initial @ obj.lowest_point(initial))
+        from_centre = lowest - second.centre - initial @ obj.lowest_point(initial)
+        place = second.centre + pose.displacement + pose.turn @ from_centre
         down = replace(second, lowered_mm=second.lowered_mm + 2.0 * pose.depth_mm)
         return cls(obj, turned, place, down)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -209,6 +209,41 @@ def states_of(
         object_rotation=np.array([p.turned for p in placed]),
         object_place=np.array([p.place for p in placed]),
     )
+
+
+def facing(fingers: tuple[States, States], apart_mm: float, closed_mm: Array) -> States:
+    """Return the states of two fingers that face each other, of which each has those of the second in its own frame.
+
+    Parameters
+    ----------
+    apart_mm : distance of both bases at first touch
+    closed_mm : (s,) by how much it has fallen at each increment
+    """
+    first, second = fingers
+    flip = np.array([1.0, -1.0, 1.0])[: first.dim]
+    down = np.zeros((len(first.step), 1, first.dim), dtype=np.float32)
+    down[:, 0, 1] = closed_mm
+    both = {
+        name: np.concatenate([getattr(first, name), getattr(second, name)], axis=axis)
+        for names, axis in ((_OF_POINTS, 0), (_OF_STEPS, 1))
+        for name in names
+    }
+    count, of_cell = len(first.points), Mesh(second.points, second.cells, {}).element
+    return replace(
+        first,
+        **both,
+        points=np.vstack([first.points, second.points * flip + apart_mm * np.eye(first.dim)[1]]).astype(np.float32),
+        cells=np.vstack([first.cells, second.cells[:, of_cell.mirrored] + count]),
+        facets=np.vstack([first.facets, second.facets[:, of_cell.facet.mirrored] + count]),
+        nodes=np.concatenate([first.nodes, second.nodes + count]),
+        displacement=np.concatenate([first.displacement, second.displacement * flip.astype(np.float32) - down], axis=1),
+        shear_y=np.concatenate([first.shear_y, -second.shear_y], axis=1),
+    )
+
+
+_OF_POINTS = "part", "facet_face", "face", "compliance"
+_OF_STEPS = "pressure", "shear_x", "shear_z", "gap", "status"
+"""Fields that two fingers have one after the other, along their first axis and along their second."""
 
 
 def object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangles:

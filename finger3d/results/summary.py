@@ -16,7 +16,7 @@ from finger3d.mechanics.readings.columns import Column, displacement_columns, pr
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
 
-_KINDS = dict.fromkeys(("marker", "face", "status", "method", "outcome"), object) | dict.fromkeys(
+_KINDS = dict.fromkeys(("finger", "marker", "face", "status", "method", "outcome"), object) | dict.fromkeys(
     ("step", "iterations"), int
 )
 """Types of the columns of a press's tables that are no floating-point numbers."""

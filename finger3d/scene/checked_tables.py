@@ -133,7 +133,9 @@ def press_of(document: TreeView, mistakes: dict[Place, str]) -> PressTable | Leg
     if press is None and grip is None:
         mistakes["press",] = "press is missing: a table is required, or [grip] for two fingers"
     if press is not None and grip is not None:
-        mistakes["press",] = "press: must not stand beside [grip], whose fingers close by themselves; take one of the two out"
+        mistakes["press",] = (
+            "press: must not stand beside [grip], whose fingers close by themselves; take one of the two out"
+        )
     if isinstance(grip, Mapping):
         return _closing(grip, mistakes)
     if not isinstance(press, Mapping):

@@ -78,11 +78,15 @@ def _grip(tables: SceneTable, solid: bool) -> list[str]:
     if shape not in _HELD_SHAPES or (shape == "cylinder" and solid and "length_mm" not in (tables.object or {})):
         closed = "a cylinder with length_mm" if shape == "cylinder" else f"one of {', '.join(_HELD_SHAPES)}"
         lines.append(f"object.shape = {shown(shape)}: two fingers hold a closed body; must be {closed}")
-    lines += [f"effects.{name}: not with [grip]; take one of the two out" for name in _NOT_HELD if tables.effects.get(name)]
+    lines += [
+        f"effects.{name}: not with [grip]; take one of the two out" for name in _NOT_HELD if tables.effects.get(name)
+    ]
     if grip.mass_g and not any(grip.down):
         lines.append("grip.down: must be a direction, not 0, 0, 0")
     across = {"down": grip.mass_g * grip.down[2], "load_N": grip.load_N[2], "load_Nmm": any(grip.load_Nmm[:2])}
-    lines += [] if solid else [f"grip.{key}: must act in the plane of a 2D domain" for key, value in across.items() if value]
+    lines += (
+        [] if solid else [f"grip.{key}: must act in the plane of a 2D domain" for key, value in across.items() if value]
+    )
     return lines
 
 

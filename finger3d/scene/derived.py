@@ -87,8 +87,9 @@ def path_of(legs: Iterable[TreeView], design: Design, obj: RigidObject, tables: 
     weight, load = GRAVITY * 1e-3 * grip.mass_g * down, np.array(grip.load_N)
     moment = np.array(grip.load_Nmm)
     solid, mirrors = tables.model.domain == "solid", _mirrors_of_load(tables, design, obj)
-    legs_under = [(weight, 0.0 * moment)] * bool(weight.any()) + [(weight + load, moment)] * bool(load.any() or moment.any())
-    return (close, *(replace(close, **_loads(force, about, solid, mirrors)) for force, about in legs_under))
+    under = [(weight, 0.0 * moment)] if weight.any() else []
+    under += [(weight + load, moment)] if load.any() or moment.any() else []
+    return (close, *(replace(close, **_loads(force, about, solid, mirrors)) for force, about in under))
 
 
 GRAVITY = 9.80665

@@ -27,6 +27,9 @@ from finger3d.progress import Progress
 FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
 """Largest relative error of prescribed forces that are reached, in small strain and where the stiffness is factored."""
 
+_SAME_DEPTH = 1e-3
+"""Relative change of the depth in whose shares contact begins below which they stay; they change it by a thousandth."""
+
 _DEPTH_ITERATIONS = 12
 """Largest number of depths in whose shares contact begins; each changes the next by a thousandth of its error."""
 
@@ -102,7 +105,7 @@ class ToForces:
                 return []
             reached = replace(after, values=self._forces(found.state, first.pose)[list(after.numbers)])
             last = self._once(first, Move(first.pose, move.end), (reached, after))
-            if abs(last.pose.depth_mm - depth) <= FORCE_TOLERANCE * abs(depth):
+            if abs(last.pose.depth_mm - depth) <= _SAME_DEPTH * abs(depth):
                 return [first, last]
         return []
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,15 @@ class Grip:
 
     Attributes
     ----------
-    problem : of both fingers at once, without readings
     fingers : each as if it stood alone, in its own frame
+    second : the second finger in the mesh of both
+    apart_mm : distance of both bases at first touch
     touched : (3,) mm from the centre of mass to where the object touches each finger first
     """
 
-    problem: Problem
     fingers: tuple[Problem, Problem]
+    second: SecondFinger
+    apart_mm: float
     touched: tuple[Float, Float]
 
     @classmethod
@@ -51,19 +54,26 @@ class Grip:
         """Return the grip by two fingers of which this is the first."""
         obj, model, touch = finger.model.object, finger.model, finger.system.first_contact_mm
         initial, lowest = obj.initial_rotation, np.array([obj.x_mm, touch, obj.z_mm])
-        top, middle = (lowest + initial @ (point - obj.lowest_point(initial)) for point in (obj.highest_point, obj.middle))
+        above = (initial @ (own - obj.lowest_point(initial)) for own in (obj.highest_point, obj.middle))
+        top, middle = (lowest + one for one in above)
         opposite = obj.mirrored(top[0], top[2])
-        centre = middle + model.centre_of_mass_mm
+        centre = middle + np.array(model.centre_of_mass_mm)
         other = replace(finger, model=replace(model, object=opposite))
         other_touch = other.model.first_contact.first_contact_mm
         other = replace(other, system=replace(other.system, first_contact_mm=other_touch))
-        base = _APART * model.design.height_mm + top[1] - touch
-        second = SecondFinger(0.5 * base, base - (top[1] + other_touch), centre)
-        return cls(_both(finger, base, second), (finger, other), (lowest - centre, top - centre))
+        apart, base = top[1] + other_touch, _APART * model.design.height_mm + top[1] - touch
+        second = SecondFinger(0.5 * base, base - apart, centre)
+        return cls((finger, other), second, apart, (lowest - centre, top - centre))
+
+    @cached_property
+    def problem(self) -> Problem:
+        """Both fingers at once, without readings."""
+        return _both(self.fingers[0], self.second.lowered_mm + self.apart_mm, self.second)
 
     def seen(self, number: int, state: State[Any], pose: ObjectPose) -> tuple[State[Any], ObjectPose]:
         """Return a state of both fingers and the pose of the object as one finger, 0 or 1, has them in its frame."""
-        flip = _MIRRORED[: self.problem.dim] if number else np.ones(self.problem.dim)
+        dim = self.fingers[0].dim
+        flip = _MIRRORED[:dim] if number else np.ones(dim)
         moved = pose.turn @ self.touched[number] - self.touched[number]
         turns = pose.turns if not number else (-pose.turn_x, pose.turn_y, -pose.turn_z)
         rise = (pose.rise_mm + moved[1]) * (1.0 if number else -1.0)
@@ -75,7 +85,7 @@ class Grip:
         if isinstance(state.body, DeformedBody):
             size = self.problem.mesh.points.size
             u, pressures = (np.split(one, 2)[number] for one in np.split(state.body.unknowns, [size]))
-            body = DeformedBody(np.concatenate([(u.reshape(-1, self.problem.dim) * flip).ravel(), pressures]))
+            body = DeformedBody(np.concatenate([(u.reshape(-1, dim) * flip).ravel(), pressures]))
         else:
             body = state.body[points] * flip
         return State(replace(contact, bases=contact.own_bases * flip), body), own
@@ -84,7 +94,7 @@ class Grip:
 def _both(finger: Problem, base: float, second: SecondFinger) -> Problem:
     """Return the problem of a finger and its mirror image on a base at a height (mm), which has no readings."""
     model = replace(finger.model, gauges=(), markers=(), taxels=(), other_readings=())
-    mesh = _two(finger.mesh, base)
+    mesh = two(finger.mesh, base)
     system, body, count = finger.system, finger.body, len(finger.surface.nodes)
     surface = _candidates(free_surface(model, mesh, body.thickness), finger)
     mirrored = np.tile([-1.0, 1.0, 1.0][: finger.dim], count)
@@ -124,7 +134,7 @@ def _both(finger: Problem, base: float, second: SecondFinger) -> Problem:
     )
 
 
-def _two(mesh: Mesh, base: float) -> Mesh:
+def two(mesh: Mesh, base: float) -> Mesh:
     """Return a mesh and its mirror image, whose base is at a height (mm), as one mesh."""
     image = reflected(mesh, 1)
     return side_by_side(mesh, replace(image, points=image.points + base * np.eye(mesh.dim)[1]))

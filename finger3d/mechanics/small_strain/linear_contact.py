@@ -290,9 +290,15 @@ class IncrementToForces(Increment):
     Attributes
     ----------
     wanted : on the whole finger
+    is_exact : whether the end has the forces, and the gaps there are not linearised
     """
 
     wanted: GeneralisedForces
+    is_exact: bool = False
+
+    def distance_from(self, other: Increment) -> float:
+        """Return the distance of the ends of two motions, over the depth; none where the linearised gaps are exact."""
+        return 0.0 if self.is_exact else super().distance_from(other)
 
     def _solved(
         self, contact: ContactProblem, guess: Float | None, bases: Float, points: Int
@@ -310,7 +316,9 @@ class IncrementToForces(Increment):
         conditions = wanted.conditions(motion, resultant, images, (far, arm), _EXACT)
         solution, moved, lacking = solve_to_forces(problem.model.rule, contact, guess, conditions)
         solution = wanted.checked(solution, bases, images, lacking)
-        return replace(self, move=Move(self.move.start, wanted.moved(end, moved))), solution
+        missed = np.abs(conditions.missing(solution.state.force) / conditions.scale).max()
+        is_exact = is_flat and max(wanted.numbers) < 3 and float(missed) <= _EXACT
+        return replace(self, move=Move(self.move.start, wanted.moved(end, moved)), is_exact=is_exact), solution
 
 
 def motion_until_touch(problem: Problem, state: State[Any], move: Move) -> Float:
