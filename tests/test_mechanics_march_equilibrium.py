@@ -215,7 +215,7 @@ def test_moments_are_held_by_the_turns_that_have_them(large: bool) -> None:
         return forces_on(problem, formulation.loads(problem, state, poses[-1]).forces, poses[-1])
 
     same = 1e-7 if large else 1e-9
-    assert forces(steps[-1].meshed_state) [:6] == pytest.approx(wanted, abs=same)
+    assert forces(steps[-1].meshed_state)[:6] == pytest.approx(wanted, abs=same)
     moves = [Move(start, end) for start, end in pairwise(poses)]
     again, _ = solved_in_turn(problem, formulation.workspace(), formulation.start(problem), moves, 0)
     assert forces(again.state)[:6] == pytest.approx(wanted, abs=2.0 * same)

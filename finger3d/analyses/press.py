@@ -15,6 +15,7 @@ from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.analyses.result import PressResult, result_in
+from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, measure
@@ -41,6 +42,7 @@ def press(
     figures: bool | None = None,
     error: bool = True,
     overrides: Sequence[str] = (),
+    least_grip: bool = False,
 ) -> PressResult:
     """Press a scene, and write its results into a folder.
 
@@ -52,6 +54,7 @@ def press(
     figures : whether to draw PNG files and to write report.html; None: if a folder is given
     error : whether to estimate the errors due to the mesh and the increments
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+    least_grip : whether to find the smallest grip that holds, of a scene with two fingers
 
     Returns
     -------
@@ -70,22 +73,30 @@ def press(
 
     started = time.perf_counter()
     scene = scene_of(scene, overrides)
+    if least_grip and scene.tables.grip is None:
+        raise Finger3dError("--least-grip: only of a scene with [grip]")
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
-        record = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures)
+        record = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures, least_grip)
     return result_in(folder, record.history, temporary)
 
 
 def run_press(
-    scene: Scene, writer: ResultWriter, report: Progress, started: float, error: bool, figures: bool
+    scene: Scene,
+    writer: ResultWriter,
+    report: Progress,
+    started: float,
+    error: bool,
+    figures: bool,
+    least_grip: bool = False,
 ) -> PressRecord:
     """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
 
     Parameters
     ----------
     started : `time.perf_counter()` at the start of the job, s
-    error, figures : whether to estimate the errors; whether to draw
+    error, figures, least_grip : whether to estimate the errors; to draw; to find the smallest grip that holds
     """
     from finger3d.analyses.effects_by_need import settled
 
@@ -100,6 +111,9 @@ def run_press(
                 _estimate_errors(record, report, companions)
                 writer.markers(record)
                 _estimate_changes(record, report)
+                writer.summary(record, record.outcome())
+            if least_grip:
+                _find_least_grip(record, report)
                 writer.summary(record, record.outcome())
             if figures:
                 from finger3d.report.press import press_page
@@ -275,6 +289,18 @@ def _estimate_errors(record: PressRecord, report: Progress, companions: Companio
     by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers)
     method = f"{found.method}; no errors by the spread of the modulus: {why}" if why else found.method
     record.error_estimate = replace(found, modulus=by_modulus, method=method)
+
+
+def _find_least_grip(record: PressRecord, report: Progress) -> None:
+    """Find the smallest grip that holds; none where the scene's own does not."""
+    from finger3d.analyses.least_grip import least_grip
+
+    if not record.history.outcome.ok:
+        record.warnings.append("least grip: the scene's own grip does not hold the object; ask with a larger one")
+        return
+    report.stage("looking for the smallest grip that holds")
+    ends = [record.entry(steps[-1])["normal_force_N"] for _, steps in record.fingers()]
+    record.least_grip_N = least_grip(record.problem, 0.5 * sum(ends), report)
 
 
 def _estimate_changes(record: PressRecord, report: Progress) -> None:

@@ -67,6 +67,7 @@ class PressRecord:
     largest_strain : principal strain at the end, without singular corners
     need : which effects are on because the scene calls for them, if it leaves that open
     model_error : what the effects that are off would change, by name
+    least_grip_N : smallest grip that holds, if it was asked for
     warnings, advice : lines for the user
     seconds : time by stage, s
     workspace : factors that increments leave for the next, those of the error estimate not among them
@@ -85,6 +86,7 @@ class PressRecord:
     largest_strain: float = 0.0
     need: Need | None = None
     model_error: Mapping[str, ChangeEstimate] = field(default_factory=dict)
+    least_grip_N: float | None = None
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -161,23 +163,22 @@ class PressRecord:
         failed = next((step for step in self.steps if not step.outcome.ok), None)
         return str(self.history.outcome) if failed is None else failed.failure
 
-    def _slip_limit(self) -> Tree | None:
-        """Return what the contact of the last converged increment holds before it slips as a whole."""
-        good = self.converged_steps
-        limit = slip_limit(self.problem.points, good[-1].state, self.problem.model.friction) if good else None
-        return limit.as_dict() if limit else None
-
     def _grip_summary(self, outcome: str) -> Tree:
         """Return what two fingers have besides: the increments of each, the object's pose, and whether it is held."""
         if self.grip is None:
             return {}
         held = [step for step in self.converged_steps if step.pose and step.other]
-        fingers = [[self.entry(step) for step in held], [self.entry(step.other) for step in held if step.other]]
+        fingers = [
+            {"finger": name, "slip_limit": _slip_limit(own, steps), "steps": [self.entry(step) for step in steps]}
+            for name, (own, steps) in zip(FINGERS, self.fingers(), strict=True)
+            if steps
+        ]
         pose, failed = held[-1].pose if held else None, next((s.detail for s in self.steps if not s.outcome.ok), "")
         return {
-            "fingers": [{"finger": name, "steps": steps} for name, steps in zip(FINGERS, fingers, strict=True)],
+            "fingers": fingers,
             "object_pose": None if pose is None else _object_pose(pose),
             "held": True if outcome == str(Outcome.CONVERGED) else (failed or None),
+            "least_grip_N": self.least_grip_N,
         }
 
     def summary(self, outcome: str) -> Tree:
@@ -189,7 +190,7 @@ class PressRecord:
             "warnings": self.warnings,
             "advice": self.advice,
             "steps": [self.entry(step) for step in self.steps],
-            "slip_limit": self._slip_limit(),
+            "slip_limit": _slip_limit(self.problem, self.converged_steps),
             **self._grip_summary(outcome),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
@@ -202,6 +203,12 @@ class PressRecord:
             "cost": _cost(self),
             "versions": versions(),
         }
+
+
+def _slip_limit(problem: Problem, steps: Sequence[StepResult]) -> Tree | None:
+    """Return what the contact after the last of converged increments holds before it slips as a whole."""
+    limit = slip_limit(problem.points, steps[-1].state, problem.model.friction) if steps else None
+    return limit.as_dict() if limit else None
 
 
 def _object_pose(pose: ObjectPose) -> Tree:

@@ -18,6 +18,9 @@ from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
 
+_HELD = 1e-10
+"""Relative error of the forces up to which an increment that changes nothing else needs no iteration."""
+
 _BORDERED = 15
 """Largest number of iterations for contact forces and coordinates at once; few that converge need more."""
 
@@ -207,8 +210,16 @@ def _at_once(
     moved, shape = np.zeros(len(conditions.forces)), problem.free_motion.shape
     motion = conditions.motion.T.reshape(len(moved), *shape)
     force, there = warm_start(problem, problem.previous.force if guess is None else guess), problem
-    for iteration in range(1, _BORDERED + 1):
+    for iteration in range(_BORDERED + 1):
         current = Iterate.of(there, force)
+        error = float(np.abs(conditions.missing(force) / conditions.scale).max())
+        if error <= (conditions.tolerance if iteration else _HELD) and current.satisfies(there, current.status):
+            mu = problem.law.friction.updated(problem.friction, current.status, pressure(force, problem.area))
+            if (mu != problem.friction).any():
+                return None
+            missed = residual(force, current.displacement, current.status, mu, problem.length_scale)
+            state = next_state(problem.previous, force, current.displacement, current.status)
+            return ContactSolution(state, Outcome.CONVERGED, missed, iteration, "newton"), moved
         active = ActiveSet.of(there, current.status, current.augmented_force)
         if not active.size:
             return None
@@ -224,15 +235,6 @@ def _at_once(
             return None
         moved, force = moved + step, at_rest + np.einsum("k,kcd->cd", step, changes)
         there = replace(problem, free_motion=problem.free_motion + np.einsum("k,kcd->cd", moved, motion))
-        after = Iterate.of(there, force)
-        error = float(np.abs(conditions.missing(force) / conditions.scale).max())
-        if error <= conditions.tolerance and after.satisfies(there, current.status):
-            mu = problem.law.friction.updated(problem.friction, current.status, pressure(force, problem.area))
-            if (mu != problem.friction).any():
-                return None
-            missed = residual(force, after.displacement, current.status, mu, problem.length_scale)
-            state = next_state(problem.previous, force, after.displacement, current.status)
-            return ContactSolution(state, Outcome.CONVERGED, missed, iteration, "newton"), moved
-        if not np.isfinite(after.mismatch):
+        if not np.isfinite(force).all():
             return None
     return None

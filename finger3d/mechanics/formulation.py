@@ -48,11 +48,13 @@ class Loads(NamedTuple):
     places : (k, d) mm, where they act
     displacement : (k, d) mm, there
     force : (k, d) N
+    at_rest : whether the places are those at rest, as in small strain
     """
 
     places: Float
     displacement: Float
     force: Float
+    at_rest: bool = False
 
     @property
     def moment(self) -> Float:
@@ -63,8 +65,8 @@ class Loads(NamedTuple):
 
     @property
     def forces(self) -> tuple[Float, Float]:
-        """Places and forces."""
-        return self.places, self.force
+        """Places of the displaced body, and the forces there."""
+        return self.places + self.displacement if self.at_rest else self.places, self.force
 
     def work_from(self, before: Loads) -> float:
         """Work (mJ) since other loads of the same points, by the trapezoidal rule."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from finger3d._types import Float
+from finger3d._types import Float, Int
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.rules import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
@@ -75,13 +75,18 @@ class GeneralisedForces:
         units = ("N" if number in _DIRECTIONS else "N mm" for number in self.numbers)
         return ", ".join(f"{value:.5g} {unit}" for value, unit in zip(self.values, units, strict=True))
 
+    @property
+    def places(self) -> Int:
+        """Places (k,) of the free coordinates among those of an `ObjectPose`."""
+        return _PLACES[list(self.numbers)]
+
     def coordinates(self, pose: ObjectPose) -> Float:
         """Return the free coordinates (k,) of a pose, mm and rad."""
-        return np.asarray(pose.coordinates[_PLACES[list(self.numbers)]])
+        return np.asarray(pose.coordinates[self.places])
 
     def moved(self, pose: ObjectPose, change: Float) -> ObjectPose:
         """Return a pose with the free coordinates changed."""
-        return pose.changed(_PLACES[list(self.numbers)], change)
+        return pose.changed(self.places, change)
 
     def placed(self, pose: ObjectPose, coordinates: Float) -> ObjectPose:
         """Return a pose with given free coordinates (k,)."""
@@ -126,7 +131,7 @@ class GeneralisedForces:
         if not solution.outcome.ok or (status == STICK).any() or not (status == SLIP).any():
             return solution
         detail = self._slips_under(solution.state.force, bases, images, lacking is not None)
-        if not detail and lacking is not None:
+        if not detail and lacking is not None and 6 in self.numbers:
             detail = f"the object {_MOTIONS[self.numbers[int(np.abs(lacking).argmax())]]}"
         return replace(solution, outcome=Outcome.SLIPS, detail=detail) if detail else solution
 
@@ -152,7 +157,11 @@ class GeneralisedForces:
             return ""
         if held <= 0.0:
             return f"{asked:.6g} N asked; the contact pushes {-held:.3g} N the other way"
-        most = f"{asked:.6g} N asked; the contact holds at most {held:.9g} N, "
+        axis = int(np.abs(wanted).argmax())
+        moves = (
+            f"the object slides along {'-' if wanted[axis] < 0.0 else ''}{'xyz'[axis]}; " if 6 in self.numbers else ""
+        )
+        most = f"{moves}{asked:.6g} N asked; the contact holds at most {held:.9g} N, "
         slides = held > _MUCH * asked
         return most + ("but slides down its slope under less" if slides else f"{100.0 * held / asked:.4g} % of it")
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from finger3d.objects.first_contact import ContactPath, FirstTouch, InitialContact, first_touch, initial_contact
-from finger3d.objects.placed import DistanceTracker, Move, ObjectPose, PlacedObject, SecondFinger
+from finger3d.objects.placed import TIME, DistanceTracker, Move, ObjectPose, PlacedObject, SecondFinger
 from finger3d.objects.rigid import Axis, HeldBody, RigidObject, vertical_frame
 from finger3d.objects.shapes import Box, Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.objects.triangulated import MeshObject, ObjectFile
@@ -24,6 +24,7 @@ OBJECTS: Mapping[str, type[RigidObject]] = MappingProxyType(
 
 __all__ = [
     "OBJECTS",
+    "TIME",
     "Axis",
     "Box",
     "ContactPath",

@@ -18,7 +18,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.objects.rigid import RigidObject, rotation
 from finger3d.objects.triangulated import MeshObject
 
-_TIME = 3
+TIME = 3
 """Place of the time among the coordinates of a pose."""
 
 
@@ -114,7 +114,7 @@ class Move:
         Time is compared only where the object rested before.  The direction of a slide along an arc counts as the same.
         """
         last, now = before.change, self.change
-        in_space = np.arange(len(last)) != _TIME
+        in_space = np.arange(len(last)) != TIME
         if last[in_space].any():
             last, now = last[in_space], now[in_space]
         if not last.any():

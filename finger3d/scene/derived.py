@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def _mirrors_of_load(tables: SceneTable, design: Design, obj: RigidObject) -> se
     return found
 
 
-def _loads(force: Float, moment: Float, solid: bool, mirrors: set[str]) -> dict[str, float]:
+def _loads(force: Float, moment: Float, solid: bool, mirrors: set[str]) -> dict[str, Any]:
     """Return the forces and moments of a leg, but for those of coordinates that a symmetry holds."""
     held = {"x": {"force_x_N", "moment_y_Nmm", "moment_z_Nmm"}, "z": {"force_z_N", "moment_x_Nmm", "moment_y_Nmm"}}
     loads = {f"force_{axis}_N": float(force[i]) for i, axis in enumerate("xyz")}

@@ -21,7 +21,7 @@ from finger3d.mechanics.march.force_control import deepest
 from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, combined, solved_in_turn
 from finger3d.mechanics.results.state import State
 from finger3d.mechanics.small_strain.elastic import SmallStrain
-from finger3d.objects import Move, ObjectPose
+from finger3d.objects import TIME, Move, ObjectPose
 from finger3d.progress import Progress
 
 FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
@@ -74,6 +74,10 @@ class ToForces:
         says why, and state and pose are those at the beginning.
         """
         model = self.problem.model
+        if self.last is not None and self._changes_nothing(move, before, after):
+            rest = Substep(self.state, self.state, Move(move.start, move.start), self.last.residual)
+            held = ContactSolution(self.state, Outcome.CONVERGED, self.last.residual, 0, "held")
+            return Advanced(held, [rest], move.start)
         begins = model.begins_in_parts and not self.state.contact.force.any()
         ends = self._by_depths(move, before, after) if begins and not model.finite_strain else []
         now, begin = before, move.start
@@ -87,6 +91,14 @@ class ToForces:
             now, begin = wanted, ends[-1].pose
         solution = combined([end.solution for end in ends], ends[-1].solution.state)
         return Advanced(solution, [part for end in ends for part in end.parts], ends[-1].pose)
+
+    def _changes_nothing(self, move: Move, before: GeneralisedForces, after: GeneralisedForces) -> bool:
+        """Return whether forces and coordinates are held that the state has, in a body that does not relax."""
+        if self.problem.model.relaxation is not None:
+            return False
+        rests = not np.delete(move.change, [*after.places, TIME]).any()
+        scale = after.scale(self.problem.model.design.height_mm)
+        return rests and bool((np.abs(after.values - before.values) <= self._round_off * scale).all())
 
     def _by_depths(self, move: Move, before: GeneralisedForces, after: GeneralisedForces) -> list[Advanced]:
         """Return the parts of an increment that begins contact, at shares of the depth that has the force at its end.

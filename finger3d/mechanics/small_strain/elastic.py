@@ -80,7 +80,7 @@ def at_rest(problem: Problem) -> ContactState:
 
 def linear_loads(problem: Problem, contact: ContactState, moved: Float) -> Loads:
     """Return the forces of the contact points, which are displaced by `moved` (c, d), at their centroids at rest."""
-    return Loads(problem.surface.centroids, moved, contact.scene_force)
+    return Loads(problem.surface.centroids, moved, contact.scene_force, at_rest=True)
 
 
 def linear_gap(problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:

@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from finger3d._types import Float, Int
+from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
 from finger3d.contact.rules import RULES, solve_to_forces
@@ -225,22 +225,23 @@ class Increment:
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
             contact = ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area)
-            return self._solved(contact, guess, bases, np.arange(len(bases)))
+            return self._solved(contact, guess, bases, problem.surface.centroids + expansion_point)
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
         contact = ContactProblem.of(
             start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
         )
-        increment, part = self._solved(contact, expected[near], bases[near], near)
+        at = problem.surface.centroids[near] + expansion_point[near]
+        increment, part = self._solved(contact, expected[near], bases[near], at)
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)
         force[near], status[near] = part.state.force, part.state.status
         return increment, replace(part, state=replace(start, force=force, status=status))
 
     def _solved(
-        self, contact: ContactProblem, guess: Float | None, bases: Float, points: Int
+        self, contact: ContactProblem, guess: Float | None, bases: Float, at: Float
     ) -> tuple[Self, ContactSolution[ContactState]]:
-        """Return the contact solution of points by their numbers, with bases (k, d, d), and the increment it is for."""
+        """Return the contact solution of points at (k, d) mm, with bases (k, d, d), and the increment it is for."""
         return self, RULES[self.problem.model.rule](contact, guess)
 
     def relative(self, geometry: ContactGeometry, expansion_point: Float, displacement: Float) -> Float:
@@ -301,11 +302,11 @@ class IncrementToForces(Increment):
         return 0.0 if self.is_exact else super().distance_from(other)
 
     def _solved(
-        self, contact: ContactProblem, guess: Float | None, bases: Float, points: Int
+        self, contact: ContactProblem, guess: Float | None, bases: Float, at: Float
     ) -> tuple[Self, ContactSolution[ContactState]]:
         """Move the object until the points have the forces; no further than distances are exact."""
         problem, end, wanted = self.problem, self.move.end, self.wanted
-        at, images = problem.surface.centroids[points], 2.0 ** len(problem.axes)
+        images = 2.0 ** len(problem.axes)
         design, is_flat = problem.model.design, problem.model.object.is_flat
         far, arm = design.height_mm if is_flat else _NEAR * length_scale(problem, self.move), design.height_mm
         size = bases[:, 0].size, len(wanted.numbers)
