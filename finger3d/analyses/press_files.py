@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.mechanics.discretise.contact_points import ContactPoints
-from finger3d.mechanics.march.grip import two
+from finger3d.mechanics.march.grip import FINGERS, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
 from finger3d.mechanics.results.history import StepResult, contact_table, row_of_entry
 from finger3d.results.states import States, facing, object_drawing, states_of, write_states
@@ -35,9 +35,6 @@ _WRITE_EVERY_S = 0.5
 
 _WRITE_SHARE = 10.0
 """Shortest time between two writes over the time of one: a table holds all increments, and grows with them."""
-
-FINGERS = "lower", "upper"
-"""Names of two fingers."""
 
 _INCOMPLETE = "incomplete: the press was still running, or was interrupted; the increments written are valid"
 _SUMMARY, _SCENE = "summary.json", "scene.toml"

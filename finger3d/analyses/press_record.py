@@ -12,13 +12,12 @@ import numpy as np
 
 from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Tree
-from finger3d.analyses.press_files import FINGERS
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
 from finger3d.geometry.imported import extent
 from finger3d.mechanics.discretise.size_advice import size_advice
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.grip import Grip
+from finger3d.mechanics.march.grip import FINGERS, Grip
 from finger3d.mechanics.results.history import History, StepResult, measure
 from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.objects import ObjectPose

@@ -25,6 +25,9 @@ from finger3d.mechanics.finite_strain.state import DeformedBody
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, SecondFinger
 
+FINGERS = "lower", "upper"
+"""Names of both fingers."""
+
 _MIRRORED = np.array([1.0, -1.0, 1.0])
 """Factors of a vector's components in the mirror image of a finger."""
 
