@@ -1,9 +1,14 @@
-"""How far does an object of 45 g creep in a minute between two pads that press it with 12 N, at mu = 1?
+"""How far does an object of 45 g creep in a minute between two pads that press it with 12 N, at mu = 1; how much grip
+does it take?
 
-Each pad carries half of the weight, 0.22 N, under a limit of 12 N.  finger3d: one pad, a cube of 20 mm, E = 1 MPa and
-nu = 0.45, fixed behind, is pressed on a plane with 12 N, then loaded with 0.22 N, then held for 60 s in 60 increments;
-without viscosity nothing depends on time.  The creep is the largest change in the hold of the depth, a slide, or the
-gap, slip or displacement of a contact point.
+Each pad carries half of the weight, 0.22 N, under a limit of 12 N.  finger3d: two pads, cubes of 20 mm, E = 1 MPa and
+nu = 0.45, fixed behind, close on a free box of 40 x 40 x 120 mm with 12 N; its weight grows, and then it is held in 60
+increments.  Without viscosity nothing depends on time.  The creep is the largest change in the hold of the object's
+pose, or of the gap, slip or displacement of a contact point.
+
+The least grip is the smallest force that holds: m g / (2 mu) by Coulomb's law.  In finger3d it is found by bisection to
+1 %.  In MuJoCo every force lets the object creep; it counts as held at forces at which it falls by less than 10 mm in
+the first second, of the 4.9 m of a free fall.
 
 MuJoCo, with default settings unless the table says otherwise (Newton's solver, Euler, a time step of 2 ms, solref
 0.02 1, solimp 0.9 0.95 0.001 0.5 2), but with the elliptic cone, which is Coulomb's: a free box of 40 x 40 x 120 mm and
@@ -27,28 +32,34 @@ from __future__ import annotations
 import csv
 import importlib.util
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from finger3d.contact.friction import Coulomb
+from finger3d.analyses.least_grip import least_grip
 from finger3d.errors import MissingError
-from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.objects import TIME
+from finger3d.progress import QUIET
+from finger3d.scene import scene_of
 
 from ._paper import columns
 from ._rows import Result, Row
 from .held_weights import largest_change
 
 MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
-LOAD = 0.5 * MASS * G
+LEAST_GRIP = 0.5 * MASS * G / MU
+FALLS = 10.0
+"""Fall (mm) in a second from which an object is not held."""
+
 DOCS = "MuJoCo documentation, Computation, Solver parameters"
-COLUMNS = "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min"
+COLUMNS = (
+    "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min "
+    "least_grip_N"
+)
 TEXT = ("program", "pads")
 
 
@@ -97,49 +108,68 @@ GRIPS = (
 )
 
 
-def mujoco_creep(grip: Grip, seconds: float) -> tuple[float, int]:
-    """Fall (mm a minute) of the object in a time that begins at 1 s, and the number of contacts at its end."""
+def mujoco_fall(grip: Grip, force: float, begin: float, seconds: float) -> tuple[float, int]:
+    """Fall (mm) of the object in a time (s) from its begin (s) under a force (N), and contacts at its end."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(grip.xml())
     data = mujoco.MjData(model)
-    data.ctrl[:] = NORMAL
+    data.ctrl[:] = force
     per_second = round(1.0 / grip.step_s)
-    mujoco.mj_step(model, data, per_second)
+    mujoco.mj_step(model, data, round(begin * per_second))
     start = float(data.qpos[2])
     mujoco.mj_step(model, data, round(seconds * per_second))
-    return 1e3 * (start - float(data.qpos[2])) * 60.0 / seconds, int(data.ncon)
+    return 1e3 * (start - float(data.qpos[2])), int(data.ncon)
 
 
-def finger3d_creep(size: float, increments: int) -> float:
-    """Largest change in the hold, mm."""
-    pad = designs()["block"](half_length_mm=10.0, height_mm=20.0, width_mm=20.0)
-    press = Leg(1.0, steps=2, duration_s=1.0, force_N=NORMAL)
-    load = Leg(1.0, steps=2, duration_s=1.0, force_N=NORMAL, force_x_N=LOAD)
-    hold = Leg(1.0, steps=increments, duration_s=HOLD_S, force_N=NORMAL, force_x_N=LOAD)
-    mesh = MeshOptions(size, 2.0 * size, "swept")
-    problem = build(Model(pad, Isotropic(1.0, 0.45), mesh, (press, load, hold), friction=Coulomb(MU)))
-    steps = list(march(problem))
-    assert all(step.outcome.ok for step in steps)
-    return largest_change(problem, steps[3:])
+def mujoco_least_grip(grip: Grip) -> float:
+    """Smallest force (N), to 1 %, at which the object falls by less than `FALLS` in its first second."""
+    low, high = 0.01 * NORMAL, NORMAL
+    while high > 1.01 * low:
+        force = float(np.sqrt(low * high))
+        low, high = (low, force) if mujoco_fall(grip, force, 0.0, 1.0)[0] < FALLS else (force, high)
+    return high
+
+
+def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
+    """Largest change in the hold, mm, and the least grip, N."""
+    tables = {
+        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 20.0, "width_mm": 20.0},
+        "object": {"shape": "box", "size_mm": (40.0, 40.0, 120.0)},
+        "material": {"E_MPa": 1.0, "nu": 0.45},
+        "friction": {"mu": MU},
+        "grip": {"force_N": NORMAL, "mass_g": 1e3 * MASS * G / 9.80665, "steps": 2},
+        "mesh": {"size_mm": size, "base_size_mm": 2.0 * size, "mesher": "swept"},
+        "effects": {"auto": False},
+    }
+    problem = build(scene_of(tables).model())
+    close, weigh = problem.model.legs
+    hold = replace(weigh, steps=increments, duration_s=HOLD_S)
+    held = replace(problem, model=replace(problem.model, legs=(close, weigh, hold)))
+    steps = list(march(held))
+    assert all(step.outcome.ok and step.pose for step in steps)
+    poses = np.array([np.delete(step.pose.coordinates, TIME) for step in steps[3:] if step.pose])
+    moved = float(np.abs(poses - poses[0]).max())
+    return max(moved, largest_change(problem, steps[3:])), least_grip(problem, NORMAL, QUIET)
 
 
 def run(quick: bool) -> Result:
     """Quick: a coarse pad, and 2 s of two of MuJoCo's models."""
-    ours = finger3d_creep(5.0 if quick else 2.5, 6 if quick else 60)
+    ours, least = finger3d_hold(5.0 if quick else 2.5, 6 if quick else 60)
     if importlib.util.find_spec("mujoco") is None:
         theirs = _committed()
     else:
-        theirs = [_line(grip, *mujoco_creep(grip, 2.0 if quick else HOLD_S)) for grip in GRIPS[: 2 if quick else None]]
-    lines = [("finger3d", "block, E = 1 MPa", 0.0, 0.0, 0.0, 0.0, 0.0, ours, 0.0), *theirs]
+        theirs = [_line(grip, 2.0 if quick else HOLD_S) for grip in GRIPS[: 2 if quick else None]]
+    lines = [("finger3d", "block, E = 1 MPa", 0.0, 0.0, 0.0, 0.0, 0.0, ours, 0.0, least), *theirs]
     table = columns(COLUMNS, lines)
-    return Result(tuple(_rows(ours, theirs)), table, lambda figure: _draw(figure, table))
+    return Result(tuple(_rows(ours, least, theirs)), table, lambda figure: _draw(figure, table))
 
 
-def _line(grip: Grip, creep: float, contacts: int) -> tuple[Any, ...]:
+def _line(grip: Grip, seconds: float) -> tuple[Any, ...]:
+    fall, contacts = mujoco_fall(grip, NORMAL, 1.0, seconds)
     formula = np.nan if grip.noslip else grip.formula()
     shown = 1e3 * grip.step_s, grip.impratio, float(grip.noslip), float(contacts)
-    return "MuJoCo", grip.pads, grip.pad_kg, *shown, creep, formula
+    return "MuJoCo", grip.pads, grip.pad_kg, *shown, fall * 60.0 / seconds, formula, mujoco_least_grip(grip)
 
 
 def _committed() -> list[tuple[Any, ...]]:
@@ -154,7 +184,7 @@ def _committed() -> list[tuple[Any, ...]]:
     return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
 
 
-def _rows(ours: float, theirs: list[tuple[Any, ...]]) -> list[Row]:
+def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> list[Row]:
     t = [dict(zip(COLUMNS.split(), line, strict=True)) for line in theirs]
     default, noslip = t[0], t[1]
     soft = [line for line in t if not line["noslip_iterations"]]
@@ -163,6 +193,9 @@ def _rows(ours: float, theirs: list[tuple[Any, ...]]) -> list[Row]:
     found = [
         Row("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours, 0.0,
             "a bound above round-off", measure="at most"),
+        Row("least grip, finger3d (N)", "m g / (2 mu)", LEAST_GRIP, least, 0.01, "bisection to 1 %"),
+        Row(f"least grip, {here}: a fall of {FALLS:g} mm in 1 s (N)", "m g / (2 mu)", LEAST_GRIP,
+            default["least_grip_N"], 0.0, "soft friction creeps before it slips", "sensitivity", "at least"),
         Row(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], 0.0, "a micron",
             "sensitivity", "at least"),
         Row("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}", default["creep_mm_per_min"],
@@ -193,12 +226,25 @@ def _label(line: tuple[Any, ...]) -> str:
 
 
 def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
-    """Creep of every model on a logarithmic axis, on which a bar begins at 1e-16."""
-    axes = figure.subplots()
+    """Creep of every model on a logarithmic axis, and the smallest force that holds over that of Coulomb's law."""
+    figure.set_size_inches(11.0, 5.0)
+    left, right = figure.subplots(1, 2, sharey=True)
     lines = list(zip(*table.values(), strict=True))[::-1]
-    creep = np.abs([line[COLUMNS.split().index("creep_mm_per_min")] for line in lines])
-    bars = axes.barh(
-        [_label(line) for line in lines], np.maximum(creep, 1e-16), left=0.0, color=["C1"] * (len(lines) - 1) + ["C0"]
+    labels, names = [_label(line) for line in lines], COLUMNS.split()
+    creep, least = (
+        np.array([line[names.index(name)] for line in lines]) for name in ("creep_mm_per_min", "least_grip_N")
     )
-    axes.bar_label(bars, [f" {value:.0f}" if value >= 10.0 else f" {value:.2g}" for value in creep], fontsize=8)
-    axes.set(xscale="log", xlim=(1e-16, 1e5), xlabel="creep in a minute (mm): 45 g held with 12 N, mu = 1")
+    colours = ["C1"] * (len(lines) - 1) + ["C0"]
+    for label, value, colour in zip(labels, np.abs(creep), colours, strict=True):
+        if value > 0.0:
+            left.plot(value, label, "o", color=colour)
+            left.annotate(f"{value:.2g}" if value < 10.0 else f"{value:.0f}", (value, label), (6, 0),
+                          textcoords="offset points", va="center", fontsize=8)  # fmt: skip
+        else:
+            left.annotate("none", (1e-4, label), (6, 0), textcoords="offset points", va="center", color=colour)
+    left.set(xscale="log", xlim=(1e-4, 1e4), xlabel="creep in a minute (mm): 45 g held with 12 N, mu = 1")
+    right.scatter(least / LEAST_GRIP, labels, color=colours)
+    right.axvline(1.0, color="0.5", lw=0.8)
+    right.set(xlim=(0.98, 1.02), xlabel="smallest force that holds, over m g / (2 mu)")
+    for axes in (left, right):
+        axes.grid(axis="x", color="0.9")
