@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,8 +13,10 @@ import scipy.sparse as sp
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
@@ -175,3 +178,10 @@ def test_the_papers_rule_goes_on_from_a_state_in_which_friction_helps_slip() -> 
     assert pressed.state.force[:, 0].sum() > 1.0
     assert slid.outcome is Outcome.CONVERGED  # with all points slipping the same way
     assert slid.state.force[:, 0].sum() == pytest.approx(pressed.state.force[:, 0].sum(), rel=1e-6)
+
+
+def test_held_ends_are_no_contact_points_at_large_deformation() -> None:
+    """Their points cannot move along z, and would have no compliance in that direction."""
+    problem = build(LargeDeformation().apply(fig9(held_ends=True)), margin=math.inf)
+    assert FREE_FACES.index("ends") not in problem.surface.face
+    assert np.diagonal(problem.delassus.reshape(problem.surface.points.size, -1)).min() > 0.0

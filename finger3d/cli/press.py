@@ -21,6 +21,15 @@ if TYPE_CHECKING:
     from finger3d.progress import Progress
 
 
+_SIDEWAYS = (
+    "tangential_force_x_N", "tangential_force_z_N", "slide_x_mm", "slide_z_mm",
+    "turn_x_deg", "turn_y_deg", "turn_z_deg",
+)  # fmt: skip
+"""Numbers of a path that leaves the press axis; they are printed where they are not 0."""
+
+_ROUND_OFF = 1e-9
+
+
 @app.command
 def press(
     scene: Path,
@@ -144,6 +153,9 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
     yield depth.title, f"{line(depth, last[depth.name])}, increment {summary['steps'].index(last) + 1}"
     for one in named(*MAIN, *AREAS):
         yield one.title, line(one, last[one.name])
+    for one in named(*_SIDEWAYS):
+        if abs(last[one.name]) > _ROUND_OFF * (last["friction_sum_N"] if one.unit == "N" else 1.0):
+            yield one.title, line(one, last[one.name])
     read = {c: v for c, v in readings_of(last["gauges"], last["markers"], last["taxels"]).items() if v is not None}
     for (kind, sensor), group in groupby(read, key=lambda c: (c.kind, c.sensor)):
         name, columns = f"{'strain' if kind == 'gauge' else kind} {sensor}", list(group)

@@ -262,8 +262,12 @@ class Problem:
 
 
 def free_surface(model: Model, mesh: Mesh, thickness: float) -> BoundarySurface:
-    """Return the points of all faces that may touch the object; an elastic one touches the contact face only."""
+    """Return the points of all faces that may touch the object; an elastic one touches the contact face only.
+
+    Ends that are held do not move towards it.
+    """
     labels = FREE_FACES if model.object_compliance is None else FREE_FACES[:1]
+    labels = tuple(label for label in labels if not (label == "ends" and model.held_ends))
     return joined([surface(mesh, label, thickness) for label in labels if len(mesh.facets.get(label, ()))])
 
 
