@@ -93,13 +93,14 @@ def _kept(out: Path, report: Progress) -> str:
 def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the closing table: numbers of the last step that converged, with their errors, and files."""
     from finger3d.accuracy.error_bars import ErrorBars
+    from finger3d.results.summary import grip_rows
 
     bars, estimate = ErrorBars.of_summary(summary), summary.get("error_estimate")
     steps = [step for step in summary["steps"] if step["outcome"] == str(Outcome.CONVERGED)]
     yield "outcome", summary["outcome"]
     for name, one in ((summary.get("effects_auto") or {}).get("judged") or {}).items():
         yield name.replace("_", " "), f"{'used' if one['used'] else 'not used'}: {one['why']}"
-    yield from _grip(summary)
+    yield from grip_rows(summary)
     if steps:
         yield from _numbers(summary, steps[-1], bars)
         yield "residual", f"{max(step['residual'] for step in steps):.1e}, the largest of all increments"
@@ -112,24 +113,6 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
     for path in sorted(out.iterdir()):
         if path.is_file() and not path.name.startswith("."):
             yield "", path.name
-
-
-def _grip(summary: TreeView) -> Iterator[tuple[str, str]]:
-    """Yield what two fingers have besides: whether they hold the object, where it is, how near each is to slipping."""
-    if "fingers" not in summary:
-        return
-    held, pose = summary["held"], summary["object_pose"]
-    yield "held", "yes" if held is True else f"no: {held}"
-    if least := summary["least_grip_N"]:
-        yield "least grip", f"{least:.4g} N, within 1 %"
-    if pose:
-        turns = ", ".join(f"{pose[f'turn_{axis}_deg']:.3g}" for axis in "xyz")
-        moved = ", ".join(f"{pose[f'{axis}_mm']:.4g}" for axis in "xyz")
-        yield "object", f"moved by {moved} mm, turned by {turns} deg; each finger closed by {pose['closing_mm']:.4g} mm"
-    for finger in summary["fingers"]:
-        last, limit = finger["steps"][-1], finger["slip_limit"]
-        used = f", {100.0 * limit['used']:.3g} % of its friction used" if limit else ""
-        yield f"{finger['finger']} finger", f"normal force {last['normal_force_N']:.5g} N{used}"
 
 
 def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tuple[str, str]]:

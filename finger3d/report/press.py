@@ -18,7 +18,7 @@ from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table,
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
-from finger3d.results.summary import PressStep, gauges_of, read_json, steps_of, title_of
+from finger3d.results.summary import PressStep, gauges_of, grip_rows, read_json, steps_of, title_of
 
 _HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, "external_work_mJ", "dissipation_mJ")
 
@@ -32,6 +32,11 @@ _PICTURES = {
 _UNTABLED = "force_y_N", "external_work_mJ", "outward_friction_x_N", "outward_friction_z_N"
 _OF_STEPS = tuple(one for one in OF_INCREMENT if one.factor == 1.0 and one.name not in _UNTABLED)
 """Quantities in the table of steps."""
+
+_OF_GRIP = (
+    "The numbers above, their errors, and the tables below are those of the lower finger. The object's pose is that of "
+    "its centre of mass, from where it touched both fingers first. Contact between the fingers is not modelled."
+)
 
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
@@ -82,6 +87,11 @@ def press_page(folder: str | Path) -> Path:
     last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
+        *(
+            [PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])]
+            if "fingers" in summary
+            else []
+        ),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
@@ -102,6 +112,11 @@ def press_page(folder: str | Path) -> Path:
         notes=[*summary["warnings"], *summary["advice"], *([_remark(bars)] if bars.discretisation else [])],
         versions=summary["versions"],
     )
+
+
+def _two_fingers(summary: TreeView) -> PageSection:
+    """Return whether the object is held, its pose, and how near each finger is to slipping."""
+    return PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])
 
 
 def _remark(bars: ErrorBars) -> str:

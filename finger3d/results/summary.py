@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,6 +15,9 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.columns import Column, displacement_columns, pressure_column, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
+
+_ROUND_OFF = 1e-9
+"""Motion (mm, degrees) that is round-off."""
 
 _KINDS = dict.fromkeys(("finger", "marker", "face", "status", "method", "outcome"), object) | dict.fromkeys(
     ("step", "iterations"), int
@@ -118,6 +121,28 @@ def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
         If they are not as a press writes them.
     """
     return tuple(PressStep(**step) for step in summary["steps"])
+
+
+def _without_round_off(value: float) -> float:
+    return 0.0 if abs(value) < _ROUND_OFF else value
+
+
+def grip_rows(summary: TreeView) -> Iterator[tuple[str, str]]:
+    """Yield what two fingers have besides: whether they hold the object, where it is, how near each is to slipping."""
+    if "fingers" not in summary:
+        return
+    held, pose = summary["held"], summary["object_pose"]
+    yield "held", "yes" if held is True else f"no: {held}"
+    if least := summary["least_grip_N"]:
+        yield "least grip", f"{least:.4g} N, within 1 %"
+    if pose:
+        keys = [f"{axis}_mm" for axis in "xyz"], [f"turn_{axis}_deg" for axis in "xyz"]
+        moved, turns = (", ".join(f"{_without_round_off(pose[key]):.4g}" for key in names) for names in keys)
+        yield "object", f"moved by {moved} mm, turned by {turns} deg; each finger closed by {pose['closing_mm']:.4g} mm"
+    for finger in summary["fingers"]:
+        last, limit = finger["steps"][-1], finger["slip_limit"]
+        used = f", {100.0 * limit['used']:.3g} % of its friction used" if limit else ""
+        yield f"{finger['finger']} finger", f"normal force {last['normal_force_N']:.5g} N{used}"
 
 
 def read_json(path: Path) -> Tree:

@@ -266,7 +266,7 @@ def free_surface(model: Model, mesh: Mesh, thickness: float) -> BoundarySurface:
 
     Ends that are held do not move towards it.
     """
-    labels = FREE_FACES if model.object_compliance is None else FREE_FACES[:1]
+    labels: tuple[str, ...] = FREE_FACES if model.object_compliance is None else FREE_FACES[:1]
     labels = tuple(label for label in labels if not (label == "ends" and model.held_ends))
     return joined([surface(mesh, label, thickness) for label in labels if len(mesh.facets.get(label, ()))])
 

@@ -103,7 +103,8 @@ class IncrementEquations:
     @cached_property
     def factor_cost(self) -> float:
         """Iterations that take as long as a factorisation and the assembly of a tangent."""
-        cost: float = _FACTOR_COST * self.start.body.unknowns.size ** (1.0 - 1.0 / self.problem.dim)
+        pieces = 1 if self.problem.system.second is None else 2
+        cost: float = _FACTOR_COST * (self.start.body.unknowns.size / pieces) ** (1.0 - 1.0 / self.problem.dim)
         return max(_LEAST_COST, cost)
 
     def finished(
