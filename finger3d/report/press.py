@@ -87,11 +87,7 @@ def press_page(folder: str | Path) -> Path:
     last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
-        *(
-            [PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])]
-            if "fingers" in summary
-            else []
-        ),
+        *([_two_fingers(summary)] if "fingers" in summary else []),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
