@@ -23,7 +23,7 @@ from sphinx.transforms.post_transforms import SphinxPostTransform
 ROOT = Path(__file__).resolve().parent.parent
 UNITS = {
     "_mm2": "mm²", "_mm3": "mm³", "_Nmm": "N mm", "_mJ": "mJ", "_MPa": "MPa", "_mm": "mm", "_deg": "degrees", "_N": "N",
-    "_seconds": "s", "_s": "s", "_MB": "MB", "_kg_m3": "kg/m³",
+    "_seconds": "s", "_s": "s", "_MB": "MB", "_kg_m3": "kg/m³", "_g": "g",
 }  # fmt: skip
 
 
@@ -122,6 +122,10 @@ def _allowed(node: dict[str, Any]) -> str:
     if "anyOf" in node:
         return " or ".join(_allowed(choice) for choice in node["anyOf"])
     if node["type"] == "array":
+        if "prefixItems" in node:
+            low, *others = (_allowed(choice) for choice in node["prefixItems"])
+            assert {*others} == {low}
+            return f"list of {len(others) + 1}, each a {low}"
         inner = node["items"]
         return f"list of {_allowed(inner)}" if "prefixItems" not in inner else "list of pairs"
     low, high = node.get("minimum", node.get("exclusiveMinimum")), node.get("maximum", node.get("exclusiveMaximum"))

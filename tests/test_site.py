@@ -20,7 +20,7 @@ import finger3d
 from finger3d.cli import main
 from tests.scenes import HALF_CYLINDER, SECTION
 
-TUTORIALS = ("section", "objects", "gel_pad", "friction", "mold", "accuracy")
+TUTORIALS = ("section", "objects", "gel_pad", "friction", "pinch", "mold", "accuracy")
 
 
 def rows(page: str, heading: str) -> set[str]:

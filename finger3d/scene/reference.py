@@ -18,6 +18,7 @@ from finger3d.scene.tables import (
     FileTable,
     FrictionTable,
     GaugeTable,
+    GripTable,
     LegTable,
     MarkerGridTable,
     MarkerTable,
@@ -64,6 +65,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
         yield f'[object] shape = "{shape}"', [row for row in _rows(table_of(record), record) if row not in common]
     yield "[friction]", _rows(FrictionTable)
     yield "[press] or [[press.leg]]", _rows(LegTable)
+    yield "[grip]", _rows(GripTable)
     yield "[contact]", _rows(ContactTable)
     yield "[model]", _rows(DomainTable)
     yield "[mesh]", _rows(MeshTable)
