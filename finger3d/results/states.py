@@ -250,7 +250,10 @@ def object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangle
     """Return the object's triangles in its own coordinates, as far as they reach over the finger in some poses."""
     half = problem.model.design.half_length_mm, 0.5 * problem.model.design.width_mm
     beside = max(float(np.hypot(*p.place[::2])) for p in placed)
-    found = problem.model.object.drawing(1.1 * float(np.hypot(*half)) + beside)
+    reach, thing = 1.1 * float(np.hypot(*half)) + beside, problem.model.object
+    if problem.model.centre_of_mass_mm is not None:  # all of what two fingers hold
+        reach = max(reach, float(np.abs(thing.highest_point).max()))
+    found = thing.drawing(reach)
     return found if len(found.faces) <= _MOST_TRIANGLES else Triangles(found.points[:0], found.faces[:0])
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.contact.acceleration import one_thread
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.laws import IsochoricLaw
@@ -99,7 +100,9 @@ class FiniteStrain:
             return self.accepted(increment, increment.solve(guess))
         before = forces_on(problem, self.loads(problem, state, move.start).forces, move.start)
         known = problem, increment.body, state, move, workspace
-        found, solution = IncrementToForces(*known, wanted, before[list(wanted.numbers)]).followed(guess)
+        # PARDISO's Schur complement of two fingers, which nothing couples, crashes on two threads
+        with one_thread():
+            found, solution = IncrementToForces(*known, wanted, before[list(wanted.numbers)]).followed(guess)
         if solution.outcome.ok and _moves_too_far(problem, state, found.move):
             return replace(solution, state=state, outcome=Outcome.PASSED_THROUGH)
         return self.accepted(replace(increment, move=found.move), solution)

@@ -21,7 +21,6 @@ from finger3d.fem.mesh.simplex import Mesh, reflected, side_by_side
 from finger3d.fem.surface.traces import BoundarySurface, restrict
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import held_dofs
-from finger3d.mechanics.finite_strain.state import DeformedBody
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose, SecondFinger
 
@@ -84,13 +83,13 @@ class Grip:
         own = ObjectPose(pose.depth_mm + rise, *slides, pose.time_s, *turns)
         points = np.split(np.arange(len(state.contact.gap)), 2)[number]
         contact = state.contact.of_points(points)
-        body: Float | DeformedBody
-        if isinstance(state.body, DeformedBody):
+        if isinstance(state.body, np.ndarray):  # the displacement of the points, in small strain
+            body = state.body[points] * flip
+        else:
             size = self.problem.mesh.points.size
             u, pressures = (np.split(one, 2)[number] for one in np.split(state.body.unknowns, [size]))
-            body = DeformedBody(np.concatenate([(u.reshape(-1, dim) * flip).ravel(), pressures]))
-        else:
-            body = state.body[points] * flip
+            own_unknowns = np.concatenate([(u.reshape(-1, dim) * flip).ravel(), pressures])
+            body = replace(state.body, unknowns=own_unknowns, previous=None)
         return State(replace(contact, bases=contact.own_bases * flip), body), own
 
 

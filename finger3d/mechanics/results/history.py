@@ -57,8 +57,10 @@ class StepResult:
     @property
     def failure(self) -> str:
         """Depth and outcome of an increment that did not converge."""
-        detail = self.detail and f" ({self.detail})"
-        return f"at a depth of {self.target.depth_mm:.4g} mm: {self.outcome}{detail}"
+        detail, outcome = self.detail and f" ({self.detail})", str(self.outcome)
+        if self.other is not None and self.outcome in (Outcome.SLIPS, Outcome.NOT_HELD):
+            outcome = "the object is not held; grip it harder, or with more friction or less load"
+        return f"at a depth of {self.target.depth_mm:.4g} mm: {outcome}{detail}"
 
     def check(self, what: str) -> None:
         """Raise a MissingError, which begins with `what`, if the increment did not converge."""
