@@ -68,7 +68,7 @@ def fake_press(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
     calls = SimpleNamespace(end=Outcome.CONVERGED, scene=None, figures=None)
 
-    def press(scene, out, report, figures=True, error=True):
+    def press(scene, out, report, figures=True, error=True, least_grip=False):
         calls.scene, calls.figures = scene, figures
         steps = [{**STEP, "depth_mm": 5.0}, STEP]
         if isinstance(calls.end, Outcome) and not calls.end.ok:
