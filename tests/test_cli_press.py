@@ -66,7 +66,7 @@ def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_pat
 
 
 def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys) -> None:
-    def press(scene, out, report, figures=True, error=True):
+    def press(scene, out, report, figures=True, error=True, least_grip=False):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(finger3d.analyses.press, "press", press)
