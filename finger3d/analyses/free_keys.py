@@ -13,12 +13,6 @@ from finger3d.scene import Scene, parse, tree
 from finger3d.scene.material import modulus_of
 from finger3d.scene.messages import shown
 
-FIRST_BOX = 0.25
-"""Half edge of the box of a first step, over the ranges of the keys."""
-
-LEAST_GAIN, _LARGE_GAIN = 0.25, 0.75
-"""Gains of a step, over those foretold, from which it is taken, and from which the box grows."""
-
 
 @dataclass(frozen=True)
 class FreeKey:
@@ -77,20 +71,6 @@ def check_distinct(keys: Sequence[str]) -> None:
     twice = next((k for i, k in enumerate(keys) if k in keys[:i]), None)
     if twice is not None:
         raise Finger3dError(f"--free {twice}: given twice")
-
-
-def next_box(box: float, size: float, gain: float) -> float:
-    """Return the half edge of the box that the next step stays in (trust region: Fletcher 1987, Ch. 5).
-
-    Parameters
-    ----------
-    box : half edge of that of the last step, over the ranges of the keys
-    size : largest change of a key in it, over its range
-    gain : of the objective by it, over what was foretold; a step that gains less than `LEAST_GAIN` is not taken
-    """
-    if gain < LEAST_GAIN:
-        return 0.25 * size
-    return max(box, 2.0 * size) if gain > _LARGE_GAIN else box
 
 
 def scene_with(given: TreeView, keys: Sequence[str], values: Sequence[float] | Float, path: Path | None) -> Scene:

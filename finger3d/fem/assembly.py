@@ -209,9 +209,7 @@ def _outer_products(gradients: Float, weights: Float) -> Float:
     return np.asarray(np.matmul(np.swapaxes(flat * weights[:, :, None], 1, 2), flat).reshape(e, k, d, k, d))
 
 
-def stiffness(
-    mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0, pattern: Pattern | None = None
-) -> Stiffness:
+def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> Stiffness:
     """Assemble the upper triangle.
 
     Parameters
@@ -220,11 +218,10 @@ def stiffness(
     elastic : the law; the mixed form needs a quadratic mesh
     thickness : mm
         Width of a 2D section (1 for a solid), so that forces are N.
-    pattern : of a mesh with the same cells, if it is known
     """
     d = mesh.dim
     bary, w = quadrature(d, 2 if mesh.element.is_quadratic else 1)
-    pattern = pattern or Pattern.of(mesh, elastic.mixed)
+    pattern = Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
     hats = bary  # the linear shape functions
     scale = pressure_scale(mesh, elastic.shear_modulus) if elastic.mixed else 1.0

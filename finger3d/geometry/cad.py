@@ -16,8 +16,6 @@ from finger3d.geometry.section import Arc, Section
 if TYPE_CHECKING:
     from build123d import Compound, Edge, Face, Part, Shape, Sketch, Solid, Wire
 
-LABELS = ("contact", "base", "ends", "walls", "cavity", "symmetry_x", "symmetry_z")
-
 _CAD_TOLERANCE_MM = 1e-7
 _LEAST_UPWARD_NORMAL = 1e-6  # of a contact face; round-off of a vertical round wall is smaller
 

@@ -53,7 +53,5 @@ def identify_page(folder: str | Path) -> Path:
         ],
         [Figure("identify.png", "Measured points over the simulated press, and residuals")],
         command="identify",
-        outcome="converged",
-        good=True,
         notes=list(data["notes"]),
     )

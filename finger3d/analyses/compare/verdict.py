@@ -135,8 +135,8 @@ def _force(planes: Sequence[Case], solid: Case, height: float) -> str:
     return f"At width/height {solid.width_mm / height:.2g} ({solid.width_mm:g} mm wide, {height:.4g} mm high) {text}."
 
 
-def _with_error(case: Case, key: str, unit: str = "") -> str:
-    return with_error(case.numbers[key], case.errors.get(key), digits=4) + unit
+def _with_error(case: Case, key: str) -> str:
+    return with_error(case.numbers[key], case.errors.get(key), digits=4)
 
 
 def _ends(own: dict[str, Case]) -> list[str]:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
 from finger3d.fem.mesh.simplex import FACETS
 from finger3d.geometry.parts import OUTSIDE
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import Tessellation
-
-Bool = NDArray[np.bool_]
 
 _MOST_SAMPLES = 20_000
 """Largest number of points with which the surface of a part is sampled."""

@@ -241,28 +241,23 @@ def snap_nodes(
         If that fails as well.
     """
     rows = seams.one_per_smooth_group(points, sets, candidates)
-    projected, failed = _projection(points, rows, seams.faces)
+    projected, failed = project(points, rows, seams.faces)
     for reduced in (seams.reduce_to_nearest, seams.reduce_to_exact_planes):
         again = failed | ((rows.sum(axis=1) > 1) & (np.linalg.norm(projected - points, axis=1) > reach))
         if again.any():
             rows = rows.copy()
             rows[again] = reduced(points[again], rows[again])
-            projected[again], failed[again] = _projection(points[again], rows[again], seams.faces)
+            projected[again], failed[again] = project(points[again], rows[again], seams.faces)
     if failed.any():
         raise UnusableMeshError("a surface node finds no place on its CAD faces")
     return projected, rows
 
 
-def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> Float:
-    """Move every point (n, 3) onto all surfaces of its set (n, f), by Newton steps of least length."""
-    projected, failed = _projection(points, sets, faces)
-    if failed.any():
-        raise UnusableMeshError("a surface node finds no place on its CAD faces")
-    return projected
+def project(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
+    """Move every point (n, 3) onto all surfaces of its set (n, f), by Newton steps of least length.
 
-
-def _projection(points: Float, sets: Bool, faces: tuple[CadFace, ...]) -> tuple[Float, Bool]:
-    """Return the points of :func:`project`, and a mask (n,) of those that do not lie on all surfaces of their sets."""
+    Returns the points, and a mask (n,) of those that do not lie on all surfaces of their sets.
+    """
     points = points.copy()
     failed = np.zeros(len(points), dtype=bool)
     scale = max((float((f.high - f.low).max()) for f in faces), default=0.0)
