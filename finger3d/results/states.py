@@ -281,9 +281,13 @@ def load_states(path: str | Path) -> States:
     return States(**{f.name: data[f.name] for f in fields(States)})
 
 
+_ROUND_OFF = 1e-9
+"""Motion (mm, degrees) that is round-off."""
+
+
 def label(step: int, target: Array) -> str:
     """Return the label of a step from its number, and depth, slides and turns (6,), mm and degrees."""
-    depth, x, z, *turns = (float(v) for v in target)
+    depth, x, z, *turns = (float(v) if abs(v) > _ROUND_OFF else 0.0 for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
     turned = "".join(f", turned {v:.4g} deg about {axis}" for v, axis in zip(turns, "xyz", strict=True) if v)
     return f"increment {step}: {depth:.4g} mm deep{slid}{turned}"

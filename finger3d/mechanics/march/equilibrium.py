@@ -152,7 +152,9 @@ class ToForces:
         guess = self.guess(begin.end) if before is None else None
         solution = formulation.increment(problem, state, begin, guess, self.workspace, wanted)
         failed = Advanced(replace(solution, state=state), [], move.start)
-        asked = str(wanted)
+        asked, fingers = str(wanted), 1
+        if problem.system.second is not None:  # the normal force is that of both
+            asked, fingers = "equilibrium", 2
         if not solution.outcome.ok:
             self.report.remark(f"{asked} wanted, no solution near a depth of {begin.end.depth_mm:.4g} mm")
             return failed
@@ -160,7 +162,7 @@ class ToForces:
         reached = self._forces(solution.state, there.end)
         missing = wanted.values - reached[list(wanted.numbers)]
         error, round_off = np.abs(missing / wanted.scale(problem.model.design.height_mm)).max(), self._round_off
-        self.report.remark(f"{asked} wanted, {reached[0]:.5g} N at a depth of {there.end.depth_mm:.4g} mm")
+        self.report.remark(f"{asked} wanted, {reached[0] / fingers:.5g} N at a depth of {there.end.depth_mm:.4g} mm")
         if error > round_off:
             return replace(failed, solution=replace(failed.solution, outcome=Outcome.NO_CONVERGENCE))
         if there.end.depth_mm > self._deepest:
