@@ -22,7 +22,7 @@ from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.march.grip import FINGERS, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
 from finger3d.mechanics.results.history import StepResult, contact_table, row_of_entry
-from finger3d.results.states import States, facing, object_drawing, states_of, write_states
+from finger3d.results.states import States, facing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 
 if TYPE_CHECKING:
@@ -181,35 +181,21 @@ class ResultWriter:
         function that draws and writes them; a solid is rendered beside what is done before
         """
         from finger3d.plotting import figures
-        from finger3d.plotting.deformed import DeformedFinger, drawing_fingers
+        from finger3d.plotting.deformed import drawing_fingers
         from finger3d.plotting.gauges import marks_of
         from finger3d.plotting.layout import save
+        from finger3d.plotting.show import finger_of, mesh_of
 
         problem, good = record.problem, record.converged_steps
-        facets = {label: fields.facets[fields.facet_face == k] for k, label in enumerate(FREE_FACES)}
-        others = {"base": fields.facets[fields.facet_face < 0]}
-        part = fields.part if fields.part.any() else None
-        mesh = Mesh(fields.points.astype(float), fields.cells, facets | others, part)
         steps = [record.entry(step) for step in good]
         table = contact_table(problem.points, good[-1].state)
-        placed = problem.placed(good[-1].target)
-        thing = object_drawing(problem, [placed])
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
         stuck = np.full(len(table["status"]), STICK)
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
-        finger = DeformedFinger(
-            mesh=mesh,
-            displacement=fields.displacement[-1].astype(float),
-            pressure=fields.pressure[-1].astype(float),
-            shear=np.stack([fields.shear_x[-1], fields.shear_y[-1], fields.shear_z[-1]], axis=1).astype(float),
-            status=fields.status[-1].astype(int),
-            nodes=fields.nodes,
-            faces=fields.face.astype(int),
-            thing=placed.to_scene(thing.points)[thing.faces],
-            title=f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep",
-            marks=marks_of(mesh, problem.model.gauges, near=mesh.dim == 3),
-            zones=fields.zones(-1),
-        )
+        mesh = mesh_of(fields)
+        title = f"{steps[-1]['normal_force_N']:.4g} N at {good[-1].target.depth_mm:.3g} mm deep"
+        marks = marks_of(mesh, problem.model.gauges, near=mesh.dim == 3)
+        finger = finger_of(fields, len(fields.step) - 1, mesh, title, marks)
 
         def draw() -> None:
             figures.contact_figure(self.folder / "contact.png", table, mu, problem.points.band_mm, half_width)

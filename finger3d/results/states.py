@@ -181,7 +181,7 @@ def states_of(
     faces = {label: FREE_FACES.index(label) if label in FREE_FACES else -1 for label in facets}
     at = [steps[i].target for i in kept]
     placed = [problem.placed(target) for target in at]
-    thing = object_drawing(problem, placed)
+    thing = _object_drawing(problem, placed)
 
     def columns(name: str) -> Array:
         return np.array([t[name] for t in tables], dtype=np.float32)
@@ -246,7 +246,7 @@ _OF_STEPS = "pressure", "shear_x", "shear_z", "gap", "status"
 """Fields that two fingers have one after the other, along their first axis and along their second."""
 
 
-def object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangles:
+def _object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangles:
     """Return the object's triangles in its own coordinates, as far as they reach over the finger in some poses."""
     half = problem.model.design.half_length_mm, 0.5 * problem.model.design.width_mm
     beside = max(float(np.hypot(*p.place[::2])) for p in placed)
