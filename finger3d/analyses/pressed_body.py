@@ -26,6 +26,7 @@ from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.force_control import at_depth_reached
+from finger3d.mechanics.march.grip import Grip
 from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import automatic, march_automatic
@@ -210,11 +211,16 @@ class PressedBody:
             self.problem = self._built(replace(self.problem.model, legs=legs))
             result, steps = press(self.problem, result)
         checks = check_surface(self.problem, steps)
-        if not all(check.within_candidates for check in checks):
+        if not all(check.within_candidates for check in (*checks, *self._checks_of_other(steps))):
             self.widen()
             result, steps = press(self.problem, result)
             checks = check_surface(self.problem, steps)
         return result, checks
+
+    def _checks_of_other(self, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
+        """Return the checks of the second finger's free surface, if there is one."""
+        others = [step.other for step in steps if step.other]
+        return check_surface(Grip.of(self.problem).fingers[1], others) if others else []
 
     def steps(self, friction: FrictionLaw | None = None, rule: RuleName | None = None) -> list[StepResult]:
         """Return the increments of the model's path, under another friction law or contact rule if one is given.

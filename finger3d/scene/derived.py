@@ -19,6 +19,13 @@ from finger3d.scene.material import mistakes
 from finger3d.scene.messages import dotted, shown, unknown
 from finger3d.scene.tables import LegTable, SceneTable
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall, m/s2."""
+
+_DEEPER = 1.25
+"""Depth for whose contact fingers that close with a force are meshed, over its forecast, which ten of ten grips exceed
+by some 20 %, and were then meshed and pressed again."""
+
 _NU_OF_RIGID = 0.3  # of a material that hardly deforms, any does
 
 
@@ -91,14 +98,6 @@ def path_of(legs: Iterable[TreeView], design: Design, obj: RigidObject, tables: 
     under = [(weight, 0.0 * moment)] if weight.any() else []
     under += [(weight + load, moment)] if load.any() or moment.any() else []
     return (close, *(replace(close, **_loads(force, about, solid, mirrors)) for force, about in under))
-
-
-_DEEPER = 1.25
-"""Depth for whose contact fingers that close with a force are meshed, over its forecast, which ten of ten grips exceed
-by some 20 %, and were then meshed and pressed again."""
-
-GRAVITY = 9.80665
-"""Standard acceleration of free fall, m/s2."""
 
 
 def _mirrors_of_load(tables: SceneTable, design: Design, obj: RigidObject) -> set[str]:
