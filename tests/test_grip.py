@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from finger3d.analyses.least_grip import least_grip
+from finger3d.analyses.reduced import ReducedModel
+from finger3d.app.live_body import LiveBody
 from finger3d.cli import main
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
@@ -201,3 +203,11 @@ def test_the_command_writes_both_fingers(tmp_path: Path, capsys: pytest.CaptureF
     plane = tmp_path / "plane.toml"
     plane.write_text(pressed, encoding="utf-8")
     assert main(["press", str(plane), "--out", str(out), "--least-grip"]) == 2
+
+
+def test_two_fingers_have_neither_an_app_nor_a_reduced_model() -> None:
+    given = scene("plane-strain", closing_mm=0.8)
+    with pytest.raises(Finger3dError, match="not with"):
+        LiveBody.of(given)
+    with pytest.raises(Finger3dError, match="no reduced model"):
+        ReducedModel.of(build(given.model()))

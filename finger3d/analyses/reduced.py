@@ -63,7 +63,7 @@ class ReducedModel:
         Raises
         ------
         Finger3dError
-            If an effect makes the compliance depend on the state or on time.
+            If an effect makes the compliance depend on the state or on time, or if there are two fingers.
         """
         model = problem.model
         if not model.is_linear_elastic:
@@ -73,6 +73,8 @@ class ReducedModel:
                 f"effects.{name}: a body with it has no reduced model, its compliance is not constant; "
                 "condense the scene with effects.auto = false and without the effect, or press the scene itself"
             )
+        if model.centre_of_mass_mm is not None:
+            raise Finger3dError("[grip]: two fingers have no reduced model; press the scene itself")
         others = beyond_candidates(problem)
         about = {
             "versions": versions(),

@@ -113,13 +113,15 @@ class LiveBody:
         Raises
         ------
         Finger3dError
-            If an effect makes the compliance depend on the state or on time.
+            If an effect makes the compliance depend on the state or on time, or if there are two fingers.
         """
         model = scene.with_effects(scene.fixed_effects).model()
         if not model.is_linear_elastic or model.inclusions is not None:
             slots = dict(model.filled)
             name = next(slots[slot] for slot in ("hyperelastic_law", "relaxation", "inclusions") if slot in slots)
             raise Finger3dError(f"app: not with effects.{name}, which takes seconds to press; take the effect out")
+        if model.centre_of_mass_mm is not None:
+            raise Finger3dError("app: not with [grip]; press the scene, or give it [press] for one finger")
         if len(model.legs) > 1 or model.legs[0].moves_sideways:
             model = replace(model, legs=(Leg(model.largest_depth_mm, steps=STEPS),))
         body = PressedBody(model, report)
