@@ -23,5 +23,5 @@ def test_free_form_surfaces_are_reached_by_projection() -> None:
     exact, out = ImplicitCylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 5.0).distance(points)
     np.testing.assert_allclose(np.abs(distance), np.abs(exact), atol=1e-4)
     np.testing.assert_allclose(np.abs(np.einsum("ij,ij->i", normal, out)), 1.0, atol=1e-4)
-    moved = project(points, np.ones((2, 1), dtype=bool), faces_of(surface))
+    moved, _ = project(points, np.ones((2, 1), dtype=bool), faces_of(surface))
     np.testing.assert_allclose(np.hypot(moved[:, 0], moved[:, 1]), 5.0, atol=1e-4)

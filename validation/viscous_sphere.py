@@ -72,6 +72,7 @@ class StandIn:
     mesh: Mesh | None = None
     elastic: Elasticity | None = None
     stiffness: Stiffness | None = None
+    second: None = None
     thickness: float = 1.0
     inclusions: AddedStiffness = field(default_factory=AddedStiffness)
     origin: ObjectPose = ObjectPose(0.0)

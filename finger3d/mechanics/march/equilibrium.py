@@ -27,7 +27,7 @@ from finger3d.progress import Progress
 FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
 """Largest relative error of prescribed forces that are reached, in small strain and where the stiffness is factored."""
 
-_SAME_DEPTH = 1e-3
+_SAME_DEPTH = 1e-6
 """Relative change of the depth in whose shares contact begins below which they stay; they change it by a thousandth."""
 
 _DEPTH_ITERATIONS = 12
