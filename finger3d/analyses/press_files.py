@@ -162,7 +162,7 @@ class ResultWriter:
         if record.grip:
             closed = [2.0 * step.pose.depth_mm for step in record.converged_steps if step.pose]
             mesh = two(mesh, record.grip.apart_mm)
-            shown = facing((states[0], states[1]), record.grip.apart_mm, np.array(closed)[shown.step - 1])
+            shown = facing((states[0], states[1]), mesh, np.array(closed)[shown.step - 1])
             at_points = {
                 name: np.concatenate([surface[0][name], _mirrored(name, surface[1][name])]) for name in at_points
             }

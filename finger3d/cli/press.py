@@ -27,8 +27,6 @@ _SIDEWAYS = (
 )  # fmt: skip
 """Numbers of a path that leaves the press axis; they are printed where they are not 0."""
 
-_ROUND_OFF = 1e-9
-
 
 @app.command
 def press(
@@ -120,7 +118,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
     from finger3d.accuracy.error_bars import with_error
     from finger3d.mechanics.readings.columns import AREAS, MAIN
     from finger3d.mechanics.readings.quantities import Quantity, named
-    from finger3d.results.summary import readings_of
+    from finger3d.results.summary import ROUND_OFF, readings_of
 
     def number(one: Quantity, value: float) -> str:
         error = bars.total(one.name)
@@ -137,7 +135,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
     for one in named(*MAIN, *AREAS):
         yield one.title, line(one, last[one.name])
     for one in named(*_SIDEWAYS):
-        if abs(last[one.name]) > _ROUND_OFF * (last["friction_sum_N"] if one.unit == "N" else 1.0):
+        if abs(last[one.name]) > ROUND_OFF * (last["friction_sum_N"] if one.unit == "N" else 1.0):
             yield one.title, line(one, last[one.name])
     read = {c: v for c, v in readings_of(last["gauges"], last["markers"], last["taxels"]).items() if v is not None}
     for (kind, sensor), group in groupby(read, key=lambda c: (c.kind, c.sensor)):

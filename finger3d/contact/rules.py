@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.acceleration import assemble_in_place, warm_start
-from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, force_of_sets
 from finger3d.contact.solve import solve_increment
@@ -17,9 +17,6 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state, pr
 from finger3d.errors import Outcome
 
 _MAX_ITERATIONS = 500
-
-_HELD = 1e-10
-"""Relative error of the forces up to which an increment that changes nothing else needs no iteration."""
 
 _BORDERED = 15
 """Largest number of iterations for contact forces and coordinates at once; few that converge need more."""
@@ -119,25 +116,42 @@ class ForceConditions:
         """Return what contact forces (c, d) are short of (k,)."""
         return np.asarray(self.forces + self.resultant.T @ force.ravel())
 
-    def stiffness(self, problem: ContactProblem, solution: ContactState, displacement: Float) -> Float:
-        """Return the derivatives (k, k) of the resultants by the coordinates at a solution."""
-        augmented = project_on_friction_cone(problem, solution.force, displacement)[2]
-        system = ActiveSetSystem.of(problem, ActiveSet.of(problem, solution.status, augmented))
-        moved = self.motion.T.reshape(-1, *solution.force.shape)
-        changes = [system.active.force(system.solve(-system.active.weighted(problem, one))) for one in moved]
-        return -self.resultant.T @ np.array(changes).reshape(len(moved), -1).T
+    def error(self, force: Float) -> float:
+        """Return the largest error of the resultants of contact forces (c, d), over their magnitudes."""
+        return float(np.abs(self.missing(force) / self.scale).max())
 
-    def step(self, stiffness: Float, missing: Float) -> tuple[Float, Float | None]:
-        """Return the step (k,) of Newton's method, and the forces (k,), over their magnitudes, to which none leads.
+    def moved(self, problem: ContactProblem, change: Float) -> ContactProblem:
+        """Return a contact problem with the object moved by a change (k,) of the coordinates."""
+        motion = (self.motion @ change).reshape(problem.free_motion.shape)
+        return replace(problem, free_motion=problem.free_motion + motion)
 
-        There are such forces, with the motion of the same coordinates, where the whole contact slips.
+    def newton_step(self, problem: ContactProblem, active: ActiveSet) -> tuple[Float, Float, Float | None]:
+        """Return a step of Newton's method for contact forces and coordinates.
+
+        The equations of the active set are bordered by those of the resultants.
+
+        Returns
+        -------
+        force : (c, d) N, at its end
+        step : (k,) of the coordinates
+        lacking : (k,) forces over their magnitudes to which no step leads, as where the whole contact slips; else None
+
+        Raises
+        ------
+        LinAlgError
+            If the equations of the active set are singular.
         """
-        relative, wanted = stiffness * self.reach / self.scale[:, None], missing / self.scale
+        system, shape = ActiveSetSystem.of(problem, active, assembly=assemble_in_place), problem.free_motion.shape
+        force = system.solution()
+        motion = self.motion.T.reshape(len(self.forces), *shape)
+        changes = np.array([active.force(system.solve(-active.weighted(problem, one))) for one in motion])
+        stiffness = -self.resultant.T @ changes.reshape(len(motion), force.size).T
+        relative, wanted = stiffness * self.reach / self.scale[:, None], self.missing(force) / self.scale
         step = np.linalg.lstsq(relative, wanted, rcond=_SINGULAR)[0]
         lacking = wanted - relative @ step
         slips = np.linalg.norm(lacking) > _UNREACHED * np.linalg.norm(wanted)
         step = self.reach * step / max(1.0, float(np.abs(step).max(initial=0.0)))
-        return np.asarray(step), np.asarray(lacking) if slips else None
+        return force + np.einsum("k,kcd->cd", step, changes), step, lacking if slips else None
 
 
 def solve_to_forces(
@@ -161,15 +175,12 @@ def solve_to_forces(
     best: tuple[float, Float, ContactSolution[ContactState]] | None = None
     moved, step, allowed, spent = np.zeros(len(conditions.forces)), np.zeros(len(conditions.forces)), 0.0, 0
     for _ in range(_SOLUTIONS):
-        motion = (conditions.motion @ moved).reshape(problem.free_motion.shape)
-        there = replace(problem, free_motion=problem.free_motion + motion)
+        there = conditions.moved(problem, moved)
         solution = RULES[rule](there, guess)
         spent += solution.iterations
         if not solution.outcome.ok and best is None:
             return solution, moved, lacking
-        missing = conditions.missing(solution.state.force)
-        error = float(np.abs(missing / conditions.scale).max()) if solution.outcome.ok else np.inf
-        touches = bool(solution.state.force.any())
+        error = conditions.error(solution.state.force) if solution.outcome.ok else np.inf
         if best is not None and error >= best[0] and best[2].state.force.any():
             step = 0.5 * step
             moved = best[1] + step
@@ -178,17 +189,16 @@ def solve_to_forces(
         allowed = allowed or max(conditions.tolerance, _INEXACT * error)
         if error <= allowed:
             break
-        if not touches:
+        if not guess.any():
             step = conditions.approach
             if not step.any():
                 break
         else:
+            augmented = Iterate.of(there, guess).augmented_force
             try:
-                gaps = there.relative_displacement(guess)
-                stiffness = conditions.stiffness(there, solution.state, gaps)
+                _, step, lacking = conditions.newton_step(there, ActiveSet.of(there, solution.state.status, augmented))
             except np.linalg.LinAlgError:
                 break
-            step, lacking = conditions.step(stiffness, missing)
             if lacking is not None:
                 break
         moved = moved + step
@@ -207,13 +217,11 @@ def _at_once(
     """
     if problem.refusal:
         return None
-    moved, shape = np.zeros(len(conditions.forces)), problem.free_motion.shape
-    motion = conditions.motion.T.reshape(len(moved), *shape)
-    force, there = warm_start(problem, problem.previous.force if guess is None else guess), problem
+    moved, there = np.zeros(len(conditions.forces)), problem
+    force = warm_start(problem, problem.previous.force if guess is None else guess)
     for iteration in range(_BORDERED + 1):
         current = Iterate.of(there, force)
-        error = float(np.abs(conditions.missing(force) / conditions.scale).max())
-        if error <= (conditions.tolerance if iteration else _HELD) and current.satisfies(there, current.status):
+        if conditions.error(force) <= conditions.tolerance and current.satisfies(there, current.status):
             mu = problem.law.friction.updated(problem.friction, current.status, pressure(force, problem.area))
             if (mu != problem.friction).any():
                 return None
@@ -224,17 +232,11 @@ def _at_once(
         if not active.size:
             return None
         try:
-            system = ActiveSetSystem.of(there, active, assembly=assemble_in_place)
-            at_rest = system.solution()
-            changes = np.array([active.force(system.solve(-active.weighted(problem, one))) for one in motion])
-            stiffness = -conditions.resultant.T @ changes.reshape(len(moved), force.size).T
-            step, lacking = conditions.step(stiffness, conditions.missing(at_rest))
+            force, step, lacking = conditions.newton_step(there, active)
         except np.linalg.LinAlgError:
             return None
-        if lacking is not None:
+        if lacking is not None or not np.isfinite(force).all():
             return None
-        moved, force = moved + step, at_rest + np.einsum("k,kcd->cd", step, changes)
-        there = replace(problem, free_motion=problem.free_motion + np.einsum("k,kcd->cd", moved, motion))
-        if not np.isfinite(force).all():
-            return None
+        moved = moved + step
+        there = conditions.moved(problem, moved)
     return None

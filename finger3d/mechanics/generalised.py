@@ -26,22 +26,16 @@ _PLACES = np.array([0, 1, 2, 4, 5, 6, 7])
 """Places of the coordinates among those of an `ObjectPose`."""
 
 COORDINATES = range(len(_PLACES))
+RISE = 6
+"""Number of the coordinate that only an object between two fingers has."""
 
-_DIRECTIONS = {0: (0.0, -1.0, 0.0), 1: (1.0, 0.0, 0.0), 2: (0.0, 0.0, 1.0), 6: (0.0, 1.0, 0.0)}
+_DIRECTIONS = {0: (0.0, -1.0, 0.0), 1: (1.0, 0.0, 0.0), 2: (0.0, 0.0, 1.0), RISE: (0.0, 1.0, 0.0)}
 """Motion of the object by the coordinates that do not turn it."""
 
 _ACROSS = {"x": (1, 4, 5), "z": (2, 3, 4)}
 """Coordinates whose forces change sign at a symmetry plane."""
 
-_MOTIONS = (
-    "closes",
-    "slides along x",
-    "slides along z",
-    "turns about x",
-    "turns about y",
-    "turns about z",
-    "moves along y",
-)
+_MOTIONS = "closes", *(f"slides along {axis}" for axis in "xz"), *(f"turns about {axis}" for axis in "xyz"), "rises"
 """What the object does as a coordinate changes."""
 
 _AT_LIMIT = 1e-9
@@ -131,7 +125,7 @@ class GeneralisedForces:
         if not solution.outcome.ok or (status == STICK).any() or not (status == SLIP).any():
             return solution
         detail = self._slips_under(solution.state.force, bases, images, lacking is not None)
-        if not detail and lacking is not None and 6 in self.numbers:
+        if not detail and lacking is not None and RISE in self.numbers:
             detail = f"the object {_MOTIONS[self.numbers[int(np.abs(lacking).argmax())]]}"
         return replace(solution, outcome=Outcome.SLIPS, detail=detail) if detail else solution
 
@@ -158,9 +152,8 @@ class GeneralisedForces:
         if held <= 0.0:
             return f"{asked:.6g} N asked; the contact pushes {-held:.3g} N the other way"
         axis = int(np.abs(wanted).argmax())
-        moves = (
-            f"the object slides along {'-' if wanted[axis] < 0.0 else ''}{'xyz'[axis]}; " if 6 in self.numbers else ""
-        )
+        sign = "-" if wanted[axis] < 0.0 else ""
+        moves = f"the object slides along {sign}{'xyz'[axis]}; " if RISE in self.numbers else ""
         most = f"{moves}{asked:.6g} N asked; the contact holds at most {held:.9g} N, "
         slides = held > _MUCH * asked
         return most + ("but slides down its slope under less" if slides else f"{100.0 * held / asked:.4g} % of it")

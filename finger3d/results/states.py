@@ -20,6 +20,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.results.history import StepResult, contact_table
 from finger3d.objects import PlacedObject
+from finger3d.results.summary import without_round_off
 
 _MOST_TRIANGLES = 20_000
 """Triangles of the object that are kept for pictures, at most."""
@@ -177,8 +178,6 @@ def states_of(
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
     tables = [contact_table(problem.points, steps[i].state) for i in kept]
-    facets = {label: f for label, f in mesh.facets.items() if len(f)}
-    faces = {label: FREE_FACES.index(label) if label in FREE_FACES else -1 for label in facets}
     at = [steps[i].target for i in kept]
     placed = [problem.placed(target) for target in at]
     thing = _object_drawing(problem, placed)
@@ -187,11 +186,7 @@ def states_of(
         return np.array([t[name] for t in tables], dtype=np.float32)
 
     return States(
-        points=mesh.points.astype(np.float32),
-        cells=mesh.cells.astype(np.int32),
-        part=(np.zeros(len(mesh.cells)) if mesh.part is None else mesh.part).astype(np.int8),
-        facets=np.concatenate(list(facets.values())).astype(np.int32),
-        facet_face=np.concatenate([np.full(len(f), faces[label], dtype=np.int8) for label, f in facets.items()]),
+        **_of_mesh(mesh),
         nodes=problem.points.nodes.astype(np.int32),
         face=problem.points.face.astype(np.int8),
         compliance=problem.points.compliance.astype(np.float32),
@@ -211,39 +206,43 @@ def states_of(
     )
 
 
-def facing(fingers: tuple[States, States], apart_mm: float, closed_mm: Array) -> States:
+def _of_mesh(mesh: Mesh) -> dict[str, Array]:
+    """Return the fields of states that a mesh has."""
+    facets = {label: f for label, f in mesh.facets.items() if len(f)}
+    faces = {label: FREE_FACES.index(label) if label in FREE_FACES else -1 for label in facets}
+    return {
+        "points": mesh.points.astype(np.float32),
+        "cells": mesh.cells.astype(np.int32),
+        "part": (np.zeros(len(mesh.cells)) if mesh.part is None else mesh.part).astype(np.int8),
+        "facets": np.concatenate(list(facets.values())).astype(np.int32),
+        "facet_face": np.concatenate([np.full(len(f), faces[label], dtype=np.int8) for label, f in facets.items()]),
+    }
+
+
+def facing(fingers: tuple[States, States], mesh: Mesh, closed_mm: Array) -> States:
     """Return the states of two fingers that face each other, of which each has those of the second in its own frame.
 
     Parameters
     ----------
-    apart_mm : distance of both bases at first touch
-    closed_mm : (s,) by how much it has fallen at each increment
+    mesh : of both at first touch
+    closed_mm : (s,) by how much the second has come down at each increment
     """
     first, second = fingers
-    flip = np.array([1.0, -1.0, 1.0])[: first.dim]
-    down = np.zeros((len(first.step), 1, first.dim), dtype=np.float32)
-    down[:, 0, 1] = closed_mm
-    both = {
-        name: np.concatenate([getattr(first, name), getattr(second, name)], axis=axis)
-        for names, axis in ((_OF_POINTS, 0), (_OF_STEPS, 1))
-        for name in names
-    }
-    count, of_cell = len(first.points), Mesh(second.points, second.cells, {}).element
+    moved = second.displacement * np.array([1.0, -1.0, 1.0], dtype=np.float32)[: first.dim]
+    moved[:, :, 1] -= closed_mm[:, None]
+    both = {name: np.concatenate([getattr(first, name), getattr(second, name)], axis=-1) for name in _OF_CONTACT_POINTS}
     return replace(
         first,
+        **_of_mesh(mesh),
         **both,
-        points=np.vstack([first.points, second.points * flip + apart_mm * np.eye(first.dim)[1]]).astype(np.float32),
-        cells=np.vstack([first.cells, second.cells[:, of_cell.mirrored] + count]),
-        facets=np.vstack([first.facets, second.facets[:, of_cell.facet.mirrored] + count]),
-        nodes=np.concatenate([first.nodes, second.nodes + count]),
-        displacement=np.concatenate([first.displacement, second.displacement * flip.astype(np.float32) - down], axis=1),
+        nodes=np.concatenate([first.nodes, second.nodes + len(first.points)]),
+        displacement=np.concatenate([first.displacement, moved], axis=1),
         shear_y=np.concatenate([first.shear_y, -second.shear_y], axis=1),
     )
 
 
-_OF_POINTS = "part", "facet_face", "face", "compliance"
-_OF_STEPS = "pressure", "shear_x", "shear_z", "gap", "status"
-"""Fields that two fingers have one after the other, along their first axis and along their second."""
+_OF_CONTACT_POINTS = "face", "compliance", "pressure", "shear_x", "shear_z", "gap", "status"
+"""Fields that two fingers have one after the other along their last axis."""
 
 
 def _object_drawing(problem: Problem, placed: Sequence[PlacedObject]) -> Triangles:
@@ -281,13 +280,9 @@ def load_states(path: str | Path) -> States:
     return States(**{f.name: data[f.name] for f in fields(States)})
 
 
-_ROUND_OFF = 1e-9
-"""Motion (mm, degrees) that is round-off."""
-
-
 def label(step: int, target: Array) -> str:
     """Return the label of a step from its number, and depth, slides and turns (6,), mm and degrees."""
-    depth, x, z, *turns = (float(v) if abs(v) > _ROUND_OFF else 0.0 for v in target)
+    depth, x, z, *turns = (without_round_off(float(v)) for v in target)
     slid = "".join(f", slid {v:.4g} mm along {axis}" for v, axis in ((x, "x"), (z, "z")) if v)
     turned = "".join(f", turned {v:.4g} deg about {axis}" for v, axis in zip(turns, "xyz", strict=True) if v)
     return f"increment {step}: {depth:.4g} mm deep{slid}{turned}"

@@ -16,8 +16,8 @@ from finger3d.mechanics.readings.columns import Column, displacement_columns, pr
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.tables import GaugeTable, record_of
 
-_ROUND_OFF = 1e-9
-"""Motion (mm, degrees) that is round-off."""
+ROUND_OFF = 1e-9
+"""Motion (mm, degrees) that is round-off, and force over the friction sum."""
 
 _KINDS = dict.fromkeys(("finger", "marker", "face", "status", "method", "outcome"), object) | dict.fromkeys(
     ("step", "iterations"), int
@@ -123,8 +123,9 @@ def steps_of(summary: TreeView) -> tuple[PressStep, ...]:
     return tuple(PressStep(**step) for step in summary["steps"])
 
 
-def _without_round_off(value: float) -> float:
-    return 0.0 if abs(value) < _ROUND_OFF else value
+def without_round_off(value: float) -> float:
+    """Return a motion, mm or degrees, as 0 if it is round-off."""
+    return 0.0 if abs(value) < ROUND_OFF else value
 
 
 def grip_rows(summary: TreeView) -> Iterator[tuple[str, str]]:
@@ -137,7 +138,7 @@ def grip_rows(summary: TreeView) -> Iterator[tuple[str, str]]:
         yield "least grip", f"{least:.4g} N, within 1 %"
     if pose:
         keys = [f"{axis}_mm" for axis in "xyz"], [f"turn_{axis}_deg" for axis in "xyz"]
-        moved, turns = (", ".join(f"{_without_round_off(pose[key]):.4g}" for key in names) for names in keys)
+        moved, turns = (", ".join(f"{without_round_off(pose[key]):.4g}" for key in names) for names in keys)
         yield "object", f"moved by {moved} mm, turned by {turns} deg; each finger closed by {pose['closing_mm']:.4g} mm"
     for finger in summary["fingers"]:
         last, limit = finger["steps"][-1], finger["slip_limit"]

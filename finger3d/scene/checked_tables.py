@@ -159,7 +159,7 @@ def _closing(grip: TreeView, mistakes: dict[Place, str]) -> PressTable | None:
     if (table.force_N is None) == (table.closing_mm is None):
         mistakes["grip",] = "grip: must have either force_N or closing_mm, by which its fingers close"
         return None
-    return PressTable(depth_mm=table.closing_mm, force_N=table.force_N, steps=table.steps)
+    return table.closing
 
 
 def effects_of(document: TreeView, mistakes: dict[Place, str]) -> tuple[dict[str, TomlTable], Tree, AutoTable | None]:

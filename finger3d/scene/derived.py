@@ -17,7 +17,7 @@ from finger3d.mechanics.model import Leg, contact_path
 from finger3d.objects import PlacedObject, RigidObject
 from finger3d.scene.material import mistakes
 from finger3d.scene.messages import dotted, shown, unknown
-from finger3d.scene.tables import LegTable, SceneTable
+from finger3d.scene.tables import SceneTable
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall, m/s2."""
@@ -87,8 +87,7 @@ def path_of(legs: Iterable[TreeView], design: Design, obj: RigidObject, tables: 
     grip = tables.grip
     if grip is None:
         return tuple(_leg(leg, design, obj, tables) for leg in legs)
-    closing = LegTable(depth_mm=grip.closing_mm, force_N=grip.force_N, steps=grip.steps)
-    close = replace(_leg(dict(closing), design, obj, tables), force_y_N=0.0)
+    close = replace(_leg(dict(grip.closing), design, obj, tables), force_y_N=0.0)
     if grip.force_N is not None:
         close = replace(close, force_N=2.0 * grip.force_N, depth_mm=_DEEPER * close.depth_mm)
     down = np.array(grip.down) / (np.linalg.norm(grip.down) or 1.0)

@@ -173,6 +173,11 @@ class GripTable(TomlTable):
     load_Nmm: tuple[SignedForce, SignedForce, SignedForce] = (0.0, 0.0, 0.0)
     steps: Steps = "auto"
 
+    @property
+    def closing(self) -> PressTable:
+        """The press of each finger as they close."""
+        return PressTable(depth_mm=self.closing_mm, force_N=self.force_N, steps=self.steps)
+
 
 class ContactTable(TomlTable):
     """[contact].

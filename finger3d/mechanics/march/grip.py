@@ -72,8 +72,8 @@ class Grip:
         """Both fingers at once, without readings."""
         return _both(self.fingers[0], self.second.lowered_mm + self.apart_mm, self.second)
 
-    def seen(self, number: int, state: State[Any], pose: ObjectPose) -> tuple[State[Any], ObjectPose]:
-        """Return a state of both fingers and the pose of the object as one finger, 0 or 1, has them in its frame."""
+    def seen(self, number: int, pose: ObjectPose, state: State[Any]) -> tuple[ObjectPose, State[Any]]:
+        """Return the pose of the object and a state of both fingers as one finger, 0 or 1, has them in its frame."""
         dim = self.fingers[0].dim
         flip = _MIRRORED[:dim] if number else np.ones(dim)
         moved = pose.turn @ self.touched[number] - self.touched[number]
@@ -90,7 +90,7 @@ class Grip:
             u, pressures = (np.split(one, 2)[number] for one in np.split(state.body.unknowns, [size]))
             own_unknowns = np.concatenate([(u.reshape(-1, dim) * flip).ravel(), pressures])
             body = replace(state.body, unknowns=own_unknowns, previous=None)
-        return State(replace(contact, bases=contact.own_bases * flip), body), own
+        return own, State(replace(contact, bases=contact.own_bases * flip), body)
 
 
 def _both(finger: Problem, base: float, second: SecondFinger) -> Problem:

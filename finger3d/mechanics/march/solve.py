@@ -240,14 +240,14 @@ class Press:
         """Advance to the pose at which the object is in equilibrium with the forces applied to it."""
         forces, wanted = self._wanted(load)
         free = np.flatnonzero(~np.isnan(wanted))
-        closes = self._grip and move.end.depth_mm > move.start.depth_mm
+        closes = move.end.depth_mm > move.start.depth_mm
         if (wanted[0] if 0 in free else forces[0]) <= 0.0 and not closes:
             detail = "nothing touches, and a tangential force or a moment is prescribed; press first"
             ended = ContactSolution(self.state, Outcome.FORCE_NOT_REACHED, np.inf, 0, "none", detail)
             return Advanced(ended, [], move.start)
         numbers = tuple(free.tolist())
         acting = np.abs([*forces[:3], *wanted[:3], forces[6], wanted[6]])
-        size = max(float(np.nanmax(acting)), self._least_force(move) if self._grip else 0.0)
+        size = float(np.nanmax(acting)) or self._least_force(move)
         asked = float(load.forces[0]), float(np.linalg.norm(np.nan_to_num(load.forces[1:3])))
         before, after = (GeneralisedForces(numbers, values[free], size, asked) for values in (forces, wanted))
         known = self.problem, self.workspace, self.state, self._last_part
@@ -255,7 +255,7 @@ class Press:
         return way.run(move, before, after)
 
     def _least_force(self, move: Move) -> float:
-        """Return the force (N) on a single point that is displaced as far as the fingers close in an increment."""
+        """Return the force (N) on a single point that is displaced as far as the depth changes in an increment."""
         normal = np.einsum("caca->ca", self.problem.delassus)[:, 0]
         return (move.end.depth_mm - move.start.depth_mm) / float(normal.max())
 
@@ -279,10 +279,7 @@ class Press:
 
     def _at(self, number: int, pose: ObjectPose, state: State[Any]) -> tuple[ObjectPose, State[Any]]:
         """Return pose and state as one of the fingers has them."""
-        if self._grip is None:
-            return pose, state
-        state, pose = self._grip.seen(number, state, pose)
-        return pose, state
+        return (pose, state) if self._grip is None else self._grip.seen(number, pose, state)
 
     def _result_of(
         self,
