@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from finger3d.accuracy.companion_presses import CompanionThread
 from finger3d.analyses.press_files import Fields, ResultWriter
@@ -78,44 +78,45 @@ def press(
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
     with claimed(temporary.name if temporary else str(out), "press") as folder:
-        record = run_press(scene, ResultWriter(folder), report or Progress(), started, error, figures, least_grip)
+        wanted = Wanted(error, figures, least_grip)
+        record = run_press(scene, ResultWriter(folder), report or Progress(), started, wanted)
     return result_in(folder, record.history, temporary)
 
 
-def run_press(
-    scene: Scene,
-    writer: ResultWriter,
-    report: Progress,
-    started: float,
-    error: bool,
-    figures: bool,
-    least_grip: bool = False,
-) -> PressRecord:
+class Wanted(NamedTuple):
+    """What a press is asked for besides its increments: error bars, pictures, the smallest grip that holds."""
+
+    error: bool
+    figures: bool
+    least_grip: bool
+
+
+def run_press(scene: Scene, writer: ResultWriter, report: Progress, started: float, wanted: Wanted) -> PressRecord:
     """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
 
     Parameters
     ----------
     started : `time.perf_counter()` at the start of the job, s
-    error, figures, least_grip : whether to estimate the errors; to draw; to find the smallest grip that holds
+    wanted : what is estimated and drawn
     """
     from finger3d.analyses.effects_by_need import settled
 
     scene, need = settled(scene, report)
     with CompanionThread() as companions:
-        record = _solve(scene, writer, report, started, companions.begin if error else None)
+        record = _solve(scene, writer, report, started, companions.begin if wanted.error else None)
         record.need = need
         fields = _recover(record, writer, report)
         writer.summary(record, record.outcome())
-        with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
-            if error:
+        with writer.pictures(record, fields) if wanted.figures and fields else nullcontext(lambda: None) as draw:
+            if wanted.error:
                 _estimate_errors(record, report, companions)
                 writer.markers(record)
                 _estimate_changes(record, report)
                 writer.summary(record, record.outcome())
-            if least_grip:
+            if wanted.least_grip:
                 _find_least_grip(record, report)
                 writer.summary(record, record.outcome())
-            if figures:
+            if wanted.figures:
                 from finger3d.report.press import press_page
 
                 report.stage("drawing")

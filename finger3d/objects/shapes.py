@@ -149,9 +149,8 @@ class Cylinder(Prism):
         if self.length_mm is None:
             return self._swept(r, y, reach_mm)
         half = 0.5 * self.length_mm
-        shares = np.array(
-            [[0.0], [1.0], [1.0], [0.0]]
-        )  # of the radius, from the middle of one end to that of the other
+        # shares of the radius, from the middle of one end over the mantle to that of the other
+        shares = np.array([[0.0], [1.0], [1.0], [0.0]])
         level = self.radius_mm + shares * (y - self.radius_mm)
         along = np.broadcast_to(np.array([-half, -half, half, half])[:, None], level.shape)
         ring = np.stack([shares * r, level, along], axis=-1)
