@@ -25,6 +25,7 @@ from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import vertical_frame
 from finger3d.progress import QUIET
+from finger3d.report.press import press_page
 from finger3d.scene import Scene, scene_of
 
 G = 9.80665e-3
@@ -196,6 +197,9 @@ def test_the_command_writes_both_fingers(tmp_path: Path, capsys: pytest.CaptureF
     assert [finger["finger"] for finger in summary["fingers"]] == ["lower", "upper"]
     assert summary["fingers"][0]["steps"] == summary["steps"]
     assert summary["object_pose"]["z_mm"] < 0.0
+    page = press_page(out).read_text(encoding="utf-8")
+    assert "closing_mm = 0.8" in page
+    assert "Two fingers" in page
     rows = (out / "contact.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("finger,face")
     assert {row.partition(",")[0] for row in rows[1:]} == {"lower", "upper"}

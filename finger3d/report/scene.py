@@ -7,7 +7,7 @@ from pathlib import Path
 
 from finger3d.report.build import Code, Part, Table
 
-_TABLES = ("finger", "material", "object", "friction", "press", "contact", "model", "mesh")
+_TABLES = ("finger", "material", "object", "friction", "press", "grip", "contact", "model", "mesh")
 
 
 def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
