@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -32,7 +31,6 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_execution_show_tb = True
 nb_merge_streams = True
-os.environ.setdefault("FINGER3D_RENDERER", "matplotlib")  # needs neither a display nor a driver
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

@@ -267,6 +267,10 @@ def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float
 # --- matplotlib ---------------------------------------------------------------------------------------------------
 
 
+_AT_CORNER = 1e-9
+"""Distance, over the solid's size, within which an arrow is at a corner of a triangle."""
+
+
 def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     """Draw a solid with matplotlib, far faces first.
 
@@ -295,9 +299,12 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     if len(skin.thing):
         seen, tint = _shaded(skin.thing, np.tile(to_rgb(OBJECT_TINT), (len(skin.thing), 1)))
         axes.add_collection(PolyCollection(list(flat(seen)), facecolors=tint, alpha=OBJECT_OPACITY, lw=0.0, zorder=3))
-    if arrows and len(skin.arrow):
+    if arrows and len(skin.arrow) and len(contact[0]):
+        from scipy.spatial import cKDTree
+
+        is_seen = cKDTree(contact[0].reshape(-1, 3)).query(skin.arrow_at)[0] <= _AT_CORNER * skin.size
         for state, colour in ARROWS.items():
-            on = skin.arrow_status == state
+            on = (skin.arrow_status == state) & is_seen
             at, by = flat(skin.arrow_at[on]), flat(skin.arrow_length * skin.arrow[on])
             axes.quiver(
                 *at.T,
