@@ -71,17 +71,23 @@ _ONE_THREAD_BELOW = 3000
 
 def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, damped: bool) -> NewtonResult:
     """Solve as `finger3d.contact.newton.newton` does, from expected forces (c, d), N, with all accelerations."""
-    problem = _ShortProducts(**vars(problem))
+    problem = ShortProducts(**vars(problem))
     start = warm_start(problem, expected)
-    precision = _PRECISION[start.shape[1]]
+    precision = first_precision(problem)
     spent = 0
-    if precision is np.float32 and problem.friction.max(initial=0.0) <= _FLOAT32_MAX_MU:
+    if precision is np.float32:
         single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
         if single.solved:
             return single
         spent = single.iterations
     double = newton(problem, start, limit, damped, correct=chord_iterations, assembly=assemble_in_place)
     return replace(double, iterations=spent + double.iterations)
+
+
+def first_precision(problem: ContactProblem) -> Precision:
+    """Return the precision of the first factors: single in 3D and under moderate friction."""
+    moderate = problem.friction.max(initial=0.0) <= _FLOAT32_MAX_MU
+    return _PRECISION[problem.free_motion.shape[1]] if moderate else np.float64
 
 
 @cache
@@ -100,7 +106,7 @@ def threads_for(rows: int) -> AbstractContextManager[object]:
     return one_thread() if rows < _ONE_THREAD_BELOW else nullcontext()
 
 
-class _ShortProducts(ContactProblem):
+class ShortProducts(ContactProblem):
     """Contact problem whose products end at the last point that bears a force."""
 
     def relative_displacement(self, force: Float) -> Float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import SLIP, STICK
-from finger3d.contact.rules import ForceConditions
+from finger3d.contact.resultants import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem

@@ -19,7 +19,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.rules import solve_to_forces
+from finger3d.contact.resultants import solve_to_forces
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.recovery.recover import displacement

@@ -27,8 +27,8 @@ from finger3d.progress import Progress
 FORCE_TOLERANCE, FORCE_TOLERANCE_IF_FACTORED = 1e-10, 1e-6
 """Largest relative error of prescribed forces that are reached, in small strain and where the stiffness is factored."""
 
-_SAME_DEPTH = 1e-6
-"""Relative change of the depth in whose shares contact begins below which they stay; they change it by a thousandth."""
+_SAME_DEPTH = 1e-3
+"""Relative change of the depth in whose shares contact begins below which they stay; they change it by 1e-5 at most."""
 
 _DEPTH_ITERATIONS = 12
 """Largest number of depths in whose shares contact begins; each changes the next by a thousandth of its error."""
@@ -116,7 +116,7 @@ class ToForces:
             if not found.outcome.ok:
                 return []
             reached = replace(after, values=self._forces(found.state, first.pose)[list(after.numbers)])
-            last = self._once(first, Move(first.pose, move.end), (reached, after))
+            last = self._once(first, Move(first.pose, move.end), (reached, after), last)
             if abs(last.pose.depth_mm - depth) <= _SAME_DEPTH * abs(depth):
                 return [first, last]
         return []
@@ -144,12 +144,19 @@ class ToForces:
         return [*first, *self._parts(last, Move(last.pose, move.end), (half, wanted), cuts - 1)]
 
     def _once(
-        self, before: Advanced | None, move: Move, forces: tuple[GeneralisedForces, GeneralisedForces]
+        self,
+        before: Advanced | None,
+        move: Move,
+        forces: tuple[GeneralisedForces, GeneralisedForces],
+        expected: Advanced | None = None,
     ) -> Advanced:
+        """Return a part of an increment after another one, whose iteration begins at an end that is expected."""
         state, wanted = (before.solution.state if before else self.state), forces[1]
         problem, formulation = self.problem, formulation_of(self.problem.model)
-        begin = self._begin(before, move, forces)
+        begin = Move(move.start, expected.pose) if expected else self._begin(before, move, forces)
         guess = self.guess(begin.end) if before is None else None
+        if expected:
+            guess = expected.solution.state.contact.force
         solution = formulation.increment(problem, state, begin, guess, self.workspace, wanted)
         failed = Advanced(replace(solution, state=state), [], move.start)
         asked, fingers = str(wanted), 1
@@ -185,6 +192,8 @@ class ToForces:
             depth = self._in_small_strain(replace(end, depth_mm=depth), wanted.values[place])
         elif abs(wanted.values[place] - now.values[place]) <= self._round_off * wanted.size:
             depth = move.start.depth_mm  # what is held moves nothing
+        elif last is None and wanted.asked[0] > 0.0:  # of the depth at the end of the leg, `move` has a share
+            depth *= (wanted.values[place] / wanted.asked[0]) ** (_HERTZ - 1.0)
         elif last is not None:
             there = last.move.start.depth_mm, self._normal_force(last.before, last.move.start)
             depth = by_power_law(there, (move.start.depth_mm, now.values[place]), wanted.values[place])

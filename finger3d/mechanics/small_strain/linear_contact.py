@@ -19,7 +19,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
-from finger3d.contact.rules import RULES, solve_to_forces
+from finger3d.contact.resultants import solve_to_forces
+from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
