@@ -179,10 +179,9 @@ def test_the_table_of_the_readme_is_what_cost_prints(root: Path) -> None:
     assert told[:2] == now[:2]
     both = [(before, after) for before in told[2:] for after in now[2:] if before[0] == after[0]]
     assert len(both) >= 2  # the smallest errors fit into memory or not
-    # over seven meshes of fTetWild, error bars have a standard deviation of 30 %, so that two of them differ by less than
-    # a factor of 4 (3.3 deviations), that of the gauge, by which edges are chosen, by less than 2 (6.5 to 7.5 %, found);
-    # edges for an error differ by the power 1 / 1.2 of that, unknowns by the third power of these, and on one edge
-    # length by 0.8 to 1.2
+    # over seven meshes of fTetWild, error bars have a standard deviation of 30 %, so that two differ by less than a
+    # factor of 4 (3.3 deviations); that of the gauge, by which edges are chosen, was 6.5 to 7.5 %, less than 2; edges
+    # for an error differ by the power 1 / 1.2 of that, unknowns by the third power of these, on one edge by 0.8 to 1.2
     for before, after in both:
         edges, unknowns = (1.0, 1.3) if before[0] == "default" else (1.8, 6.0)
         for column, factor in {1: edges, 2: unknowns, 5: 4.0, 6: 2.0, 7: 4.0}.items():
