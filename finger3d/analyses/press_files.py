@@ -188,7 +188,7 @@ class ResultWriter:
 
         problem, good = record.problem, record.converged_steps
         steps = [record.entry(step) for step in good]
-        table = contact_table(problem.points, good[-1].state)
+        table = contact_table(problem.points, good[-1])
         half_width = problem.points.half_width_mm if problem.dim == 3 else None
         stuck = np.full(len(table["status"]), STICK)
         mu = problem.model.friction.coefficients(stuck, table["pressure_MPa"])
@@ -219,10 +219,10 @@ def _markers(record: PressRecord) -> Tree | None:
 
 def _contact_table(record: PressRecord, step: StepResult) -> Tree:
     """Return the columns of contact.csv; those of two fingers, each in its own frame, one after the other."""
-    first = contact_table(record.problem.points, step.state)
+    first = contact_table(record.problem.points, step)
     if step.other is None:
         return first
-    second = contact_table(record.problem.points, step.other.state)
+    second = contact_table(record.problem.points, step.other)
     fingers = np.repeat(FINGERS, len(first["face"]))
     return {"finger": fingers, **{name: np.concatenate([first[name], second[name]]) for name in first}}
 
@@ -239,7 +239,7 @@ def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str
 
     At a crease they are those of the face with the larger pressure.
     """
-    table = contact_table(points, step.state)
+    table = contact_table(points, step)
     own = np.argsort(table["pressure_MPa"], kind="stable")  # the last of equal indices counts
     labels = [FREE_FACES[k] for k in np.union1d(points.face, CONTACT)]
     ends, between = middles(np.concatenate([mesh.facets[label] for label in labels if label in mesh.facets]), mesh.dim)

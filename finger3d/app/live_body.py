@@ -181,7 +181,7 @@ def _pressed(body: LiveBody, mu: float, depth_mm: float) -> LivePress:
     steps = list(march(pressed))
     steps[-1].check(f"app: mu = {mu:g}")
     measured = measure(problem.points, steps[-1])
-    table = contact_table(problem.points, steps[-1].state)
+    table = contact_table(problem.points, steps[-1])
     z_mm, on = middle_line(table, problem.points.band_mm, problem.points.half_width_mm if problem.dim == 3 else None)
     unknowns = next(formulation_of(problem.model).unknowns(problem, [steps[-1].meshed_state]))
     return LivePress(

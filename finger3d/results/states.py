@@ -177,7 +177,7 @@ def states_of(
     for k, unknowns in enumerate(formulation_of(problem.model).unknowns(problem, parts)):
         u[k] = displacement(problem.mesh, unknowns)[parent] * sign
     u[-1] = last
-    tables = [contact_table(problem.points, steps[i].state) for i in kept]
+    tables = [contact_table(problem.points, steps[i]) for i in kept]
     at = [steps[i].target for i in kept]
     placed = [problem.placed(target) for target in at]
     thing = _object_drawing(problem, placed)

@@ -42,6 +42,8 @@ class PressStep:
     moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : its moment about the middle of the base
     outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
     contact_area_mm2, stick_area_mm2 : area at rest of the zones of contact and of stick, which end between the points
+    stick_ratio_area, stick_ratio_force : share of the contact area, and of the normal force, that sticks
+    slip_margin : 1 less the tangential load over the largest that can be held in its direction; 0: slips as a whole
     largest_penetration_mm : how deep any place of the finger's free surface is inside the object; of its contact points
         where the object is elastic, and while the press runs
     contact_half_length_mm, stick_half_length_mm : half the extent along x, at rest, of contact and stick zone at z = 0
@@ -78,6 +80,9 @@ class PressStep:
     outward_friction_z_N: float
     contact_area_mm2: float
     stick_area_mm2: float
+    stick_ratio_area: float
+    stick_ratio_force: float
+    slip_margin: float
     contact_half_length_mm: float
     stick_half_length_mm: float
     largest_penetration_mm: float

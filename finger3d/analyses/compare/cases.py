@@ -104,7 +104,7 @@ def quantities(points: ContactPoints, step: StepResult) -> dict[str, float]:
 
 def lines_along_x(points: ContactPoints, step: StepResult) -> dict[str, Tree]:
     """Return tractions along x at z = 0, or near it on an unstructured mesh, and at the end of a solid."""
-    table = contact_table(points, step.state)
+    table = contact_table(points, step)
     z = table["z_mm"]
     exact = 1e-6 * points.half_width_mm
     top = points.face == CONTACT

@@ -307,4 +307,5 @@ class Press:
             penetration_mm=max(-float(state.contact.gap.min(initial=0.0)), 0.0),
             detail=solution.detail,
             parts=tuple(parts),
+            friction=problem.model.friction,
         )

@@ -33,6 +33,7 @@ class Kind(Enum):
     CONTACT_AREA = auto()
     STICK_LENGTH = auto()
     STICK_AREA = auto()
+    SHARE = auto()
     DEPTH = auto()
     MOTION = auto()
     MOMENT = auto()
@@ -44,8 +45,8 @@ class Kind(Enum):
 
     @property
     def is_zone(self) -> bool:
-        """Return whether the number is a length or an area of contact or stick."""
-        return self.is_stick or self in (Kind.CONTACT_LENGTH, Kind.CONTACT_AREA)
+        """Return whether the number is a length, an area or a share of contact or stick."""
+        return self.is_stick or self in (Kind.CONTACT_LENGTH, Kind.CONTACT_AREA, Kind.SHARE)
 
     @property
     def is_reading(self) -> bool:
@@ -73,6 +74,7 @@ _FITTED = {
     Kind.FRICTION_SUM: 1.2,
     Kind.STICK_LENGTH: 1.1,
     Kind.STICK_AREA: 1.1,
+    Kind.SHARE: 1.1,
     Kind.DISSIPATION: 1.1,
 }
 
@@ -136,6 +138,9 @@ OF_INCREMENT = (
     *_along("xz", "outward_friction", Kind.FRICTION_SUM, "outward friction along"),
     Quantity("contact_area_mm2", Kind.CONTACT_AREA, "contact area", "mm2"),
     Quantity("stick_area_mm2", Kind.STICK_AREA, "stick area", "mm2"),
+    Quantity("stick_ratio_area", Kind.SHARE, "stick ratio by area"),
+    Quantity("stick_ratio_force", Kind.SHARE, "stick ratio by force"),
+    Quantity("slip_margin", Kind.SHARE, "slip margin"),
     Quantity("contact_half_length_mm", Kind.CONTACT_LENGTH, "contact extent", "mm", *_HALF),
     Quantity("stick_half_length_mm", Kind.STICK_LENGTH, "stick extent", "mm", *_HALF),
     Quantity("contact_half_length_end_mm", Kind.CONTACT_LENGTH, "contact extent", "mm", "at z = width/2", 2.0),

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.contact.friction import STATUS_NAMES
+from finger3d.contact.friction import STATUS_NAMES, STICK, Coulomb, FrictionLaw
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import Zone, zone_area, zone_ends
 from finger3d.errors import MissingError, Outcome
 from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.readings.columns import MEASURED, Column, by_key, in_space, of_kind
+from finger3d.mechanics.results.slip_limit import margins, slip_margin
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose
 
@@ -32,8 +33,9 @@ class StepResult:
     is that of all contact forces on the finger about the middle of the base; `penetration_mm` is how deep the deepest
     contact point is inside the object, or the deepest place of the free surface
     (`finger3d.mechanics.postprocess.penetration`); `detail` describes a failure.  `parts` are the pose and the state of
-    the meshed part at the end of every part that the increment was solved in, the last one included.  Between two
-    fingers `other` is the result of the second one, each in a frame of its own, and `pose` that of the object.
+    the meshed part at the end of every part that the increment was solved in, the last one included; `friction` is the
+    law by which points slip.  Between two fingers `other` is the result of the second one, each in a frame of its own,
+    and `pose` that of the object.
     """
 
     target: ObjectPose
@@ -53,6 +55,7 @@ class StepResult:
     parts: tuple[tuple[ObjectPose, State[Any]], ...] = ()
     other: StepResult | None = None
     pose: ObjectPose | None = None
+    friction: FrictionLaw = Coulomb(0.0)
 
     @property
     def failure(self) -> str:
@@ -121,6 +124,7 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
     points = points.with_basis_of(state)
     world = points.to_global(state.force)
     friction = points.friction(state.force)
+    normal, sticks = state.force[:, 0], state.status == STICK
     outward = (friction[:, ::2] * points.sides_of(step.lowest)).sum(axis=0)
     numbers: Tree = {
         "depth_mm": target.depth_mm,
@@ -136,6 +140,8 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
         **{f"moment_{axis}_Nmm": float(moment) for axis, moment in zip("xyz", step.moment, strict=True)},
         **{f"outward_friction_{axis}_N": float(force) for axis, force in zip("xz", outward, strict=True)},
         **sizes,
+        "stick_ratio_force": float(normal[sticks].sum() / (normal.sum() or 1.0)),
+        "slip_margin": slip_margin(points, state, step.friction),
     }
     others = {column.name: value for column, value in step.readings.items() if column.kind not in MEASURED}
     return numbers | {
@@ -156,10 +162,11 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
 def _sizes_of_zones(points: ContactPoints, state: ContactState) -> dict[str, float]:
     """Return areas and half lengths of contact and stick."""
     (contact, stick), middle = points.zones(state), points.middle_line()
-    facets, area = points.facets, points.facet_area
+    touching, sticking = (zone_area(points.facets, points.facet_area, zone) for zone in (contact, stick))
     return {
-        "contact_area_mm2": zone_area(facets, area, contact),
-        "stick_area_mm2": zone_area(facets, area, stick),
+        "contact_area_mm2": touching,
+        "stick_area_mm2": sticking,
+        "stick_ratio_area": sticking / (touching or 1.0),
         "contact_half_length_mm": _half_extent(middle, contact),
         "stick_half_length_mm": _half_extent(middle, stick),
         **({"contact_half_length_end_mm": _half_extent(points.end_line(), contact)} if points.dim == 3 else {}),
@@ -182,11 +189,12 @@ def row_of_entry(entry: TreeView, step: StepResult) -> Tree:
     return numbers | by_key(in_space(step.readings))
 
 
-def contact_table(points: ContactPoints, state: ContactState) -> Tree:
+def contact_table(points: ContactPoints, step: StepResult) -> Tree:
     """Columns of contact.csv; pressure and shear are the traction on the finger, normals point into it.
 
     A vertex on a crease has a row for each of its faces.
     """
+    state = step.state
     points = points.with_basis_of(state)
     friction = points.friction(state.force)
     padded = np.zeros((len(state.accumulated_slip), points.dim))
@@ -210,5 +218,6 @@ def contact_table(points: ContactPoints, state: ContactState) -> Tree:
         "slip_x_mm": slip[:, 0],
         "slip_y_mm": slip[:, 1],
         "slip_z_mm": slip[:, 2],
+        "margin": margins(points, state, step.friction),
         "status": [STATUS_NAMES[s] for s in state.status],
     }

@@ -1,7 +1,8 @@
 """Slip limit: the largest tangential forces and the largest torque that a contact transmits before it slips as a whole.
 
 With normal forces as they are, every point transmits at most mu times its own.  The resultants that these allow are the
-limit surface (Goyal, Ruina and Papadopoulos 1991).
+limit surface (Goyal, Ruina and Papadopoulos 1991).  Margins are what is left of it, from 1 to 0, where a point or the
+whole contact slips, or nothing can be held.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import FrictionLaw
+from finger3d.contact.friction import STICK, FrictionLaw
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 
@@ -47,6 +48,27 @@ def largest_force(
     along = normal @ direction
     across = np.linalg.norm(direction - along[:, None] * normal, axis=1)
     return float(limit @ across), float(state.force[:, 0] @ along)
+
+
+def margins(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
+    """Return the margin (m,) of every point, 1 - |friction| / (mu N); 0 where it does not stick."""
+    sticks, limit = state.status == STICK, _limits(points, state, friction)
+    used = np.divide(np.linalg.norm(state.force[:, 1:], axis=1), limit, out=np.ones_like(limit), where=limit > 0.0)
+    return np.where(sticks, np.clip(1.0 - used, 0.0, 1.0), 0.0)
+
+
+def slip_margin(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> float:
+    """Return 1 less the tangential load over the largest that the whole contact can hold in its direction.
+
+    The load is that of pressure and friction; 0: the contact slips as a whole.
+    """
+    load = points.with_basis_of(state).to_global(state.force).sum(axis=0) * np.array([1.0, 0.0, 1.0])
+    size = float(np.linalg.norm(load))
+    if not (state.status == STICK).any() or not _limits(points, state, friction).any():
+        return 0.0
+    direction = load / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
+    held = sum(largest_force(points, state, friction, direction))
+    return min(max(1.0 - size / held, 0.0), 1.0) if held > 0.0 else 0.0
 
 
 def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> SlipLimit | None:
