@@ -1,4 +1,4 @@
-"""Tables of README and docs that a command or the package prints; ``python docs/_quoted.py`` writes them anew.
+"""Tables of docs that a command or the package prints; ``python docs/_quoted.py`` writes them anew.
 
 A table stands between ``<!-- from SOURCE ... -->`` and ``<!-- end -->``.
 """
@@ -38,7 +38,7 @@ def cost_table() -> str:
 
 
 TABLES: dict[str, tuple[str, Callable[[], str]]] = {
-    "README.md": ("finger3d cost geometries/fig9.toml", cost_table),
+    "docs/accuracy.md": ("finger3d cost geometries/fig9.toml", cost_table),
     "docs/scenes.md": ("finger3d.scene.reference", keys.reference),
     "docs/materials.md": ("finger3d.materials.reference", silicones.reference),
 }

@@ -90,8 +90,8 @@ def test_the_full_extra_brings_what_the_readme_shows(root: Path) -> None:
     shown = {
         "pandas": "to_dataframe()",
         "pyvista": "to_pyvista()",
-        "dash": "finger3d app",
-        "build123d": "export scene.toml",
+        "dash": "`app`",
+        "build123d": "`export`",
     }
     assert all(words in text for words in shown.values())
     own = re.findall(r"\w+", extras["full"][0].partition("[")[2])

@@ -7,6 +7,7 @@ import re
 import runpy
 import shlex
 import shutil
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,15 +95,49 @@ def test_every_mold_is_exported(root: Path, folder: Path, capsys: pytest.Capture
 
 
 def test_the_python_example_runs(root: Path, folder: Path) -> None:
-    assert main(["new", "scene.toml"]) == 0
-    text = Path("scene.toml").read_text(encoding="utf-8")
-    Path("scene.toml").write_text(text.replace('mesher = "ftetwild"', 'mesher = "swept"').replace("= 2.0 ", "= 4.0 "))
-    (example,) = python(root, "From Python")
+    scene = Path("geometries/fig9.toml")
+    coarse = 'mesher = "swept"\nsize_mm = 4.0\nbase_size_mm = 12.0'
+    scene.write_text(scene.read_text(encoding="utf-8").replace("gauge_refinement = 2.0", coarse), encoding="utf-8")
+    (example,) = python(root, "A press")
     names: dict = {}
     execute(example, names)
     assert len(names["frame"]) == names["result"].summary()["step_estimate"]["steps"]
     assert names["grid"].n_cells > 0
     assert Path("out/contact.png").is_file()
+
+
+def test_the_scene_of_the_readme_is_that_of_its_command(root: Path) -> None:
+    shown = re.search(r"```toml\n(.*?)```", (root / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
+    scene = tomllib.loads((root / "geometries" / "fig9.toml").read_text(encoding="utf-8"))
+    assert shown
+    assert {"title": scene["title"]} | tomllib.loads(shown[1]) == scene
+
+
+@pytest.mark.slow
+def test_the_numbers_of_the_readme_come_back(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    """Two meshes of fTetWild agree within the sum of their error bars."""
+    assert main(["press", "geometries/fig9.toml", "--out", "out", "--no-figures"]) == 0
+    line = r"^ *(normal force|stick area|strain g36) +([\d.]+) \+- ([\d.]+)"
+    told, found = (
+        {name: (float(value), float(bar)) for name, value, bar in re.findall(line, text, flags=re.MULTILINE)}
+        for text in ((root / "README.md").read_text(encoding="utf-8"), capsys.readouterr().out)
+    )
+    assert len(told) == 3
+    for name, (value, bar) in told.items():
+        other, its = found[name]
+        assert abs(value - other) <= bar + its, name
+
+
+def test_the_numbers_beside_other_codes_are_those_of_the_studies(root: Path) -> None:
+    text = (root / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| .*\[study\]\(validation/(\w+)\.py\)\) \| (.*) \| (.*) \|$", text, flags=re.MULTILINE)
+    assert len(rows) == 3
+    for study, *cells in rows:
+        with (root / "validation" / "results" / f"{study}.csv").open(newline="", encoding="utf-8") as file:
+            known = [float(row[key]) for row in csv.DictReader(file) for key in ("wanted", "got")]
+        for number in re.findall(r"\b\d+(?:\.\d+)?", " ".join(cells).replace("CalculiX 2.20", "")):
+            digits = len(number.partition(".")[2])
+            assert any(round(value, digits) == float(number) for value in known), (study, number)
 
 
 def test_the_examples_of_adding_work_and_are_short(root: Path, folder: Path) -> None:
@@ -170,11 +205,11 @@ def test_the_reference_is_the_codes_own(root: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_table_of_the_readme_is_what_cost_prints(root: Path) -> None:
+def test_the_table_of_costs_is_what_cost_prints(root: Path) -> None:
     quoted = runpy.run_path(str(root / "docs" / "_quoted.py"))
     told, now = (
         [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
-        for text in (quoted["parts"]("README.md")[1], quoted["cost_table"]())
+        for text in (quoted["parts"]("docs/accuracy.md")[1], quoted["cost_table"]())
     )
     assert told[:2] == now[:2]
     both = [(before, after) for before in told[2:] for after in now[2:] if before[0] == after[0]]
@@ -191,7 +226,7 @@ def test_the_table_of_the_readme_is_what_cost_prints(root: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_readings_of_two_gauges_in_the_readme_give_the_mu_it_states(
+def test_the_readings_of_two_gauges_give_the_mu_it_states(
     root: Path, folder: Path, capsys: pytest.CaptureFixture
 ) -> None:
     assert main(["new", "scene.toml"]) == 0
@@ -208,7 +243,7 @@ def test_the_readings_of_two_gauges_in_the_readme_give_the_mu_it_states(
 
 
 @pytest.mark.slow
-def test_the_reading_of_one_gauge_in_the_readme_gives_the_mu_it_states(
+def test_the_reading_of_one_gauge_gives_the_mu_it_states(
     root: Path, folder: Path, capsys: pytest.CaptureFixture
 ) -> None:
     assert main(["new", "scene.toml"]) == 0
@@ -219,7 +254,7 @@ def test_the_reading_of_one_gauge_in_the_readme_gives_the_mu_it_states(
     *_, told = capsys.readouterr().out.splitlines()
     found = re.match(r"mu = ([\d.]+) \+- ([\d.]+) \(90 % interval [\d.]+ to [\d.]+\)$", told)
     assert found, told
-    (quoted,) = re.findall(r"--strain 0\.05 +# mu = ([\d.]+)", (root / "README.md").read_text(encoding="utf-8"))
+    (quoted,) = re.findall(r"--strain 0\.05 +# mu = ([\d.]+)", (root / "docs/sensor.md").read_text(encoding="utf-8"))
     assert float(found[1]) == pytest.approx(float(quoted), abs=0.006)  # two digits
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import pytest
 
 from validation import _verdict
@@ -55,13 +52,3 @@ def test_the_table_is_the_first_in_the_index_and_each_claim_a_row_of_it() -> Non
     assert first == _verdict.lines(KEPT, "figures")
     assert len(first) == len(_verdict.CLAIMS) + 2
     assert _verdict.summary(KEPT) in text
-
-
-def test_the_readme_counts_the_claims_as_the_studies_do(root: Path) -> None:
-    text = " ".join((root / "README.md").read_text(encoding="utf-8").split())
-    for column in _verdict.COLUMNS:
-        told = [_verdict.verdict(rows) for claim in _verdict.CLAIMS if (rows := claim.found(column, KEPT))]
-        numbers = [told.count(state) for state in (_verdict.HOLDS, _verdict.PARTLY, _verdict.FAILS)]
-        found = re.search(rf"{column} (\d+), (\d+), (\d+)", text)
-        assert found, column
-        assert [int(number) for number in found.groups()] == numbers, column
