@@ -61,7 +61,7 @@ def test_numbers_between_presses_converge_to_those_of_presses(tmp_path: Path) ->
     for shares in found.design():
         found.press(shares)
     wanted = np.array([0.6, 0.8, 0.7, 0.3])
-    true = found.simulation.at([s.value(x) for s, x in zip(found.scales, wanted, strict=True)], found.data)
+    true = found.simulation.at([s.value(x) for s, x in zip(found.free, wanted, strict=True)], found.data)
     errors = []
     for near in (0.0, 0.05):
         if near:

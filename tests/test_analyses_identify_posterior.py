@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
-from finger3d.analyses.identify.scale import Scale
 
-SCALES = [Scale("friction.mu", 0.0, 1.0), Scale("material.E_MPa", 0.0, 2.0)]
+SCALES = [FreeKey("friction.mu", 0.0, 1.0), FreeKey("material.E_MPa", 0.0, 2.0)]
 COUNT = 4096
 """Samples; the error of a standard deviation is about 1 / sqrt(2 n) = 0.011 of it."""
 
@@ -46,13 +46,13 @@ def test_a_straight_response_has_a_normal_distribution() -> None:
 
 
 def test_samples_find_a_peak_a_thousandth_of_the_range_wide() -> None:
-    found = fitted(linear(np.eye(3)), [0.31, 0.77, 0.5], 1e-3, [Scale(name, 0.0, 1.0) for name in "abc"])
+    found = fitted(linear(np.eye(3)), [0.31, 0.77, 0.5], 1e-3, [FreeKey(name, 0.0, 1.0) for name in "abc"])
     assert found.stds == pytest.approx([1e-3] * 3, rel=0.06)
 
 
 def test_an_interval_is_one_deviation_of_the_share_to_both_sides() -> None:
     """On a logarithmic scale it is longer above the value than below, and it ends at the bounds."""
-    scales = [Scale("a", 1.0, 100.0), Scale("b", 0.0, 1.0)]
+    scales = [FreeKey("a", 1.0, 100.0), FreeKey("b", 0.0, 1.0)]
     assert scales[0].is_logarithmic
     assert scales[0].share(scales[0].value(0.3)) == pytest.approx(0.3)
     found = fitted(linear(np.eye(2)), [0.5, 1.0], 0.05, scales)
@@ -65,7 +65,7 @@ def test_an_interval_is_one_deviation_of_the_share_to_both_sides() -> None:
 
 def test_the_part_of_the_errors_of_the_simulation() -> None:
     """An error of 3 deviations in the only reading of the first value, none in that of the second."""
-    scales, root = [Scale("a", 0.0, 1.0), Scale("b", 0.0, 2.0)], math.sqrt(10.0)
+    scales, root = [FreeKey("a", 0.0, 1.0), FreeKey("b", 0.0, 2.0)], math.sqrt(10.0)
     slope = np.diag([1e3 / root, 1e3])
     samples = sampled(lambda at: -0.5 * np.sum(((at - 0.5) @ slope) ** 2, axis=1), 2, COUNT)
     found = fitted_values(scales, np.array([0.5, 0.5]), samples, slope, np.diag([0.9, 0.0]))
@@ -74,7 +74,7 @@ def test_the_part_of_the_errors_of_the_simulation() -> None:
 
 
 def test_values_that_only_their_sum_is_told_of() -> None:
-    scales = [Scale("a", 0.0, 1.0), Scale("b", 1.0, 100.0)]
+    scales = [FreeKey("a", 0.0, 1.0), FreeKey("b", 1.0, 100.0)]
     told = fitted(linear([[1.0, 1.0], [0.5, 0.5]]), [0.5, 0.5], scales=scales)
     assert any("apart: they may change against each other" in note for note in told.untold)
 

@@ -14,11 +14,10 @@ from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
 from finger3d.analyses.identify.emulator import Emulator, ends
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
-from finger3d.analyses.identify.scale import values_at
 from finger3d.analyses.identify.simulated import (
     OFFSET,
     Curve,
@@ -214,7 +213,7 @@ class _Misfit:
             n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
             for n, v in data.columns.items()
         }
-        shares = np.array([scale.share(v) for scale, v in zip(emulator.scales, start, strict=True)])
+        shares = np.array([key.share(v) for key, v in zip(emulator.free, start, strict=True)])
         return cls(emulator, shares, stds, np.eye(data.count))
 
     def with_errors(self, known: Mapping[str, Float]) -> _Misfit:
@@ -273,7 +272,7 @@ class _Misfit:
         for _ in range(rounds):
             samples = sampled(self.log_likelihood, len(self.start), _FEW)
             best = self.best(samples)
-            named = zip(simulation.free, values_at(emulator.scales, best), strict=True)
+            named = zip(simulation.free, values_at(emulator.free, best), strict=True)
             told = ", ".join(f"{free.key} = {value:.5g}" for free, value in named)
             report.stage(f"fitting, {simulation.solved} presses: {told}")
             unsure = np.sum(self.whitened(emulator.error(samples.shares)) ** 2, axis=1)
@@ -315,7 +314,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     misfit = _Misfit.of(emulator, start)
     shares = misfit.explored(report, 2)
     report.stage("errors of mesh and increments")
-    known = simulation.errors(values_at(emulator.scales, shares), data)
+    known = simulation.errors(values_at(emulator.free, shares), data)
     misfit = misfit.with_errors(known)
     shares = misfit.explored(report)
     if set(data.stds) != set(data.columns):
@@ -325,7 +324,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     part, misfit = misfit.part_of_errors, misfit.as_far_as_it_fits(shares)
     samples = sampled(misfit.log_likelihood, len(start), _MANY)
     shares = misfit.best(samples)
-    fitted = fitted_values(emulator.scales, shares, samples, misfit.derivative(shares), part)
+    fitted = fitted_values(emulator.free, shares, samples, misfit.derivative(shares), part)
     values = fitted.values
     simulated = simulation.at(values, data)
     reduced = _reduced_chi_square(data, simulated, len(values))

@@ -13,6 +13,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.effects_by_need import settled
+from finger3d.analyses.free_keys import FreeKey, check_distinct
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
@@ -80,10 +81,7 @@ def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
     found = tuple(Vary.of(text) for text in texts)
     if not found:
         raise Finger3dError(f"sweep: nothing varies; give at least one key, for instance {_EXAMPLE}")
-    keys = [v.key for v in found]
-    for i, key in enumerate(keys):
-        if key in keys[:i]:
-            raise Finger3dError(f"--vary {key}: given twice; put all its values into one list")
+    check_distinct([v.key for v in found], "--vary", "; put all its values into one list")
     return found
 
 
@@ -208,9 +206,7 @@ def _checked(
     """Return the sweep over values that `joined` makes points of, each a checked scene."""
     base, path = tables_of(source, overrides)
     keys = [tree.numbered(v.key, base, option) for v in vary]
-    if len(set(keys)) < len(keys):
-        both = next(v.key for i, v in enumerate(vary) if keys[i] in keys[:i])
-        raise Finger3dError(f"{option} {both}: given twice; put all its values into one list")
+    check_distinct(keys, option, "; put all its values into one list")
     options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, option)
     settings = list(joined(*(v.texts for v in vary)))
     scenes: list[Scene] = []
@@ -347,26 +343,13 @@ def drawn(sample: str, ranges: Sequence[str], seed: int) -> tuple[Vary, ...]:
         )
     if seed < 0:
         raise Finger3dError(f"--seed {seed}: must be 0 or more")
-    bounds = [_range(text) for text in ranges]
-    keys = [key for key, *_ in bounds]
-    if twice := next((key for i, key in enumerate(keys) if key in keys[:i]), ""):
-        raise Finger3dError(f"--range {twice}: given twice")
+    bounds = [FreeKey.of(text, "--range", f"as in {_SAMPLE_EXAMPLE}") for text in ranges]
+    check_distinct([free.key for free in bounds], "--range")
     random = np.random.default_rng(seed)
     columns = []
-    for key, low, high in bounds:
+    for free in bounds:
         share = random.random(count)
         if kind == "lhs":
             share = (random.permutation(count) + share) / count
-        columns.append(Vary(key, tuple(map(repr, (low + (high - low) * share).tolist()))))
+        columns.append(Vary(free.key, tuple(map(repr, (free.low + (free.high - free.low) * share).tolist()))))
     return tuple(columns)
-
-
-def _range(text: str) -> tuple[str, float, float]:
-    key, _, bounds = text.partition("=")
-    try:
-        low, high = (float(part) for part in bounds.split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise Finger3dError(f"--range {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, as in {_SAMPLE_EXAMPLE}")
-    return key.strip(), low, high
