@@ -210,15 +210,6 @@ def refine_mesh(
     return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
 
 
-def _relative_errors(
-    numbers: Mapping[str, float], kinds: Mapping[str, Kind], errors: Mapping[str, float], goal: str
-) -> dict[str, float]:
-    """Return the relative errors of the goal, or of all numbers, the largest first."""
-    names = [name for name in errors if name in numbers] if goal == ALL else [goal]
-    found = {name: relative_error(numbers, kinds, name, errors[name]) for name in names}
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
     """Press on one mesh; return its problem, its round, and the edge lengths to try next."""
     start = time.perf_counter()
@@ -228,17 +219,27 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     steps[-1].check("the press on this mesh")
     numbers, kinds = press_numbers(short, steps[-1]), kinds_of(steps[-1].readings)
     found, beside, _ = discretisation(short, steps, numbers=press_numbers)
-    errors = _relative_errors(numbers, kinds, found.discretisation, goal)
-    worst, error = next(iter(errors.items()))
-    mesh = model.mesh
+    names = [name for name in found.discretisation if name in numbers] if goal == ALL else [goal]
+    errors = {name: relative_error(numbers, kinds, name, found.discretisation[name]) for name in names}
+    worst, mesh = max(errors, key=lambda name: errors[name]), model.mesh
+    error = errors[worst]
     if error <= tolerance:
         wanted = _longer(problem, numbers["contact_half_length_mm"])
     else:
         factor = (_SAFETY * tolerance / error) ** (1.0 / (1.0 if kinds[worst].is_zone else kinds[worst].order))
         factor = min(max(factor, _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
         wanted = _shorter(mesh, _zones_to_refine(beside, found.companion_numbers, worst, kinds[worst]), factor)
-    dofs = int(problem.body.stiffness.upper.shape[0])
-    return problem, _round(mesh, dofs, error, worst, time.perf_counter() - start), wanted
+    done = Round(
+        size_mm=mesh.size_mm,
+        base_size_mm=mesh.base_size_mm,
+        dofs=int(problem.body.stiffness.upper.shape[0]),
+        error=error,
+        number=worst,
+        seconds=time.perf_counter() - start,
+        gauge_refinement=mesh.gauge_refinement,
+        stick_refinement=mesh.stick_refinement,
+    )
+    return problem, done, wanted
 
 
 def _edges(mesh: MeshOptions) -> tuple[float, ...]:
@@ -292,13 +293,6 @@ def _shorter(mesh: MeshOptions, zones: set[str], factor: float) -> MeshOptions:
         gauge_refinement=finer[0],
         stick_refinement=finer[1],
         borders=None,
-    )
-
-
-def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
-    """Return the record of a round on a mesh."""
-    return Round(
-        mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement, mesh.stick_refinement
     )
 
 

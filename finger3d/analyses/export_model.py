@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, holds
+from finger3d.io import claimed, holds, write_text
 from finger3d.progress import Progress
 from finger3d.scene import Source, scene_of
 
@@ -101,7 +101,7 @@ def export_deck(
     report.stage("meshing")
     made = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
-    with claimed(out), atomic(out / DECK_FILE) as temporary:
-        temporary.write_text(made.deck.text(), encoding="ascii")
+    with claimed(out):
+        write_text(out / DECK_FILE, made.deck.text())
     mesh = made.deck.mesh
     return ModelFiles((out / DECK_FILE,), len(mesh.points), len(mesh.cells), made.multiple, made.remarks)

@@ -36,6 +36,11 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+_MOST_KEPT = 4
+"""Bodies, and presses, that a search or a fit keeps."""
 
 _FARTHEST = 2.0
 """Largest extrapolation of forces in mu, over the difference of the last two values."""
@@ -261,3 +266,13 @@ class PressedBody:
         problem = build(model, self._report, *margin)
         self.seconds += time.perf_counter() - start
         return problem
+
+
+def kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value:
+    """Return what is stored under a key; if nothing is, make and store it in place of the oldest of `_MOST_KEPT`."""
+    if key not in store:
+        found = made()
+        while len(store) >= _MOST_KEPT:
+            store.pop(next(iter(store)))
+        store[key] = found
+    return store[key]

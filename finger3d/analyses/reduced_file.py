@@ -36,6 +36,9 @@ _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 """Mesh options that a file stores."""
 
+_OF_MODEL = ("legs", "gauges", "markers", "taxels", "domain", "rule", "warnings", "filled")
+"""Attributes of a model that a file stores as they are."""
+
 _FRICTION: dict[str, type[FrictionLaw]] = {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 
@@ -44,8 +47,8 @@ class _Header(BaseModel):
     """The header; `object` and `friction` are tables whose ``kind`` names a class."""
 
     model_config = _STRICT
-    format: str
-    version: int
+    format: str = FORMAT
+    version: int = VERSION
     about: dict[str, Any]
     body: DesignSummary
     material: Isotropic
@@ -70,8 +73,7 @@ def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Tre
     if isinstance(problem.model.object, MeshObject):
         shape = problem.model.object.surface
         arrays |= {"object_points": shape.points, "object_faces": shape.faces}
-    header = {"format": FORMAT, "version": VERSION, "about": dict(about), **_header(problem)}
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    arrays["header"] = np.frombuffer(_header(problem, about).model_dump_json().encode(), dtype=np.uint8)
     write_arrays(path, arrays)
     return Path(path)
 
@@ -213,27 +215,20 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     return replace(problem, without_inclusions=replace(problem, system=without))
 
 
-def _header(problem: Problem) -> Tree:
-    model = problem.model
-    thing = model.object
-    placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}
-    return {
-        "body": asdict(model.design),
-        "material": asdict(model.material.isotropic("a reduced model")),
-        "mesh": {name: getattr(model.mesh, name) for name in _OF_MESH},
-        "legs": [asdict(leg) for leg in model.legs],
-        "object": {"kind": type(thing).__name__, **placed},
-        "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
-        "gauges": [asdict(g) for g in model.gauges],
-        "markers": [asdict(m) for m in model.markers],
-        "taxels": [asdict(t) for t in model.taxels],
-        "domain": model.domain,
-        "rule": model.rule,
-        "warnings": list(model.warnings),
-        "filled": [list(f) for f in model.filled],
-        "axes": list(problem.axes),
-        "touch_mm": problem.system.first_contact_mm,
-    }
+def _header(problem: Problem, about: TreeView) -> _Header:
+    model, obj = problem.model, problem.model.object
+    placed = {f.name: getattr(obj, f.name) for f in fields(obj) if f.name != "surface"}
+    return _Header(
+        about=dict(about),
+        body=model.design,
+        material=model.material.isotropic("a reduced model"),
+        mesh=MeshOptions(**{name: getattr(model.mesh, name) for name in _OF_MESH}),
+        object={"kind": type(obj).__name__, **placed},
+        friction={"kind": type(model.friction).__name__, **asdict(model.friction)},
+        axes=problem.axes,
+        touch_mm=problem.system.first_contact_mm,
+        **{name: getattr(model, name) for name in _OF_MODEL},
+    )
 
 
 def _model(header: _Header, arrays: TreeView) -> Model:
@@ -243,20 +238,13 @@ def _model(header: _Header, arrays: TreeView) -> Model:
 
         surface = {"surface": Triangles(arrays["object_points"], arrays["object_faces"])}
     return Model(
-        header.body,
-        header.material,
-        header.mesh,
-        header.legs,
-        _of_kind(_SHAPES, header.object, surface),
-        _of_kind(_FRICTION, header.friction, {}),
-        gauges=header.gauges,
-        markers=header.markers,
-        taxels=header.taxels,
-        domain=header.domain,
-        rule=header.rule,
+        design=header.body,
+        material=header.material,
+        mesh=header.mesh,
+        object=_of_kind(_SHAPES, header.object, surface),
+        friction=_of_kind(_FRICTION, header.friction, {}),
         symmetry=header.axes,
-        warnings=header.warnings,
-        filled=header.filled,
+        **{name: getattr(header, name) for name in _OF_MODEL},
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,14 +93,7 @@ class Sensitivity:
             name: {key: {"value": e.value(self.changes[key]), **e._asdict()} for key, e in by_key.items()}
             for name, by_key in self.effects.items()
         }
-        return {
-            "title": self.title,
-            "numbers": dict(self.numbers),
-            "keys": dict(self.keys),
-            "changes": dict(self.changes),
-            "effects": effects,
-            "failures": dict(self.failures),
-        }
+        return {**asdict(self), "effects": effects}
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""

@@ -3,40 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from finger3d._types import Float, Int
+from finger3d._types import Float
 from finger3d.analyses.pressed_body import PressesByMu, presses
 from finger3d.mechanics.discretise.companions import built_like
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
-
-
-@dataclass(frozen=True)
-class ReferenceReadings:
-    """Readings of the nominal body.
-
-    Attributes
-    ----------
-    mu : (n,) array
-    readings : (n,) by name
-    sample : (m,) array
-        Indices of the values of mu at which other bodies and paths are pressed.
-    frame : the last increment of any press
-    pressed : presses by mu
-    """
-
-    mu: Float
-    readings: Mapping[str, Float]
-    sample: Int
-    frame: StepResult
-    pressed: PressesByMu
 
 
 @dataclass(frozen=True)

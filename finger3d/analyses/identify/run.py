@@ -30,7 +30,7 @@ from finger3d.analyses.identify.simulated import (
     names_of,
 )
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
@@ -401,8 +401,7 @@ def _write(folder: Path, found: Identification) -> None:
             f"{name}_simulated": found.simulated[name],
         }
     write_csv(folder / "identify.csv", columns)
-    with atomic(folder / "identified.toml") as temporary:
-        temporary.write_text(found.scene.to_toml(), encoding="utf-8")
+    write_text(folder / "identified.toml", found.scene.to_toml())
     offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
     part = moving_part(found.curve[data.index], data)
     curve = {name: values[part] for name, values in found.curve.items()}

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -18,7 +18,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.pressed_body import PressedBody, kept, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
@@ -48,11 +48,6 @@ _SHORTEST = 1.0 / 30.0
 
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
-
-_MAX_STORED = 4  # bodies, and presses
-
-Key = TypeVar("Key")
-Value = TypeVar("Value")
 
 Curve = Mapping[str, Float]
 """Columns of history.csv, a value for each increment."""
@@ -206,11 +201,11 @@ class Simulation:
             model = scene.model()
             model = replace(model, legs=self._legs(model))
             key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
-            body = _kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
+            body = kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
             steps = body.steps(model.friction, model.rule)  # which may condense it again
             return under(body.problem, model.friction, rule=model.rule), steps
 
-        return _kept(self._presses, point, pressed)
+        return kept(self._presses, point, pressed)
 
     def _in_same_mesh(self, model: Model) -> Problem | None:
         """Return the condensed body of a model in the mesh of one that differs in materials and friction, if any."""
@@ -242,16 +237,6 @@ class Simulation:
 
     def _named(self, point: tuple[float, ...]) -> str:
         return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
-
-
-def _kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value:
-    """Return what is stored under a key; if nothing is, make and store it in place of the oldest."""
-    if key not in store:
-        found = made()
-        while len(store) >= _MAX_STORED:
-            store.pop(next(iter(store)))
-        store[key] = found
-    return store[key]
 
 
 def has_zones(columns: Iterable[str]) -> bool:

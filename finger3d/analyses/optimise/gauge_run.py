@@ -18,7 +18,7 @@ from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import NOWHERE, SPACING_MM, Candidates, GaugeSet, Region, search
 from finger3d.analyses.optimise.task import MUS
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.model import Model
 from finger3d.plotting.optimise import GaugeMap, draw_places
 from finger3d.progress import Progress
@@ -198,8 +198,7 @@ def _with_gauges(given: TreeView, path: Path | None, found: GaugeSet) -> Scene:
 
 
 def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
-    with atomic(folder / "best.toml") as temporary:
-        temporary.write_text(result.scene.to_toml(defaults=False), encoding="utf-8")
+    write_text(folder / "best.toml", result.scene.to_toml(defaults=False))
     places = result.maps[0][0]
     columns: Tree = {f"{axis}_mm": places[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"mean_mu_sd_g{i + 1}_here": values for i, (_, values) in enumerate(result.maps)}

@@ -18,7 +18,7 @@ from finger3d.analyses.optimise.task import (
     objective_of,
 )
 from finger3d.errors import MissingError
-from finger3d.io import atomic, claimed, write_json
+from finger3d.io import claimed, write_json, write_text
 from finger3d.plotting.optimise import draw
 from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
@@ -179,8 +179,7 @@ def _write_best(
     increments: Mapping[str, object] | None = None,
 ) -> None:
     problem = search.problem
-    with atomic(folder / "best.toml") as path:
-        path.write_text(problem.scene(best.values).to_toml(defaults=False), encoding="utf-8")
+    write_text(folder / "best.toml", problem.scene(best.values).to_toml(defaults=False))
     names = [f.key for f in problem.free]
     write_json(
         folder / "design.json",
