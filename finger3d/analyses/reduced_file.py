@@ -218,17 +218,18 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
 def _header(problem: Problem, about: TreeView) -> _Header:
     model, obj = problem.model, problem.model.object
     placed = {f.name: getattr(obj, f.name) for f in fields(obj) if f.name != "surface"}
-    return _Header(
-        about=dict(about),
-        body=model.design,
-        material=model.material.isotropic("a reduced model"),
-        mesh=MeshOptions(**{name: getattr(model.mesh, name) for name in _OF_MESH}),
-        object={"kind": type(obj).__name__, **placed},
-        friction={"kind": type(model.friction).__name__, **asdict(model.friction)},
-        axes=problem.axes,
-        touch_mm=problem.system.first_contact_mm,
+    header: Tree = {
+        "about": dict(about),
+        "body": model.design,
+        "material": model.material.isotropic("a reduced model"),
+        "mesh": MeshOptions(**{name: getattr(model.mesh, name) for name in _OF_MESH}),
+        "object": {"kind": type(obj).__name__, **placed},
+        "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
+        "axes": problem.axes,
+        "touch_mm": problem.system.first_contact_mm,
         **{name: getattr(model, name) for name in _OF_MODEL},
-    )
+    }
+    return _Header(**header)
 
 
 def _model(header: _Header, arrays: TreeView) -> Model:

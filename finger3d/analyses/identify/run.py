@@ -85,25 +85,19 @@ class Identification:
 
     def as_dict(self) -> Tree:
         """Return the content of identify.json."""
-        fitted = self.fitted
+        fitted, names = self.fitted, ("value", "std", "std_numerical", "low", "high")
+        rows = np.column_stack([fitted.values, fitted.stds, fitted.numerical, fitted.low, fitted.high]).tolist()
+        tables = zip(self.keys, rows, fitted.correlation.tolist(), strict=True)
+        values, correlation = {}, {}
+        for key, row, correlated in tables:
+            values[key] = dict(zip(names, row, strict=True))
+            correlation[key] = dict(zip(self.keys, correlated, strict=True))
         return {
             "scene": self.scene.as_dict(),
             "measured": str(self.measured.path),
             "index": self.measured.index,
-            "values": {
-                key: {
-                    "value": float(fitted.values[i]),
-                    "std": float(fitted.stds[i]),
-                    "std_numerical": float(fitted.numerical[i]),
-                    "low": float(fitted.low[i]),
-                    "high": float(fitted.high[i]),
-                }
-                for i, key in enumerate(self.keys)
-            },
-            "correlation": {
-                key: dict(zip(self.keys, map(float, fitted.correlation[i]), strict=True))
-                for i, key in enumerate(self.keys)
-            },
+            "values": values,
+            "correlation": correlation,
             "reduced_chi_square": self.reduced_chi_square,
             "residual_rms": {
                 name: float(np.sqrt(np.mean((values - self.simulated[name]) ** 2)))

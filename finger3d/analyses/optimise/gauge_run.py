@@ -65,16 +65,12 @@ class GaugePlaces:
             "spacing_mm": self.found.spacing_mm,
             "gauges": [
                 {
-                    "name": f"g{i + 1}",
-                    "x_mm": float(g.place[0]),
-                    "y_mm": float(g.place[1]),
-                    "z_mm": float(g.place[2]),
-                    "angle_deg": math.degrees(g.angle),
+                    **table,
                     "mean_mu_sd_alone": float(own.mean()),
-                    "mean_mu_sd_with_those_before": first[i],
+                    "mean_mu_sd_with_those_before": before,
                     "mu_sd_alone": own,
                 }
-                for i, (g, own) in enumerate(zip(gauges, each, strict=True))
+                for table, own, before in zip(_gauge_tables(self.found), each, first, strict=True)
             ],
         }
 
@@ -182,18 +178,19 @@ def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, F
     return places, best
 
 
+def _gauge_tables(found: GaugeSet) -> list[Tree]:
+    """Return the keys of the gauges as tables of a scene have them."""
+    places = [dict(zip(("x_mm", "y_mm", "z_mm"), gauge.place.tolist(), strict=True)) for gauge in found.gauges]
+    return [
+        {"name": f"g{i}", **place, "angle_deg": math.degrees(gauge.angle)}
+        for i, (place, gauge) in enumerate(zip(places, found.gauges, strict=True), start=1)
+    ]
+
+
 def _with_gauges(given: TreeView, path: Path | None, found: GaugeSet) -> Scene:
     """Return the scene with the gauges that were found instead of its own."""
-    gauges = [
-        {
-            "name": f"g{i + 1}",
-            "x_mm": round(float(g.place[0]), 3),
-            "y_mm": round(float(g.place[1]), 3),
-            "z_mm": round(float(g.place[2]), 3),
-            "angle_deg": round(math.degrees(g.angle), 2),
-        }
-        for i, g in enumerate(found.gauges)
-    ]
+    digits = {"x_mm": 3, "y_mm": 3, "z_mm": 3, "angle_deg": 2}
+    gauges = [table | {k: round(table[k], n) for k, n in digits.items()} for table in _gauge_tables(found)]
     return parse(tree.frozen(tree.plain(given) | {"gauge": gauges}), path)
 
 
