@@ -20,7 +20,7 @@ from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
-from finger3d.analyses.identify.simulated import Simulation, largest, names_of
+from finger3d.analyses.identify.simulated import Simulation, names_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
@@ -132,7 +132,6 @@ def test_names_and_magnitudes() -> None:
     names = names_of(scene().model())
     assert {"depth_mm", "normal_force_N", "time_s", "gauge_g36", "gauge_long"} <= set(names)
     assert "method" not in names
-    assert largest({"a": np.array([-3.0, 2.0]), "b": np.array([])}) == {"a": 3.0, "b": 0.0}
 
 
 def test_increments_end_at_the_measured_rows(tmp_path: Path) -> None:

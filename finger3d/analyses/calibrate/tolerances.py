@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
@@ -162,7 +163,8 @@ def evaluate_tolerances(
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
         report.stage("a coarser body")
-        coarse = _on_coarser_mesh(body, report)
+        with suppress(Finger3dError):  # where there is no coarser mesh
+            coarse = ReferenceBody.of(companion(body.problem, report), names, mu)
     varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
         report.stage(f"tolerance {name}")
@@ -316,14 +318,6 @@ def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
         return tuple(f + s * (f - last) for f, last, s in zip(forces, before, share, strict=False))
 
     return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
-
-
-def _on_coarser_mesh(body: ReferenceBody, report: Progress) -> ReferenceBody | None:
-    """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
-    try:
-        return ReferenceBody.of(companion(body.problem, report), body.names, body.mu)
-    except Finger3dError:
-        return None
 
 
 def _mesh_errors(body: ReferenceBody, coarse: ReferenceBody, readings: Sequence[CalibratedReading]) -> Float:

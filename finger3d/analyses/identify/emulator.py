@@ -157,7 +157,7 @@ class Emulator:
     @cached_property
     def _is_stress(self) -> NDArray[np.bool_]:
         """Whether each of the numbers (n,) is proportional to the stresses."""
-        return np.repeat([self.simulation.is_stress(name) for name in self.data.columns], len(self.data.at))
+        return np.repeat([name in self.simulation.stresses for name in self.data.columns], len(self.data.at))
 
     def error(self, shares: Float) -> Float:
         """Return the error (s, n) at shares (s, k): half of the difference to another interpolation."""

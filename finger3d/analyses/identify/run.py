@@ -24,8 +24,6 @@ from finger3d.analyses.identify.simulated import (
     Simulation,
     check_rows,
     fitted_scene,
-    has_zones,
-    largest,
     moving_part,
     names_of,
 )
@@ -167,7 +165,7 @@ def identify(
         claimed(out, "identify") as folder,
         opened(folder / "presses.jsonl", folder / "task.json", task) as journal,
     ):
-        simulation = Simulation(given, path, keys, journal, has_zones(data.columns), data)
+        simulation = Simulation(given, path, keys, journal, data)
         found = _fitted(simulation, data, start, report)
         _write(folder, found)
         return found
@@ -292,8 +290,14 @@ class _Misfit:
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
-        data = self.emulator.data
-        return replace(self, stds={**self.stds, **_by_residuals(data, self.emulator.columns(shares), len(shares))})
+        data, simulated, stds = self.emulator.data, self.emulator.columns(shares), {**self.stds}
+        left = 1.0 - min(len(shares) / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
+        for name, values in data.columns.items():
+            if name not in data.stds:
+                least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
+                std = max(_rms(values - simulated[name]) / math.sqrt(left), least)
+                stds[name] = np.full(len(values), std)
+        return replace(self, stds=stds)
 
 
 def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
@@ -324,7 +328,11 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     reduced = _reduced_chi_square(data, simulated, len(values))
     unknown = sorted(set(data.columns) - set(known))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
-    notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := _misfit_text(reduced)) else [])]
+    notes, ratio = [*fitted.untold, *missing], math.sqrt(reduced)
+    if ratio > _MISFIT:
+        notes.append(
+            f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
+        )
     return Identification(
         scene=simulation.scene(values),
         keys=tuple(f.key for f in simulation.free),
@@ -344,30 +352,8 @@ def _check_columns(emulator: Emulator, tried: Sequence[Float]) -> None:
     good = [shares for shares in tried if not emulator.fails(shares[None])[0]]
     curves = [emulator.columns(shares) for shares in good]
     emulator.data.check_signs(curves)
-    magnitudes = [largest(curve) for curve in curves]
-    columns = emulator.data.columns
-    emulator.data.check_units(
-        {n: min(m[n] for m in magnitudes) for n in columns}, {n: max(m[n] for m in magnitudes) for n in columns}
-    )
-
-
-def _misfit_text(reduced: float) -> str:
-    """Say whether residuals are larger than their standard deviations, from the reduced chi-square."""
-    ratio = math.sqrt(reduced)
-    if ratio <= _MISFIT:
-        return ""
-    return f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
-
-
-def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:
-    """Return the standard deviations (n,) of columns that have none in the file, from their residuals."""
-    left = 1.0 - min(keys / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
-    found = {}
-    for name, values in data.columns.items():
-        if name not in data.stds:
-            least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
-            found[name] = np.full(len(values), max(_rms(values - simulated[name]) / math.sqrt(left), least))
-    return found
+    magnitudes = {n: [float(np.abs(curve[n]).max()) for curve in curves] for n in emulator.data.columns}
+    emulator.data.check_units(magnitudes)
 
 
 def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> float:
