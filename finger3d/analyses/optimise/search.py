@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
-from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem
+from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem, evaluation_of
 from finger3d.analyses.pressed_body import PressedBody, kept, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
@@ -81,11 +81,15 @@ class Search:
     report: Progress
     objective: Objective
     journal: Journal
-    known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
+    known: dict[tuple[float, ...], Evaluation] = field(init=False)
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
     chosen: tuple[int | Literal["auto"], ...] | None = None
     _stored: dict[str, _PressedDesign] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Take over the evaluations of an earlier run."""
+        self.known = {found.values: found for found in map(evaluation_of, self.journal.rows)}
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
         """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""

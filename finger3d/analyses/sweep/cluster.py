@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from finger3d import _extras
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.store import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import DIED, BodyPoints, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.results.journal import Row
 
@@ -191,10 +191,7 @@ def _reason(future: Future[list[Row]]) -> str:
 
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
-        return (
-            "every worker that was given this body died, perhaps for lack of memory; "
-            "try a coarser mesh or fewer --workers; the same command tries it again"
-        )
+        return DIED
     if error is None:
         return "its task was cancelled; the same command tries it again"
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
