@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from finger3d._cost import PressSize, mesh_gb, tet_unknowns, tets_made
-from finger3d.accuracy.cost import AddedCost, forecast
+from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError
@@ -186,13 +186,6 @@ def test_points_at_the_border_of_stick_are_foretold() -> None:
     assert forecast(smooth)["contact_points"] == without["contact_points"]
 
 
-def test_a_cost_is_told_with_its_reason() -> None:
-    text = str(AddedCost(seconds=12.345, memory_mb=678.9, reason="a mesh of its own"))
-    assert "12 s" in text
-    assert "6.8e+02 MB" in text
-    assert text.endswith("a mesh of its own")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("sphere", [True, False])
 def test_an_unstructured_solid_has_the_size_that_was_foretold(sphere: bool) -> None:
@@ -226,25 +219,12 @@ def test_unknowns_of_thin_layers_and_of_coarse_solids_are_those_that_ftetwild_ma
     assert 0.7 < unknowns / forecast(model)["dofs"] < 1.4
 
 
-def test_an_increment_at_finite_strain_costs_a_factorisation_and_its_iterations() -> None:
-    one, two = PressSize(3, 1e6, 100.0), PressSize(3, 2e6, 100.0)
-    # the ordering of the condensation is reused; iterations are proportional to the unknowns
-    assert 0.5 * one.condensation_s < one.finite_strain_s < 1.5 * one.condensation_s
-    iterations = one.finite_strain_s - 0.85 * one.condensation_s
-    assert two.finite_strain_s - 0.85 * two.condensation_s == pytest.approx(2.0 * iterations, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("dofs", "measured"), [(860, 0.044), (5276, 0.14), (17_895, 0.197), (47_312, 0.837), (102_596, 2.01)]
 )
 def test_increments_of_sections_at_finite_strain_take_what_was_measured(dofs: int, measured: float) -> None:
     # processor seconds an increment of the sections at large deformation of validation/cost_forecast.py
     assert 0.5 < PressSize(2, dofs, 50.0).finite_strain_s / measured < 2.0
-
-
-def test_a_press_takes_its_condensation_and_its_increments() -> None:
-    size = PressSize(2, 10_000.0, 100.0)
-    assert size.press_s(10) == pytest.approx(size.condensation_s + 10 * size.contact_s)
 
 
 def test_large_meshes_take_the_memory_that_was_measured() -> None:

@@ -300,17 +300,6 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
     assert all(check_surface(problem, [end])[0].within_candidates for end in ends)
 
 
-def test_one_solver_proves_as_the_other(monkeypatch) -> None:
-    problem = build(scene().model())
-    ends = [list(march(problem))[-1]] * 3
-    monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
-    other = build(scene().model())
-    assert other.body.condensed.solver == "superlu"
-    forces = [f.meshed_state.contact.force for f in ends]
-    for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
-        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
-
-
 def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
     """Then nothing that a plane could touch is beyond them, and no press pays a proof."""
     level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]

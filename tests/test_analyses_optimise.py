@@ -20,7 +20,7 @@ from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
 from finger3d.analyses.optimise.gauge_search import Candidates, Region, objectives, search
 from finger3d.analyses.optimise.run import find_best, optimise
-from finger3d.analyses.optimise.task import Evaluation, OptimisationProblem, evaluation_of, sensitivity
+from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
 from finger3d.analyses.pressed_body import presses
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
@@ -42,14 +42,6 @@ def test_sensitivity_is_the_least_slope_in_units_of_noise() -> None:
     assert sensitivity(objective_table([0.0, -0.1, -0.15])) == pytest.approx(100.0)
     # it turns back: two mu share a strain
     assert sensitivity(objective_table([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
-
-
-def test_an_evaluation_comes_back_from_its_line() -> None:
-    row = json.loads('{"values": [0.25, 0.5], "objective": NaN, "outcome": "too deep"}')
-    found = evaluation_of(row)
-    assert (found.values, found.outcome) == ((0.25, 0.5), "too deep")
-    assert math.isnan(found.value)
-    assert evaluation_of({**row, "objective": 3.5}) == Evaluation((0.25, 0.5), 3.5, "too deep")
 
 
 # one body for all angles: refined around its gauge, each press would have another mesh

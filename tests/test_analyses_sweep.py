@@ -16,13 +16,12 @@ import pytest
 
 import finger3d
 from finger3d.analyses.sweep import run as running
-from finger3d.analyses.sweep.points import Vary, columns_of, combinations, drawn, listed_points, rows_of
+from finger3d.analyses.sweep.points import Vary, checked_points, columns_of, drawn, rows_of, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress, duration
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal, Row
-from finger3d.scene import load
 from tests.scenes import HALF_CYLINDER, written
 from tests.sweep_cases import COARSE, SETS, lines, points_of, pressed_here, table
 
@@ -49,10 +48,10 @@ def test_values_are_told_apart_by_commas_outside_brackets_and_quotes(text, value
 
 def test_a_varied_modulus_or_silicone_replaces_what_the_scene_gives(paper_scene) -> None:
     named = ["material.silicone=Dragon Skin 20"]
-    moduli = combinations(paper_scene, named, ["material.E_MPa=0.3,0.5"])
+    moduli = checked_points(paper_scene, named, varied(["material.E_MPa=0.3,0.5"]))
     assert [p.values["material.E_MPa"] for p in moduli.points] == [0.3, 0.5]
     assert len(moduli.bodies) == 2
-    silicones = combinations(paper_scene, (), ['material.silicone="Ecoflex 00-30","dragon skin 20"'])
+    silicones = checked_points(paper_scene, (), varied(['material.silicone="Ecoflex 00-30","dragon skin 20"']))
     assert len(silicones.bodies) == 2
 
 
@@ -105,7 +104,7 @@ def test_samples_that_cannot_be_drawn_are_refused(sample, ranges, seed, expected
 def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("\ufefffriction.mu, material.nu\n0.3,0.45\n\n0.1,0.49\n0.2,0.45\n", encoding="utf-8")
-    sweep = listed_points(paper_scene, SETS, rows_of(path), "--points")
+    sweep = checked_points(paper_scene, SETS, rows_of(path), "--points")
     assert [p.values for p in sweep.points] == [
         {"friction.mu": 0.3, "material.nu": 0.45},
         {"friction.mu": 0.1, "material.nu": 0.49},
@@ -113,7 +112,7 @@ def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_pa
     ]
     assert len(sweep.bodies) == 2
     path.write_text("Operator;Max\nfriction.mu;material.nu\n0,3;0,45\n0,1;0,49\n0,2;0,45\n", encoding="utf-16")
-    assert listed_points(paper_scene, SETS, rows_of(path), "--points").points == sweep.points
+    assert checked_points(paper_scene, SETS, rows_of(path), "--points").points == sweep.points
 
 
 @pytest.mark.parametrize(
@@ -206,7 +205,7 @@ def test_every_marker_of_a_grid_is_a_column(tmp_path: Path) -> None:
 def test_a_dot_has_one_name_whatever_the_size_of_the_finger(tmp_path: Path) -> None:
     """Places are multiples of the spacing on a section whose half length is its radius."""
     path = written(tmp_path, HALF_CYLINDER + "[marker_grid]\nspacing_mm = 2.0\n")
-    sweep = combinations(path, ["gauge.0.y_mm=3.0"], ["finger.radius_mm=4,6", "marker_grid.spacing_mm=2,3"])
+    sweep = checked_points(path, ["gauge.0.y_mm=3.0"], varied(["finger.radius_mm=4,6", "marker_grid.spacing_mm=2,3"]))
     grids = [{m.name: m.x_mm for m in sweep.bodies[point.body].grid} for point in sweep.points]
     assert [[*grid.values()] for grid in grids] == [
         [-4.0, -2.0, 0.0, 2.0, 4.0],
@@ -268,10 +267,6 @@ def test_a_point_whose_row_is_written_at_an_interruption_is_counted(paper_scene,
     assert main(words) == 130
     assert "2 of 3 points" in capsys.readouterr().err
     assert len(lines(tmp_path)) == len(table(tmp_path)) == 2
-
-
-def test_the_scene_of_these_tests_is_small(paper_scene) -> None:
-    assert load(paper_scene, SETS).mesh.size_mm == 4.0
 
 
 def test_one_worker_is_this_process(paper_scene, tmp_path, monkeypatch) -> None:
@@ -374,7 +369,7 @@ def test_what_makes_it_another_sweep_is_named(vary, expected, paper_scene, tmp_p
         pass
     with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(paper_scene, *vary), tmp_path).open():
         pass
-    other = combinations(paper_scene, [*SETS, "press.steps=3"], ["friction.mu=0.06,1"])
+    other = checked_points(paper_scene, [*SETS, "press.steps=3"], varied(["friction.mu=0.06,1"]))
     with pytest.raises(Finger3dError, match="another scene"), ResultStore(other, tmp_path).open():
         pass
 

@@ -22,7 +22,7 @@ import pytest
 from finger3d.analyses.sweep import local, worker
 from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep.cluster import Cluster
-from finger3d.analyses.sweep.points import Sweep, combinations
+from finger3d.analyses.sweep.points import Sweep, checked_points, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.progress import Progress
@@ -106,7 +106,8 @@ def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("finger3d.mechanics.march.parallel.ThreadPoolExecutor", Pool)
     monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
     # from 1000 contact rows on presses run at once
-    sweep = combinations(written(tmp_path, HALF_CYLINDER), ["mesh.size_mm=0.0045"], ["friction.mu=0.06,0.3,1"])
+    scene, vary = written(tmp_path, HALF_CYLINDER), varied(["friction.mu=0.06,0.3,1"])
+    sweep = checked_points(scene, ["mesh.size_mm=0.0045"], vary)
     (body,) = sweep.bodies.values()
     rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
     assert [row["point"] for row in rows] == [0, 1, 2]
@@ -380,7 +381,7 @@ def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, pape
 
 def load_points(paper_scene: Path) -> list:
     nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
-    return list(combinations(paper_scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
+    return list(checked_points(paper_scene, SETTINGS, varied(["friction.mu=0.02", f"material.nu={nu}"])).points)
 
 
 AT_ONCE = "import finger3d.mechanics.march.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "

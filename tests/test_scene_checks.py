@@ -7,7 +7,6 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +15,6 @@ from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 from finger3d.scene import parse
-from finger3d.scene.checked_tables import checked, effects_of, shaped
-from finger3d.scene.tables import FrictionTable
 from tests.commands import refused
 from tests.scene_tables import FINGER, SMALL
 
@@ -266,26 +263,15 @@ def test_a_mistake_in_an_override(override, expected, scene, capsys) -> None:
         assert text in err
 
 
-def test_a_scene_that_is_not_there(tmp_path, capsys) -> None:
-    path = tmp_path / "nothing.toml"
-    assert f"{path}: " in refused(capsys, "plan", path)
-
-
-def test_a_folder_for_a_scene(tmp_path, capsys) -> None:
-    assert f"{tmp_path}: " in refused(capsys, "plan", tmp_path)
-
-
-def test_a_file_that_is_not_text(tmp_path, capsys) -> None:
+@pytest.mark.parametrize(("content", "told"), [(None, ""), (b"mu = \xff\xfe", "byte 5 "), (b"", "finger ")])
+def test_a_file_that_holds_no_scene_is_named(content: bytes | None, told: str, tmp_path, capsys) -> None:
     path = tmp_path / "scene.toml"
-    path.write_bytes(b"mu = \xff\xfe")
-    assert "byte 5 " in (err := refused(capsys, "plan", path))
-    assert str(path) in err
-
-
-def test_an_empty_file(tmp_path, capsys) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text("")
-    assert "finger " in refused(capsys, "plan", path)
+    if content is not None:
+        path.write_bytes(content)
+    err = refused(capsys, "plan", path)
+    assert f"{path}: " in err
+    assert told in err
+    assert f"{tmp_path}: " in refused(capsys, "plan", tmp_path)  # a folder
 
 
 @pytest.mark.parametrize(
@@ -346,29 +332,6 @@ def test_values_that_are_seldom_meant_are_warned_of(changes, words) -> None:
     warnings = parse({key: table for key, table in tables.items() if table is not None}).model().warnings
     assert len(warnings) == bool(words)
     assert all(word in warnings[0] for word in words)
-
-
-def test_mistakes_are_collected_and_none_stops_the_next() -> None:
-    mistakes: dict[Any, str] = {}
-    assert checked(FrictionTable, {"mu": -1.0}, ("friction",), mistakes) is None
-    assert checked(FrictionTable, {"mu": 0.5}, ("friction",), mistakes) == FrictionTable(mu=0.5)
-    assert list(mistakes) == [("friction", "mu")]
-    assert "friction.mu = -1.0" in mistakes["friction", "mu"]
-
-
-def test_an_object_without_a_shape_is_a_plane() -> None:
-    assert shaped({"tilt_deg": 2.0}) == {"shape": "plane", "tilt_deg": 2.0}
-    assert shaped({"shap": "sphere"}) == {"shap": "sphere"}  # misspelt: it is told so
-
-
-def test_keys_of_the_effects_themselves_are_no_effects() -> None:
-    mistakes: dict[Any, str] = {}
-    document = {"effects": {"auto": True, "auto_tolerance": 0.1, "kinetic_friction": {"ratio": 0.7}}}
-    tables, effects, auto = effects_of(document, mistakes)
-    assert not mistakes
-    assert set(tables) == set(effects) == {"kinetic_friction"}
-    assert auto is not None
-    assert (auto.auto, auto.auto_tolerance) == (True, 0.1)
 
 
 TABLES = {

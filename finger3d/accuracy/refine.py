@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
@@ -107,7 +107,8 @@ class Refinement:
     @property
     def best(self) -> Round:
         """The round with the fewest unknowns that meets the tolerance, else that with the smallest error."""
-        return best_round(self.rounds, self.tolerance)
+        met = [r for r in self.rounds if r.error <= self.tolerance]
+        return min(met, key=lambda r: r.dofs) if met else min(self.rounds, key=lambda r: r.error)
 
     @property
     def met(self) -> bool:
@@ -132,12 +133,6 @@ class Refinement:
             "stopped": self.stopped,
             "rounds": [asdict(r) for r in self.rounds],
         }
-
-
-def best_round(rounds: Sequence[Round], tolerance: float) -> Round:
-    """Return the round with the fewest unknowns that meets a tolerance; without one, that with the smallest error."""
-    met = [r for r in rounds if r.error <= tolerance]
-    return min(met, key=lambda r: r.dofs) if met else min(rounds, key=lambda r: r.error)
 
 
 def refine_mesh(
@@ -204,10 +199,13 @@ def refine_mesh(
             stopped = f"max_seconds = {max_seconds:g}"
             break
         options = found
-    best = best_round(rounds, tolerance)
-    stopped = "met" if best.error <= tolerance else stopped
-    kept = meshes[rounds.index(best)]
-    return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
+    found = Refinement(tolerance, options, tuple(rounds), stopped)
+    return replace(
+        found,
+        mesh=meshes[rounds.index(found.best)],
+        stopped="met" if found.met else stopped,
+        problem=problem if found.best is rounds[-1] else None,
+    )
 
 
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:

@@ -30,8 +30,8 @@ class ModelFiles:
     files: tuple[Path, ...]
     points: int
     cells: int
-    multiple: float | None
-    remarks: tuple[str, ...]
+    multiple: float | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def export_mesh(
@@ -73,7 +73,7 @@ def export_mesh(
         write_mesh_vtu(out / MESH_FILES[0], whole)
         write_mesh_msh(out / MESH_FILES[1], whole)
     files = tuple(out / name for name in MESH_FILES)
-    return ModelFiles(files, len(whole.points), len(whole.cells), None, ())
+    return ModelFiles(files, len(whole.points), len(whole.cells))
 
 
 def export_deck(

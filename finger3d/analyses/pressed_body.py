@@ -238,8 +238,7 @@ class PressedBody:
             return steps, [step for step in steps[-1:] if step.outcome.ok]
 
         steps, checks = self.pressed(press)
-        last = [replace(steps[-1], penetration_mm=check.penetration_mm) for check in checks]
-        return [*steps[:-1], *last] if last else steps
+        return [*steps[:-1], *with_penetration(steps[-1:], checks)]
 
     def ends(self, mus: Sequence[float], legs: tuple[Leg, ...] | None = None) -> list[StepResult]:
         """Return the last increment with every mu, on a path other than the model's own if it is given.
@@ -253,8 +252,7 @@ class PressedBody:
             return found, [end for end in found if end.outcome.ok]
 
         ends, checks = self.pressed(press)
-        depths = iter(checks)
-        return [replace(end, penetration_mm=next(depths).penetration_mm) if end.outcome.ok else end for end in ends]
+        return with_penetration(ends, checks)
 
     def widen(self) -> None:
         """Condense the body to all points of its free faces."""
@@ -266,6 +264,12 @@ class PressedBody:
         problem = build(model, self._report, *margin)
         self.seconds += time.perf_counter() - start
         return problem
+
+
+def with_penetration(steps: Sequence[StepResult], checks: Sequence[SurfaceCheck]) -> list[StepResult]:
+    """Return increments with the penetration of the surface, which was checked after those that converged."""
+    left = iter(checks)
+    return [replace(one, penetration_mm=next(left).penetration_mm) if one.outcome.ok else one for one in steps]
 
 
 def kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value:

@@ -16,7 +16,7 @@ from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import NOWHERE, SPACING_MM, Candidates, GaugeSet, Region, search
-from finger3d.analyses.optimise.task import MUS
+from finger3d.analyses.optimise.task import MUS, check_readings
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.model import Model
@@ -25,7 +25,6 @@ from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene.derived import largest_spread
-from finger3d.sensor.curve import LARGEST_STRAIN
 
 MOST = 8
 """Gauges that are placed together at most."""
@@ -117,7 +116,11 @@ def place_gauges(
     given, path = tables_of(scene, overrides)
     given = settled_tables(given, path, report)
     keys, mus = free_keys(free or ()), MUS if mus is None else mus
-    _check(count, mus, noise, spacing_mm)
+    if not 1 <= count <= MOST:
+        raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
+    check_readings(mus, 3, noise)
+    if not 0.0 <= spacing_mm <= FARTHEST_MM:
+        raise Finger3dError(f"--spacing {spacing_mm:g}: must be a number from 0 to {FARTHEST_MM:g} (mm)")
     scene = parse(given, path)
     model = scene.model()
     if model.inclusions is not None:
@@ -134,17 +137,6 @@ def place_gauges(
         report.stage("writing")
         _write(folder, result, model)
     return result
-
-
-def _check(count: int, mus: Sequence[float], noise: float, spacing_mm: float) -> None:
-    if not 1 <= count <= MOST:
-        raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
-    if len(mus) < 3 or any(b <= a for a, b in zip(mus, mus[1:], strict=False)):
-        raise Finger3dError("--mu: must be at least three numbers, ascending")
-    if not 1e-12 <= noise <= LARGEST_STRAIN:
-        raise Finger3dError(f"--noise {noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
-    if not 0.0 <= spacing_mm <= FARTHEST_MM:
-        raise Finger3dError(f"--spacing {spacing_mm:g}: must be a number from 0 to {FARTHEST_MM:g} (mm)")
 
 
 def _region(model: Model, free: Sequence[FreeKey]) -> Region:

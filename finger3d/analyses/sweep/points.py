@@ -139,7 +139,7 @@ class Sweep:
     points: tuple[Point, ...]
     bodies: dict[str, BodySpec]
     title: str
-    is_list: bool = False
+    is_list: bool
 
     def identity(self) -> Tree:
         """Return what identifies the sweep; the hashes of bodies include the contents of files that vary."""
@@ -153,35 +153,19 @@ class Sweep:
         }
 
 
-def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str], report: Progress = QUIET) -> Sweep:
-    """Read a scene and check every combination of some values.
-
-    Parameters
-    ----------
-    overrides : as for ``--set``
-    texts : as for ``--vary``, such as ``friction.mu=0.06,0.25,1``
-
-    Raises
-    ------
-    Finger3dError
-        For the first mistake, in one line that names the key and the value.
-    """
-    vary = varied(texts)
-    count = math.prod(len(v.texts) for v in vary)
-    if count > MOST:
-        raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
-    return _checked(source, overrides, vary, "--vary", itertools.product, report)
-
-
-def listed_points(
-    source: Source, overrides: Sequence[str], columns: tuple[Vary, ...], option: str, report: Progress = QUIET
+def checked_points(
+    source: Source,
+    overrides: Sequence[str],
+    vary: tuple[Vary, ...],
+    option: str = "--vary",
+    report: Progress = QUIET,
 ) -> Sweep:
-    """Read a scene and check every point of a list.
+    """Read a scene and check every point of a sweep.
 
     Parameters
     ----------
     overrides : as for ``--set``
-    columns : the keys, each with its value at every point
+    vary : the keys; with ``--vary`` every combination of their values is a point, else values at the same place are
     option : what gave them, for messages
 
     Raises
@@ -189,28 +173,18 @@ def listed_points(
     Finger3dError
         For the first mistake, in one line that names the key and the value.
     """
-    count = len(columns[0].texts)
+    is_list = option != "--vary"
+    count = len(vary[0].texts) if is_list else math.prod(len(v.texts) for v in vary)
     if count > MOST:
-        raise Finger3dError(f"{option}: {count} points; at most {MOST} in one sweep, split it")
-    return replace(_checked(source, overrides, columns, option, zip, report), is_list=True)
-
-
-def _checked(
-    source: Source,
-    overrides: Sequence[str],
-    vary: tuple[Vary, ...],
-    option: str,
-    joined: Callable[..., Iterable[tuple[Any, ...]]],
-    report: Progress,
-) -> Sweep:
-    """Return the sweep over values that `joined` makes points of, each a checked scene."""
+        points = "points" if is_list else "combinations"
+        raise Finger3dError(f"{option}: {count} {points}; at most {MOST} in one sweep, split it")
+    joined: Callable[..., Iterable[tuple[Any, ...]]] = zip if is_list else itertools.product
     base, path = tables_of(source, overrides)
     keys = [tree.numbered(v.key, base, option) for v in vary]
     check_distinct(keys, option, "; put all its values into one list")
     options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, option)
-    settings = list(joined(*(v.texts for v in vary)))
     scenes: list[Scene] = []
-    for texts in settings:
+    for texts in joined(*(v.texts for v in vary)):
         changes = [f"{key}={text}" for key, text in zip(keys, texts, strict=True)]
         scene = parse(tree.override(base, changes, option), path=path, set_keys=options)
         if scene.tables.mesh.tolerance is not None:
@@ -238,7 +212,7 @@ def _checked(
         )
         for key, of in members.items()
     }
-    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)
+    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title, is_list)
 
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
