@@ -39,6 +39,10 @@ _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 _OF_MODEL = ("legs", "gauges", "markers", "taxels", "domain", "rule", "warnings", "filled")
 """Attributes of a model that a file stores as they are."""
 
+_OF_SURFACE = ("nodes", "face", "points", "area", "normals", "samples")
+_OF_POINTS = ("nodes", "face", "points", "area", "facets")
+"""Arrays of a surface, and of its contact points, that a file stores under these names."""
+
 _FRICTION: dict[str, type[FrictionLaw]] = {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 
@@ -107,18 +111,12 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
         ) from None
     checked = _Header.model_validate_json(arrays["header"].tobytes())
     problem = assembled(_model(checked, arrays), arrays, checked.touch_mm, checked.axes)
-    return problem, _face("other", arrays, problem.dim), checked.about
+    return problem, _face("other", arrays), checked.about
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     mean, hats = face.average.tocsr(), face.hats.tocsr()
-    return {
-        f"{name}_nodes": face.nodes,
-        f"{name}_face": face.face,
-        f"{name}_points": face.points,
-        f"{name}_area": face.area,
-        f"{name}_normals": face.normals,
-        f"{name}_samples": face.samples,
+    return {f"{name}_{key}": getattr(face, key) for key in _OF_SURFACE} | {
         f"{name}_mean": mean.data,
         f"{name}_mean_at": mean.indices,
         f"{name}_mean_rows": mean.indptr,
@@ -126,29 +124,18 @@ def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     }
 
 
-def _face(name: str, arrays: TreeView, dim: int) -> BoundarySurface:
+def _face(name: str, arrays: TreeView) -> BoundarySurface:
     """Return a surface with the quadrature points of the gap, and without traces of a mesh."""
-    samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
-    pattern, shape = (arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"]), (len(nodes), len(samples))
+    own = {key: arrays[f"{name}_{key}"] for key in _OF_SURFACE}
+    shape, pattern = (len(own["nodes"]), len(own["samples"])), (arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
     mean, hats = (sp.csr_matrix((arrays[f"{name}_{data}"], *pattern), shape=shape) for data in ("mean", "hats"))
-    points = arrays[f"{name}_points"].reshape(-1, dim)
-    return BoundarySurface(
-        nodes=nodes,
-        face=arrays[f"{name}_face"],
-        points=points,
-        area=arrays[f"{name}_area"],
-        normals=arrays[f"{name}_normals"].reshape(-1, dim),
-        trace=sp.csr_matrix((len(nodes), 0)),
-        samples=samples,
-        average=mean,
-        interpolate=sp.csr_matrix((len(samples), 0)),
-        hats=hats,
-    )
+    trace, interpolate = (sp.csr_matrix((count, 0)) for count in shape)
+    return BoundarySurface(**own, trace=trace, average=mean, interpolate=interpolate, hats=hats)
 
 
 def bare(face: BoundarySurface) -> BoundarySurface:
     """Return the surface without traces of a mesh."""
-    return _face("it", _face_arrays("it", face), face.points.shape[1])
+    return _face("it", _face_arrays("it", face))
 
 
 def arrays_of(problem: Problem) -> dict[str, Array]:
@@ -160,12 +147,8 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
         "parent": problem.symmetry.image_of,
         "sign": problem.symmetry.mirror_sign,
         "share": problem.symmetry.multiplicity,
-        "nodes": problem.points.nodes,
-        "face": problem.points.face,
-        "points": problem.points.points,
-        "area": problem.points.area,
+        **{key: getattr(problem.points, key) for key in _OF_POINTS},
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
-        "facets": problem.points.facets,
         "contact_compliance": problem.points.compliance,
         **_face_arrays("face", bare(problem.surface)),
     }
@@ -185,16 +168,12 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     c = len(arrays["face_nodes"])
     half_width, band = arrays["band"]
     system = ContactSystem(
-        surface=_face("face", arrays, d),
+        surface=_face("face", arrays),
         points=ContactPoints(
-            nodes=arrays["nodes"],
-            face=arrays["face"],
-            points=arrays["points"],
-            area=arrays["area"],
+            **{key: arrays[key] for key in _OF_POINTS},
             basis=vertical_frame(d),
             half_width_mm=float(half_width),
             band_mm=float(band),
-            facets=arrays["facets"],
             compliance=arrays["contact_compliance"],
         ),
         delassus=arrays["compliance"].reshape(c, d, c, d),

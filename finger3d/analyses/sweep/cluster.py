@@ -142,7 +142,9 @@ class Cluster:
             return
         body, _ = self._running.pop(future)
         if future.status != "finished":
-            self._give_up(body, _reason(future))
+            if self.client.status != "running":  # a lost connection cancels every future
+                raise self._lost("scheduler")
+            self.progress.give_up(body, _reason(future))
             return
         address = next(iter(self.client.who_has([future]).get(future.key, ())), None)
         rows: list[Row] = future.result()
@@ -160,11 +162,6 @@ class Cluster:
             del self._running[future]
             self.client.cancel([future], force=True)
             self._submit(body)
-
-    def _give_up(self, body: BodyPoints, reason: str) -> None:
-        if self.client.status != "running":  # a lost connection cancels every future
-            raise self._lost("scheduler")
-        self.progress.give_up(body, reason)
 
     def _workers(self) -> int:
         """Return the number of workers.
