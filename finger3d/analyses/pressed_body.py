@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from threading import Event
 from typing import TypeVar
@@ -72,10 +72,6 @@ class PressAtMu:
         return cls(mu, steps[-1], tuple(step.meshed_state.contact.force for step in steps), factorizations)
 
 
-PressesByMu = Mapping[float, PressAtMu]
-"""Presses by mu, as initial guesses for those of a similar body or path."""
-
-
 def under(
     problem: Problem,
     friction: FrictionLaw | None = None,
@@ -120,18 +116,17 @@ def press(
     return PressAtMu.of(mu, steps, workspace.factorizations - before)
 
 
-def presses(problem: Problem, mus: Sequence[float], initial: PressesByMu | None = None) -> Iterator[PressAtMu]:
-    """Yield a press for each of ascending values of mu, started from the press of `initial` with the same mu if any.
+def presses(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
+    """Yield a press for each of ascending values of mu.
 
     At finite strain they come in another order than that of mu; see `march_in_groups`.
     """
     if problem.model.finite_strain and not automatic(problem.model):
         yield from _together(problem, mus)
         return
-    known = initial or {}
 
     def pressed(mu: float, before: Sequence[PressAtMu], workspace: Workspace, cancel: Event) -> PressAtMu:
-        return press(problem, mu, [known[mu]] if mu in known else before, workspace, cancel)
+        return press(problem, mu, before, workspace, cancel)
 
     yield from map_parallel(problem, pressed, mus)
 

@@ -28,14 +28,13 @@ from finger3d.analyses.calibrate.reference import ReferenceBody, read
 from finger3d.analyses.calibrate.settings import CalibratedReading, CalibrationSettings
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
-from finger3d.analyses.pressed_body import PressesByMu, under
+from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.march.step_halving import with_few_increments
-from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import targets
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.quantities import Quantity
@@ -157,7 +156,7 @@ def evaluate_tolerances(
         report.stage(f"{_FEW} increments")
         body = ReferenceBody.of(with_few_increments(problem, _FEW), names, mu)
     else:
-        body = ReferenceBody(problem, names, mu, own, {p.mu: p for p in curve.presses if p.frame.outcome.ok})
+        body = ReferenceBody(problem, names, mu, own)
     others = set(tolerances) - {*GAUGE_PLACES.values(), "increments"}
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
@@ -238,8 +237,7 @@ def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: 
     problem, model = body.problem, body.problem.model
     shallowest, node = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0), _NODE * sd
     for step in (node, -min(node, 0.5 * shallowest)):
-        legs = deeper(model.legs, step)
-        yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
+        yield step, body.change(under(problem, legs=deeper(model.legs, step)))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
@@ -304,20 +302,6 @@ _VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], flo
     **{name: partial(_vary_stiff_gauge, name) for name in GAUGE_PLACES.values()},
 }
 """By tolerance, the function that yields its effects on a reference body for one standard deviation."""
-
-
-def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
-    """Return the presses of a body with forces extrapolated to the depths of another path, as initial guesses."""
-    own = [t.depth_mm for t in targets(body.problem.model.legs)]
-    strides = np.diff([0.0, *own])
-    change = np.subtract([t.depth_mm for t in targets(legs)], own)
-    share = np.divide(change, strides, out=np.zeros(len(own)), where=strides != 0.0)
-
-    def extrapolated(forces: tuple[Float, ...]) -> tuple[Float, ...]:
-        before = (np.zeros_like(forces[0]), *forces)
-        return tuple(f + s * (f - last) for f, last, s in zip(forces, before, share, strict=False))
-
-    return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
 
 
 def _mesh_errors(body: ReferenceBody, coarse: ReferenceBody, readings: Sequence[CalibratedReading]) -> Float:
