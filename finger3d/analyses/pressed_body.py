@@ -4,8 +4,8 @@ A body is condensed to the points that may come into contact.  Whether contact s
 solution; if not, the body is condensed again to all points of its free faces, and pressed again.
 
 Presses with several coefficients of friction start from those before: where mu changes by at most 0.1, the forces at
-the previous mu save up to half of the time of a press.  They are an initial guess only: the solution satisfies the
-contact conditions in any case.
+the previous mu save 15 to 25 % of the time of a press under a plane.  They are an initial guess only: the solution
+satisfies the contact conditions in any case.
 """
 
 from __future__ import annotations
