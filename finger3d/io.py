@@ -208,6 +208,12 @@ def text_of(content: bytes) -> str:
     raise ValueError("is cut within a character of UTF-16")
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8."""
+    with atomic(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     """Write one line of names and a line for each entry; numbers keep every digit (``repr``).
 
@@ -227,9 +233,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
 
 def write_json(path: str | Path, data: object) -> None:
     """Write nested dicts, lists, arrays and numbers; NaN and infinity, which JSON lacks, become null."""
-    text = json_text(data)
-    with atomic(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_text(path, json_text(data) + "\n")
 
 
 def json_text(data: object) -> str:

@@ -7,14 +7,14 @@ import json
 from pathlib import Path
 
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Sweep, combinations
+from finger3d.analyses.sweep.points import Sweep, checked_points, varied
 
 COARSE = ["--set", "model.domain=plane-strain", "--set", "mesh.size_mm=4", "--set", "mesh.base_size_mm=16"]
 SETS = COARSE[1::2]
 
 
 def points_of(scene: Path, *vary: str) -> Sweep:
-    return combinations(scene, SETS, vary)
+    return checked_points(scene, SETS, varied(vary))
 
 
 def pressed_here(sweep: Sweep) -> list[dict]:

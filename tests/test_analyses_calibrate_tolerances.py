@@ -1,8 +1,10 @@
-"""Calibrations of pressed bodies: the curve is that of presses, every tolerance a difference of two of them."""
+"""Tolerances and increments of a calibration."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,19 +12,28 @@ import numpy as np
 import pytest
 
 from finger3d.analyses.calibrate import run as runs
+from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
+from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import _mesh_errors, displaced_gauges, tolerance_of, with_defaults
+from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
+from finger3d.analyses.free_keys import FreeKey
+from finger3d.analyses.optimise.run import find_best
+from finger3d.analyses.optimise.task import OptimisationProblem as Search
 from finger3d.analyses.press import press
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.fem.laws.material import MIXED_FROM, Isotropic
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg
-from finger3d.sensor import estimate
-from tests.models import half_cylinder
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions
+from finger3d.sensor import estimate, load
+from tests.models import block, half_cylinder
 from tests.sensor_cases import FEW, NONE, SCENE, scene
 
 
@@ -176,3 +187,155 @@ def test_two_steps_of_any_length_give_the_parabola_through_them() -> None:
     alone = tolerance_of("nu", 0.003, effects[:1])
     assert not alone.curvature.any()
     assert alone.slope == pytest.approx(effects[0][1] / 0.17)
+
+
+COARSE = block(mesh=MeshOptions(1.5, 1.5, "swept"), gauges=(Gauge("g", 1.0, 1.5, length_mm=1.0),))
+
+
+@pytest.mark.parametrize("large", [False, True], ids=["small strain", "finite strain"])
+def test_the_moduli_of_all_parts_are_multiplied(large: bool) -> None:
+    finger = designs()["block"](half_length_mm=3.0, height_mm=3.0, width_mm=2.0, skin_mm=1.0)
+    model = replace(COARSE, design=finger, domain="plane-strain", gauges=(), parts=(("skin", Isotropic(3.0, 0.3)),))
+    base = build(LargeDeformation().apply(model) if large else model)
+    (*_, soft), (*_, stiff) = march(base), march(with_modulus(base, 1.25))
+    assert stiff.state.force == pytest.approx(1.25 * soft.state.force, rel=1e-6, abs=1e-9)
+
+
+def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:
+    legs = (Leg(0.3), Leg(0.3, 1.0), Leg(0.0))
+    assert [leg.depth_mm for leg in deeper(legs, 0.1)] == pytest.approx([0.4, 0.4, 0.0])
+    assert deeper(legs, 0.1)[1].slide_x_mm == 1.0
+
+
+@pytest.mark.parametrize(
+    ("nu", "steps"),
+    [
+        (0.45, (-0.008, 0.008)), (0.49, (-0.008, 0.008)), (0.005, (0.008, 0.016)), (0.5, (-0.008, -0.016)),
+        (MIXED_FROM, (0.008, 0.016)), (MIXED_FROM - 0.001, (-0.008, -0.016)), (0.487, (0.0065, 0.013)),
+    ],
+)  # fmt: skip
+def test_poissons_ratio_keeps_its_range_and_its_element(nu: float, steps: tuple[float, float]) -> None:
+    assert poisson_steps(nu, 0.008) == pytest.approx(steps, rel=1e-6)
+
+
+def test_a_tilted_body_has_a_coarser_swept_mesh() -> None:
+    fine = build(replace(COARSE, mesh=MeshOptions(0.01, 1.0, "swept"), domain="plane-strain"))
+    options = tilted_mesh(fine)
+    assert options == MeshOptions(0.02, 2.0, "swept")
+    coarse = build(replace(COARSE, domain="plane-strain"))
+    assert tilted_mesh(coarse) == MeshOptions(1.5, 1.5, "swept")
+
+
+NOISE = 1.5e-4
+
+
+def steps(count: int | str) -> Any:
+    """A section under a curved object, which is pressed in increments."""
+    curved = {"shape": "cylinder", "radius_mm": 300.0}
+    return scene(press={"depth_mm": 10.0, "steps": count}, object=curved)
+
+
+@pytest.mark.parametrize(
+    ("slope", "expected"),
+    [
+        (0.0, 20),  # one comparison is made whatever it says
+        (1e-2, 80),  # 3e-2 / n^2, the difference to half as many, is 1.5e-5 at n = 45
+        (10.0, 320),  # the limit of a section
+    ],
+)
+def test_increments_are_doubled_until_the_error_is_a_tenth_of_the_noise(slope: float, expected: int) -> None:
+    problem, tried = build(steps("auto").model()), list[int]()
+
+    def read_once(p: Any) -> Any:
+        tried.append(p.model.legs[0].steps)
+        return np.array([[slope / tried[-1] ** 2 / NOISE]])
+
+    found = choose_increments(problem, read_once)
+    assert found.chosen
+    assert [leg.steps for leg in found.legs] == [expected]
+    assert found.error == pytest.approx(3.0 * slope / expected**2 / NOISE)
+    assert tried == [10 * 2**k for k in range(len(tried))]
+
+
+def test_increments_are_not_settled_by_a_press_that_fails() -> None:
+    found = choose_increments(build(steps("auto").model()), lambda p: np.array([[0.0, np.nan]]))
+    assert found.legs[0].steps == 320
+    assert np.isnan(found.error)
+
+
+def test_a_number_that_is_given_is_kept() -> None:
+    model = steps(7).model()
+    found = choose_increments(build(model), lambda p: pytest.fail("nothing is to be pressed"))
+    assert not found.chosen
+    assert found.legs == model.legs
+
+
+@pytest.mark.slow
+def test_the_error_of_given_increments_is_that_of_presses_of_many() -> None:
+    """Within a factor 2 of the true one wherever that is above the noise; of 4 increments it is over 4 noises."""
+    problem = build(steps(4).model())
+    mu = np.linspace(0.3, 1.2, 4)
+
+    def strain(other: Any) -> Any:
+        return read(other, ("g36",), mu)[0]
+
+    own = strain(problem)
+    told = error_of_increments(problem, own, False, strain)
+    true = np.abs(own - strain(build(steps(160).model())))
+    assert true.max() > 4.0 * NOISE
+    ratio = told[true > NOISE] / true[true > NOISE]
+    assert 0.5 < ratio.min()
+    assert ratio.max() < 2.0
+
+
+def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> None:
+    rough = steps(2)
+    found = calibrate(rough, "g36", tmp_path, (0.1, 0.3, 0.4, 0.5, 0.6, 0.9), tolerances={**NONE, "increments": 1.0})
+    data = json.loads((tmp_path / "calibration.json").read_text())
+    assert data["about"]["increments"] == {"steps": [2], "chosen": False}
+    increments = data["readings"]["g36"]["tolerances"]["increments"]
+    assert (increments["unit"], increments["sd"]) == ("error bar", 1.0)
+    assert found.reductions([0.5])["increments"][0] > 0.5
+    # read by a press of many: off by far more than the noise, but not by more than what is told
+    strain = float(read(build(steps(160).model()), ("g36",), np.array([0.5]))[0, 0])
+    away = abs(strain - float(found.at(0.5)[0]))
+    assert away > 2.0 * found.noise[0]
+    assert away < 2.0 * float(found.readings[0].reading_sd([0.5])[0])
+    (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
+    assert abs(sure.mu - 0.5) > 2.0 * sure.std
+    assert honest.low <= 0.5 <= honest.high  # which two increments do not tell any nearer
+
+
+@pytest.mark.slow
+def test_chosen_increments_press_the_curve() -> None:
+    """Where the strain hardly depends on them, 20 do, and the error left is told from presses of ten."""
+    mus = (0.02, 0.03, 0.04, 0.05)
+    found, curve = calibrated(
+        steps("auto").model(), "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0}
+    )
+    assert curve.increments.chosen
+    assert curve.problem.model.legs[0].steps == 20
+    same = calibrate(steps(20), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
+    assert found.readings[0].reading == pytest.approx(same.readings[0].reading, rel=1e-9)
+    assert found.readings[0].tolerances[0].slope == pytest.approx(same.readings[0].tolerances[0].slope, rel=1e-6)
+    assert found.readings[0].tolerances[1].name == "increments"
+    ten = calibrate(steps(10), "g36", mus=mus, tolerances=NONE).readings[0].reading
+    told = found.readings[0].tolerances[1].spread
+    assert told == pytest.approx(np.abs(found.readings[0].reading - ten), rel=1e-6, abs=1e-12)
+    assert told.max() <= 0.1 * found.noise[0]
+
+
+@pytest.mark.parametrize("count", [4, "auto"])
+def test_a_search_tells_the_increments_of_its_best_design(count: int | str, tmp_path: Path) -> None:
+    given = steps(count).as_dict() | {"mesh": {"size_mm": 6.0, "base_size_mm": 16.0}}
+    free = (FreeKey("gauge.g36.angle_deg", 0.0, 90.0),)
+    found = find_best(Search(given, free, mus=(0.1, 0.5), budget=2), tmp_path)
+    told = json.loads((tmp_path / "design.json").read_text())["increments"]
+    assert told["chosen"] is (count == "auto")
+    assert told["steps"] == [4] if count == 4 else told["steps"][0] >= 20
+    assert told["strain_error"] >= 0.0
+    assert found.scene.as_dict()["press"]["steps"] == count
+    # the same number again, where the start is remembered and the search goes on
+    more = find_best(Search(given, free, mus=(0.1, 0.5), budget=3), tmp_path)
+    assert json.loads((tmp_path / "design.json").read_text())["increments"]["steps"] == told["steps"]
+    assert more.evaluations[: len(found.evaluations)] == found.evaluations

@@ -1,4 +1,4 @@
-"""Forecasts of what accuracy costs: against a press on the mesh of a row, their rates, limits, and the command."""
+"""What accuracy costs, and the plan of a press."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import finger3d
+import finger3d.analyses.press
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.cost import ERRORS, CostRow, Forecasts, _scaled
@@ -15,6 +16,7 @@ from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.quantities import kinds_of
 from finger3d.scene import scene_of
+from tests.scenes import SECTION, written
 from tests.sensor_cases import scene
 
 BASE = {
@@ -91,3 +93,28 @@ def test_edges_of_all_meshes_are_in_proportion() -> None:
 def test_numbers_and_meshes_that_have_no_forecast_are_refused(tmp_path: Path) -> None:
     with pytest.raises(Finger3dError, match='of = "force": no number of this press; must be one of normal_force_N, '):
         finger3d.cost(scene(**BASE), of=["force"])
+
+
+def test_a_plan_forecasts_size_time_and_memory(tmp_path: Path) -> None:
+    plan = finger3d.plan(written(tmp_path, SECTION))
+    assert plan.dofs > plan.contact_points > 0
+    assert plan.total_s > plan.forecast["error_bars_s"] > 0.0
+    assert plan.memory_MB > 0.0
+    assert plan.summary()["forecast"]["dofs"] == plan.dofs
+
+
+def test_a_plan_tells_the_size_of_a_file_as_it_lies(tmp_path: Path) -> None:
+    from tests.bodies import box, write_stl
+
+    stl = write_stl(tmp_path / "box.stl", box(30.0, 16.0, 12.0, (7.0, -3.0, 2.0)))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        f'[finger]\ngeometry = "{stl}"\n[material]\nE_MPa = 1.0\nnu = 0.3\n[press]\ndepth_mm = 0.5\n', encoding="utf-8"
+    )
+    found = finger3d.plan(scene).forecast["finger"]
+    assert found == "30 x 16 x 12 mm (x, y up, z), base 30 x 12 mm; unit of the file: mm, as STL files have none"
+    text = scene.read_text(encoding="utf-8")
+    scene.write_text(text.replace("[finger]\n", '[finger]\nup = "z"\n'), encoding="utf-8")
+    lying = finger3d.plan(scene).forecast["finger"]
+    assert lying.startswith("30 x 12 x 16 mm (x, y up, z), base 30 x 16 mm; ")
+    assert lying.endswith(", its z turned up")

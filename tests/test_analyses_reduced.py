@@ -1,7 +1,10 @@
-"""The reduced model: it presses as the scene does, from a file that is whole or refused."""
+"""Reduced models and their files."""
 
 from __future__ import annotations
 
+import io
+import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +20,7 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
+from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
@@ -125,3 +129,70 @@ def test_effects_without_a_fixed_compliance_are_refused(effect: Any) -> None:
     problem = build(effect.apply(small_section(legs=(Leg(0.5, steps=4, duration_s=1.0),))))
     with pytest.raises(Finger3dError, match="reduced"):
         ReducedModel.of(problem)
+
+
+def test_files_that_are_none_or_were_altered_are_one_line(tmp_path: Path) -> None:
+    """A checksum covers the header and every array."""
+    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
+    data = good.read_bytes()
+    with np.load(good) as stored:
+        arrays = dict(stored)
+    header = json.loads(arrays["header"].tobytes())
+
+    def file(*left_out: str, **changes: Any) -> bytes:
+        stream = io.BytesIO()
+        np.savez(stream, **{name: a for name, a in {**arrays, **changes}.items() if name not in left_out})
+        return stream.getvalue()
+
+    def headed(**changes: Any) -> bytes:
+        return file(header=np.frombuffer(json.dumps({**header, **changes}).encode(), dtype=np.uint8))
+
+    single = io.BytesIO()
+    np.save(single, np.zeros(3))
+    turned = bytearray(data)
+    turned[data.index(b"compliance.npy") + 400] ^= 0xFF  # inside the array, whose checksum is stored by zip, too
+    cases = [
+        ("cut short", data[: len(data) // 2]),
+        ("no reduced model", b"hello"),
+        ("version 8", headed(version=8)),
+        ("; `finger3d calibrate` writes one", headed(format="a cake")),
+        ("parts of the reduced model are missing", file("compliance")),
+        ("reduced model, or cut", single.getvalue()),
+        ("no reduced model, or cut short", bytes(turned)),
+        ("damaged", headed(legs=[{**header["legs"][0], "force_N": -1}])),
+    ]
+    cases += [("damaged", headed(touch_mm=value)) for value in (None, "a", [], math.nan, -1)]
+    cases += [
+        ("condense", file(**{name: value}))
+        for name, a in arrays.items()
+        if a.size
+        for value in (a[:-1], a[..., None], np.full(a.shape, "x"), np.full(a.shape, np.nan), np.array(1.0))
+    ]
+    path = tmp_path / "bad.npz"
+    for told, content in cases:
+        path.write_bytes(content)
+        with pytest.raises(Finger3dError, match=told) as found:
+            ReducedModel.load(path)
+        assert str(found.value).startswith(f"{path}: ")
+        assert "\n" not in str(found.value)
+    with pytest.raises(Finger3dError, match="none.npz"):
+        ReducedModel.load(tmp_path / "none.npz")
+
+
+def test_whole_numbers_of_a_header_become_floats(tmp_path: Path) -> None:
+    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
+    with np.load(good) as stored:
+        arrays = {name: stored[name] for name in stored if name != "checksum"}
+    header = json.loads(arrays["header"].tobytes())
+    header["legs"][0]["slide_x_mm"] = 10**30
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    write_arrays(tmp_path / "whole.npz", arrays)
+    assert isinstance(ReducedModel.load(tmp_path / "whole.npz").problem.model.legs[0].slide_x_mm, float)
+
+
+def test_a_file_that_expands_a_thousandfold_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "zeros.npz", compliance=np.zeros(2_000_000))
+    with pytest.raises(Finger3dError, match="no reduced model"):
+        ReducedModel.load(tmp_path / "zeros.npz")
+    with pytest.raises(ValueError, match="expands to 16 MB"):
+        read_arrays(tmp_path / "zeros.npz")

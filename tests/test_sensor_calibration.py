@@ -1,16 +1,120 @@
-"""A calibration says of mu what the estimates from it say."""
+"""Curves, files and maps of a calibration, and the model of the sensor."""
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
-from finger3d.sensor import Calibration, estimate
+from finger3d.analyses import pressed_body as pressing
+from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.build import build
+from finger3d.sensor import Calibration, Tolerance, estimate, load, save
 from finger3d.sensor.calibration import summary
-from tests.sensor_cases import curve, kinked, line, saturating, straight, together, tolerance, turning
+from finger3d.sensor.curve import MonotoneCubic
+from finger3d.sensor.maps import Reader, StrainMap
+from tests.commands import run
+from tests.sensor_cases import SCENE, curve, kinked, line, saturating, scene, straight, together, tolerance, turning
+
+
+def test_the_interpolation_is_that_of_scipy() -> None:
+    random = np.random.default_rng(0)
+    for _ in range(300):
+        count = random.integers(2, 9)
+        x, y = np.cumsum(random.uniform(0.1, 2.0, count)), random.normal(size=count) * random.choice([0, 1, 1], count)
+        at = random.uniform(x[0], x[-1], 20)
+        found, wanted = MonotoneCubic.of(x, y), PchipInterpolator(x, y)
+        assert found(at) == pytest.approx(wanted(at), rel=1e-12, abs=1e-12)
+        assert found(at, 1) == pytest.approx(wanted(at, 1), rel=1e-9, abs=1e-9)
+
+
+def test_the_papers_numbers_a_slope_of_15e_4_and_a_noise_of_15e_5_give_a_tenth() -> None:
+    """Maeno 2004, Sec. IV: 1.5e-4 of strain makes 0.1 of mu, so the slope is 1.5e-3."""
+    found = curve(straight)["g"]
+    assert found.resolution(0.5) == pytest.approx(0.1, rel=1e-9)
+
+
+def test_the_fit_is_second_order_and_its_residual_is_what_it_leaves() -> None:
+    exact = curve(lambda mu: 0.02 - 0.01 * mu + 0.003 * mu**2)["g"]
+    assert exact.fit.coefficients == pytest.approx((0.02, -0.01, 0.003), rel=1e-9)
+    assert exact.fit.largest < 1e-15
+    bump = curve(lambda mu: 0.02 - 0.01 * mu + 1e-4 * np.cos(np.pi * np.arange(25)))["g"]
+    assert bump.fit.rms == pytest.approx(1e-4, rel=0.05)  # two of three unknowns hardly see an alternating sign
+
+
+def test_the_interpolation_error_bounds_what_pchip_misses() -> None:
+    found = curve(saturating)["g"]
+    mu = np.linspace(0.02, 1.2, 2001)
+    missed = np.abs(found.at(mu) - saturating(mu))
+    bound = np.sqrt(np.mean(found.curve_error(found.mu[1:-1]) ** 2))
+    assert np.sqrt(np.mean(missed**2)) <= 1.5 * bound
+    assert bound < 1e-5
+
+
+def test_readings_that_share_nothing_add_their_information() -> None:
+    joint = together(curve(straight), curve(lambda mu: 0.002 * mu, noise=4e-4))
+    expected = 1.0 / math.hypot(0.0015 / 1.5e-4, 0.002 / 4e-4)
+    assert joint.mu_sd([0.3, 0.9]) == pytest.approx(expected, rel=1e-6)
+
+
+def test_one_reading_is_as_if_alone() -> None:
+    mu = np.linspace(0.1, 1.0, 7)
+    for function in (straight, saturating):
+        alone = curve(function, tolerances=(tolerance("depth_mm", 0.1, 0.02), tolerance("mesh", 1.0, 3e-4)))
+        g = alone["g"]
+        assert alone.mu_sd(mu) == pytest.approx(g.reading_sd(mu) / np.abs(g.slope(mu)), rel=1e-9)
+
+
+def test_a_shared_tolerance_is_told_apart_from_mu() -> None:
+    """Two readings and two unknowns: generalised least squares leaves what the noise leaves."""
+    noise, depth = 1e-4, tolerance("depth_mm", 10.0, 0.02)  # far worse known than either reading could tell
+    first = curve(line(0.01), noise=noise, tolerances=(depth,))
+    second = curve(line(-0.01), noise=noise, tolerances=(depth,))
+    assert first.mu_sd([0.5])[0] > 10.0
+    # the difference of the two is free of the depth: its slope is 0.02, its noise sqrt(2) times that of one
+    assert together(first, second).mu_sd([0.5])[0] == pytest.approx(math.sqrt(2.0) * noise / 0.02, rel=1e-3)
+    # readings that the depth changes as mu does tell no more than one
+    same = together(first, first)
+    assert same.mu_sd([0.5])[0] == pytest.approx(first.mu_sd([0.5])[0], rel=1e-3)
+
+
+def test_the_covariance_is_that_of_drawn_errors() -> None:
+    random = np.random.default_rng(4)
+    one = curve(straight, tolerances=(tolerance("depth_mm", 0.1, 0.03), tolerance("gauge_x_mm", 0.3, 0.01)))
+    other = curve(saturating, noise=2e-3, tolerances=(tolerance("depth_mm", 0.1, -0.05), tolerance("nu", 0.01, 0.1)))
+    joint, draws = together(one, other), 400_000
+    depth, place, nu = (sd * random.normal(size=draws) for sd in (0.1, 0.3, 0.01))
+    errors = [
+        1.5e-4 * random.normal(size=draws) + 0.03 * depth + 0.01 * place,
+        2e-3 * random.normal(size=draws) - 0.05 * depth + 0.1 * nu,
+    ]
+    drawn, found = np.cov(errors), joint.covariance([0.5])[0]
+    found[1, 1] -= other["g"].curve_error(0.5) ** 2
+    # entries of a covariance of n draws are good to about sqrt(2 / n) of the variances: 0.2 %
+    scale = np.sqrt(np.outer(np.diag(drawn), np.diag(drawn)))
+    assert (np.abs(found - drawn) / scale).max() < 0.01
+
+
+def test_knowing_a_cause_reduces_the_variance_by_its_share() -> None:
+    alone = curve(straight, tolerances=(tolerance("depth_mm", 0.1, 0.001), tolerance("nu", 0.01, 0.02)))
+    shares = alone.reductions([0.5])
+    squares = {"noise": 1.5e-4**2, "depth_mm": 1e-4**2, "nu": 2e-4**2}
+    for name, square in squares.items():
+        assert shares[name][0] == pytest.approx(square / sum(squares.values()), abs=1e-6)
+
+
+def test_readings_are_chosen_by_name() -> None:
+    joint = together(curve(straight), curve(saturating))
+    assert joint.of(["b"]).names == ("b",)
+    assert joint.of(["b", "a"]).at([0.5])[0] == pytest.approx(joint.at([0.5])[0][::-1])
+    with pytest.raises(Finger3dError, match="c: .* a, b"):
+        joint.of(["a", "c"])
 
 
 def gauge() -> Calibration:
@@ -96,3 +200,108 @@ def test_several_readings_have_a_row_each_and_one_alone_is_judged_as_if_alone() 
     assert joint.title == "readings a, b together"
     (alone,) = estimate(joint, {"a": 0.055})
     assert alone == estimate(joint.of(["a"]), 0.055)[0]
+
+
+def test_a_calibration_comes_back_from_its_file_as_it_was(tmp_path: Path) -> None:
+    before = curve(
+        saturating,
+        tolerances=(Tolerance("nu", "1", 0.003, np.linspace(0.0, 1.0, 25), np.linspace(0.0, 1e-3, 25)),),
+        failed=((0.3, "x"),),
+    )
+    after = load(save(before, tmp_path / "calibration.json"))
+    assert np.array_equal(after["g"].reading, before["g"].reading)
+    assert np.array_equal(after["g"].tolerances[0].slope, before["g"].tolerances[0].slope)
+    assert after.failed == before.failed
+    assert estimate(after, 0.005)[0] == estimate(before, 0.005)[0]
+
+
+def test_calibration_files_that_are_none(tmp_path: Path) -> None:
+    good = save(curve(straight), tmp_path / "good.json").read_text()
+    data = json.loads(good)
+    cases = {
+        "not JSON, or cut short": good[: len(good) // 2],
+        "version 9, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 9}),
+        "version 2, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 2}),
+        "version 1 of several readings, this finger3d reads version 5; calibrate again": json.dumps(
+            {**data, "format": "finger3d joint calibration", "version": 1}
+        ),
+        "no calibration": json.dumps([1, 2]),
+    }
+    for told, text in cases.items():
+        path = tmp_path / "bad.json"
+        path.write_text(text)
+        with pytest.raises(Finger3dError, match=told) as found:
+            load(path)
+        assert "\n" not in str(found.value)
+        assert str(found.value).startswith(str(path))
+    with pytest.raises(Finger3dError, match="none.json"):
+        load(tmp_path / "none.json")
+    with pytest.raises(Finger3dError, match=str(tmp_path)):
+        load(tmp_path)
+
+
+def parts(node: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Places of all parts of a tree."""
+    for key in node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
+        yield (*place, key)
+        yield from parts(node[key], (*place, key))
+
+
+def test_a_file_with_any_part_changed_or_removed_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Every number is changed by 1e-9 of itself, every word by a letter; every part is removed."""
+    one, path = Tolerance("nu", "1", 0.003, np.ones(25), np.ones(25)), tmp_path / "calibration.json"
+    text = save(curve(straight, tolerances=(one,), failed=((0.3, "x"),)), path).read_text()
+    places = list(parts(json.loads(text)))
+    assert len(places) > 200
+    for removed in (False, True):
+        for place in places:
+            data = node = json.loads(text)
+            for key in place[:-1]:
+                node = node[key]
+            value = node.pop(place[-1])
+            if not removed and isinstance(value, int | float | str):
+                changed = f"{value}x" if isinstance(value, str) else 1.000000001 * value + 1e-12
+                node.update({place[-1]: changed}) if isinstance(node, dict) else node.insert(place[-1], changed)
+            path.write_text(json.dumps(data))
+            with pytest.raises(Finger3dError, match="checksum|no calibration|version"):
+                load(path)
+    assert run("estimate", path, "--strain", "0.01") == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
+def test_the_map_reads_what_a_gauge_there_reads(domain: str) -> None:
+    """The middles of squares at (35.5, 39.5) and, in the mirrored half, (-20.5, 30.5) mm."""
+    places = [(35.5, 39.5), (-20.5, 30.5)]
+    gauges = [{"name": f"{x}:{a}", "x_mm": x, "y_mm": y, "angle_deg": a} for x, y in places for a in (0.0, 40.0, 90.0)]
+    size = {"size_mm": 8.0, "base_size_mm": 14.0, "mesher": "swept"} if domain == "solid" else SCENE["mesh"]
+    model = scene(gauge=gauges, model={"domain": domain}, mesh=size).model()
+    problem = build(model)
+    frames = {mu: pressing.press(problem, mu).frame for mu in (0.2, 0.4)}
+    found = StrainMap.of(problem, frames)
+    for x, y in places:
+        i, j = int(np.argmin(np.abs(found.y - y))), int(np.argmin(np.abs(found.x - x)))
+        for a in (0.0, 40.0, 90.0):
+            got = found.along(math.radians(a))[:, i, j]
+            assert got == pytest.approx([frames[mu].gauges[f"{x}:{a}"] for mu in (0.2, 0.4)], abs=1e-10)
+    slope = found.slope_at(0.0, 0.3)
+    assert slope.shape == (len(found.y), len(found.x))
+    assert np.isnan(slope[-1, 0])  # beside the dome
+    assert np.isfinite(slope[0]).all()
+
+
+def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
+    problem = build(scene().model())
+    found = StrainMap.of(problem, {mu: pressing.press(problem, mu).frame for mu in (0.2, 0.6)})
+    assert np.allclose(found.along(0.5), found.along(math.pi - 0.5)[:, :, ::-1], atol=1e-12, equal_nan=True)
+    best, angle = found.best()
+    assert np.nanmax(found.worst_slope(0.5) - best) <= np.nanmax(best) * 0.05  # the best of 5 degree steps
+    assert np.nanmin(angle) >= 0.0
+
+
+def test_a_reader_of_a_linear_field_is_exact() -> None:
+    problem = build(scene().model())
+    u = problem.mesh.points @ np.array([[0.1, 0.3], [-0.2, 0.05]])
+    read = Reader.at(problem.mesh, np.array([[10.0, 20.0], [0.0, 200.0]]), ()).strain(u)
+    assert read[0] == pytest.approx([0.1, 0.05, 0.05], abs=1e-12)
+    assert np.isnan(read[1]).all()

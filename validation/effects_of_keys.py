@@ -88,8 +88,8 @@ def judged(name: str, scene: Scene) -> Iterator[Judged]:
         for number in (n for n in NAMES if n in effects):
             scale, effect = scales.get(number) or abs(true.numbers[number]), effects[number]
             for side, told, error, there in (
-                ("falling", effect.falling, effect.falling_error, true.changed[key][0]),
-                ("growing", effect.growing, effect.growing_error, true.changed[key][1]),
+                ("falling", effect.falling, effect.falling_error, true.changed[key, 0]),
+                ("growing", effect.growing, effect.growing_error, true.changed[key, 1]),
             ):
                 if isinstance(there, dict) and np.isfinite([told, error]).all():
                     yield Judged(name, number, key, side, told / scale, error / scale, there[number] / scale)

@@ -129,12 +129,12 @@ def forecast(model: Model, bars: bool = False) -> Tree:
     axes, press = symmetry(model), press_cost(model)
     size, seconds = press.size, press.seconds
     costs = {name: added_cost(slot, model, press) for slot, name in model.filled}
+    added = sum(cost.seconds for cost in costs.values())
     if bars:
-        added = sum(cost.seconds for cost in costs.values())
         seconds = seconds | {"error_bars": _error_bars_s(model, size, seconds, added)}
-    memory = 1e3 * size.press_gb(len(model.gauges))
+    memory = 1e3 * size.press_gb(len(model.gauges)) + sum(cost.memory_mb for cost in costs.values())
     memory += CAD_MB * _is_meshed_by_tetwild(model) + _states_mb(model, press, axes)
-    check_memory((memory + sum(cost.memory_mb for cost in costs.values())) / 1e3, "this press")
+    check_memory(memory / 1e3, "this press")
     return {
         "domain": model.domain,
         "formulation": "mixed quadratic/linear" if model.mixed else "quadratic displacement",
@@ -148,8 +148,8 @@ def forecast(model: Model, bars: bool = False) -> Tree:
         **({"steps_of_all_runs": press.increments} if press.runs > 1 else {}),
         **{f"{stage}_s": round(s, 2) for stage, s in seconds.items()},
         **{name: f"costs {cost}" for name, cost in costs.items()},
-        "total_s": round(sum(seconds.values()) + sum(cost.seconds for cost in costs.values()), 1),
-        "memory_MB": round(memory + sum(cost.memory_mb for cost in costs.values())),
+        "total_s": round(sum(seconds.values()) + added, 1),
+        "memory_MB": round(memory),
     }
 
 

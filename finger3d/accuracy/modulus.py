@@ -67,7 +67,7 @@ def _by_variants(
     """Return the errors by name due to each spread, from presses on a coarser mesh."""
     legs = with_increments_of(problem.model.legs, increments)
     beside = companion(replace(problem, model=replace(problem.model, legs=legs)))
-    models = [_with_modulus(beside.model, label, ratio) for label, s in spreads.items() for ratio in (1.0 - s, 1.0 + s)]
+    models = [times_modulus(beside.model, 1.0 + sign * s, label) for label, s in spreads.items() for sign in (-1, 1)]
     ends = press_variants(beside, models, lambda p, steps: numbers(p, steps[-1]))
     found = []
     for soft, stiff in zip(ends[::2], ends[1::2], strict=True):
@@ -77,13 +77,12 @@ def _by_variants(
     return found
 
 
-def _with_modulus(model: Model, label: str, ratio: float) -> Model:
-    """Return a model with Young's modulus of one part, or of the main body, times a ratio."""
-    parts = tuple((name, times_modulus(one, ratio if name == label else 1.0)) for name, one in model.parts)
-    return replace(model, material=times_modulus(model.material, 1.0 if label else ratio), parts=parts)
+def times_modulus(model: Model, ratio: float, label: str | None = None) -> Model:
+    """Return a model with Young's modulus of one part, "" for the main body, or of all of them times a ratio."""
 
+    def scaled(name: str, material: Material) -> Material:
+        own = material.isotropic("the spread of E_MPa")
+        return replace(own, E_MPa=(ratio if label in (None, name) else 1.0) * own.E_MPa)
 
-def times_modulus(material: Material, ratio: float) -> Material:
-    """Return a material with its Young's modulus times a ratio."""
-    own = material.isotropic("the spread of E_MPa")
-    return replace(own, E_MPa=ratio * own.E_MPa)
+    parts = tuple((name, scaled(name, one)) for name, one in model.parts)
+    return replace(model, material=scaled("", model.material), parts=parts)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
@@ -107,7 +107,8 @@ class Refinement:
     @property
     def best(self) -> Round:
         """The round with the fewest unknowns that meets the tolerance, else that with the smallest error."""
-        return best_round(self.rounds, self.tolerance)
+        met = [r for r in self.rounds if r.error <= self.tolerance]
+        return min(met, key=lambda r: r.dofs) if met else min(self.rounds, key=lambda r: r.error)
 
     @property
     def met(self) -> bool:
@@ -132,12 +133,6 @@ class Refinement:
             "stopped": self.stopped,
             "rounds": [asdict(r) for r in self.rounds],
         }
-
-
-def best_round(rounds: Sequence[Round], tolerance: float) -> Round:
-    """Return the round with the fewest unknowns that meets a tolerance; without one, that with the smallest error."""
-    met = [r for r in rounds if r.error <= tolerance]
-    return min(met, key=lambda r: r.dofs) if met else min(rounds, key=lambda r: r.error)
 
 
 def refine_mesh(
@@ -204,19 +199,13 @@ def refine_mesh(
             stopped = f"max_seconds = {max_seconds:g}"
             break
         options = found
-    best = best_round(rounds, tolerance)
-    stopped = "met" if best.error <= tolerance else stopped
-    kept = meshes[rounds.index(best)]
-    return Refinement(tolerance, kept, tuple(rounds), stopped, problem if best is rounds[-1] else None)
-
-
-def _relative_errors(
-    numbers: Mapping[str, float], kinds: Mapping[str, Kind], errors: Mapping[str, float], goal: str
-) -> dict[str, float]:
-    """Return the relative errors of the goal, or of all numbers, the largest first."""
-    names = [name for name in errors if name in numbers] if goal == ALL else [goal]
-    found = {name: relative_error(numbers, kinds, name, errors[name]) for name in names}
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    found = Refinement(tolerance, options, tuple(rounds), stopped)
+    return replace(
+        found,
+        mesh=meshes[rounds.index(found.best)],
+        stopped="met" if found.met else stopped,
+        problem=problem if found.best is rounds[-1] else None,
+    )
 
 
 def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Round, MeshOptions]:
@@ -228,17 +217,27 @@ def _run_round(model: Model, tolerance: float, goal: str) -> tuple[Problem, Roun
     steps[-1].check("the press on this mesh")
     numbers, kinds = press_numbers(short, steps[-1]), kinds_of(steps[-1].readings)
     found, beside, _ = discretisation(short, steps, numbers=press_numbers)
-    errors = _relative_errors(numbers, kinds, found.discretisation, goal)
-    worst, error = next(iter(errors.items()))
-    mesh = model.mesh
+    names = [name for name in found.discretisation if name in numbers] if goal == ALL else [goal]
+    errors = {name: relative_error(numbers, kinds, name, found.discretisation[name]) for name in names}
+    worst, mesh = max(errors, key=lambda name: errors[name]), model.mesh
+    error = errors[worst]
     if error <= tolerance:
         wanted = _longer(problem, numbers["contact_half_length_mm"])
     else:
         factor = (_SAFETY * tolerance / error) ** (1.0 / (1.0 if kinds[worst].is_zone else kinds[worst].order))
         factor = min(max(factor, _FACTOR_RANGE[0]), _FACTOR_RANGE[1])
         wanted = _shorter(mesh, _zones_to_refine(beside, found.companion_numbers, worst, kinds[worst]), factor)
-    dofs = int(problem.body.stiffness.upper.shape[0])
-    return problem, _round(mesh, dofs, error, worst, time.perf_counter() - start), wanted
+    done = Round(
+        size_mm=mesh.size_mm,
+        base_size_mm=mesh.base_size_mm,
+        dofs=int(problem.body.stiffness.upper.shape[0]),
+        error=error,
+        number=worst,
+        seconds=time.perf_counter() - start,
+        gauge_refinement=mesh.gauge_refinement,
+        stick_refinement=mesh.stick_refinement,
+    )
+    return problem, done, wanted
 
 
 def _edges(mesh: MeshOptions) -> tuple[float, ...]:
@@ -292,13 +291,6 @@ def _shorter(mesh: MeshOptions, zones: set[str], factor: float) -> MeshOptions:
         gauge_refinement=finer[0],
         stick_refinement=finer[1],
         borders=None,
-    )
-
-
-def _round(mesh: MeshOptions, dofs: int, error: float, goal: str, seconds: float) -> Round:
-    """Return the record of a round on a mesh."""
-    return Round(
-        mesh.size_mm, mesh.base_size_mm, dofs, error, goal, seconds, mesh.gauge_refinement, mesh.stick_refinement
     )
 
 

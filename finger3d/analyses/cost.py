@@ -103,16 +103,8 @@ class CostRow:
 
     def as_dict(self) -> Tree:
         """Return the entry of the JSON output."""
-        return {
-            "error": self.error,
-            "set": self.keys,
-            "increments": self.increments,
-            "dofs": self.dofs,
-            "seconds": self.seconds,
-            "memory_MB": self.memory_MB,
-            "errors": dict(self.errors),
-            "limit": self.limit,
-        }
+        forecast = ("increments", "dofs", "seconds", "memory_MB", "errors", "limit")
+        return {"error": self.error, "set": self.keys, **{name: getattr(self, name) for name in forecast}}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, holds
+from finger3d.io import claimed, holds, write_text
 from finger3d.progress import Progress
 from finger3d.scene import Source, scene_of
 
@@ -30,8 +30,8 @@ class ModelFiles:
     files: tuple[Path, ...]
     points: int
     cells: int
-    multiple: float | None
-    remarks: tuple[str, ...]
+    multiple: float | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def export_mesh(
@@ -73,7 +73,7 @@ def export_mesh(
         write_mesh_vtu(out / MESH_FILES[0], whole)
         write_mesh_msh(out / MESH_FILES[1], whole)
     files = tuple(out / name for name in MESH_FILES)
-    return ModelFiles(files, len(whole.points), len(whole.cells), None, ())
+    return ModelFiles(files, len(whole.points), len(whole.cells))
 
 
 def export_deck(
@@ -101,7 +101,7 @@ def export_deck(
     report.stage("meshing")
     made = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
-    with claimed(out), atomic(out / DECK_FILE) as temporary:
-        temporary.write_text(made.deck.text(), encoding="ascii")
+    with claimed(out):
+        write_text(out / DECK_FILE, made.deck.text())
     mesh = made.deck.mesh
     return ModelFiles((out / DECK_FILE,), len(mesh.points), len(mesh.cells), made.multiple, made.remarks)

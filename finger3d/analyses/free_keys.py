@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from finger3d._types import Float, TreeView
 from finger3d.errors import Finger3dError
 from finger3d.scene import Scene, parse, tree
 from finger3d.scene.material import modulus_of
 from finger3d.scene.messages import shown
+
+_DECADE = 10.0
 
 
 @dataclass(frozen=True)
@@ -23,17 +27,15 @@ class FreeKey:
     high: float
 
     @classmethod
-    def of(cls, text: str) -> FreeKey:
-        """From ``KEY=LOW:HIGH``."""
-        key, equals, bounds = text.partition("=")
+    def of(cls, text: str, option: str = "--free", example: str = "for instance finger.radius_mm=60:200") -> FreeKey:
+        """From ``KEY=LOW:HIGH``, which an option gave."""
+        key, _, bounds = text.partition("=")
         try:
             low, high = (float(part) for part in bounds.split(":"))
         except ValueError:
             low = high = math.nan
-        if not equals or not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise Finger3dError(
-                f"--free {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, for instance finger.radius_mm=60:200"
-            )
+        if not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise Finger3dError(f"{option} {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, {example}")
         return cls(key.strip(), low, high)
 
     def numbered(self, given: TreeView) -> str:
@@ -54,6 +56,28 @@ class FreeKey:
         """Middle of the bounds."""
         return 0.5 * (self.low + self.high)
 
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether shares are those of the logarithm: of positive bounds that differ by more than a decade."""
+        return self.low > 0.0 and self.high / self.low > _DECADE
+
+    def value(self, share: float) -> float:
+        """Return the value at a share of the range, from 0 to 1."""
+        if self.is_logarithmic:
+            return self.low * math.pow(self.high / self.low, share)
+        return self.low + (self.high - self.low) * share
+
+    def share(self, value: float) -> float:
+        """Return the share of the range at a value."""
+        if self.is_logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+
+def values_at(free: Sequence[FreeKey], shares: Float) -> Float:
+    """Return values (k,) of free keys at shares (k,) of their ranges."""
+    return np.array([key.value(float(share)) for key, share in zip(free, shares, strict=True)])
+
 
 Bounds = Mapping[str, tuple[float, float]] | Sequence[str]
 """Lower and upper bound by key, or texts such as ``material.E_MPa=0.05:5``."""
@@ -66,11 +90,11 @@ def free_keys(bounds: Bounds) -> tuple[FreeKey, ...]:
     return tuple(map(FreeKey.of, bounds))
 
 
-def check_distinct(keys: Sequence[str]) -> None:
-    """Raise an error if a key is given twice."""
-    twice = next((k for i, k in enumerate(keys) if k in keys[:i]), None)
-    if twice is not None:
-        raise Finger3dError(f"--free {twice}: given twice")
+def check_distinct(keys: Sequence[str], option: str = "--free", advice: str = "") -> None:
+    """Raise an error if an option gives a key twice."""
+    for i, key in enumerate(keys):
+        if key in keys[:i]:
+            raise Finger3dError(f"{option} {key}: given twice{advice}")
 
 
 def scene_with(given: TreeView, keys: Sequence[str], values: Sequence[float] | Float, path: Path | None) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast
@@ -55,13 +55,7 @@ class Plan:
 
     def summary(self) -> Tree:
         """Return what `finger3d plan --json` prints."""
-        return {
-            "title": self.title,
-            "moduli": dict(self.moduli),
-            "effects": dict(self.effects),
-            "forecast": dict(self.forecast),
-            "warnings": list(self.warnings),
-        }
+        return asdict(self)
 
 
 def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 from finger3d.accuracy.companion_presses import CompanionThread
 from finger3d.analyses.press_files import Fields, ResultWriter
 from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
-from finger3d.analyses.pressed_body import PressedBody
+from finger3d.analyses.pressed_body import PressedBody, with_penetration
 from finger3d.analyses.result import PressResult, result_in
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
@@ -155,7 +155,7 @@ def _solve(scene: Scene, writer: ResultWriter, report: Progress, started: float,
 
     record, checks = body.pressed(press_all)
     record.surface_checks = checks
-    record.keep_penetration()
+    record.steps = with_penetration(record.steps, checks)
     writer.progress(record)
     return record
 

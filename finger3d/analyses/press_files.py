@@ -17,7 +17,7 @@ from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
-from finger3d.io import atomic, write_csv, write_json
+from finger3d.io import write_csv, write_json, write_text
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.march.grip import FINGERS, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
@@ -133,8 +133,7 @@ class ResultWriter:
         content = record.summary(outcome)
         write_json(self.folder / _SUMMARY, content)
         if self._scene:
-            with atomic(self.folder / _SCENE) as path:
-                path.write_text(self._scene, encoding="utf-8")
+            write_text(self.folder / _SCENE, self._scene)
             for name in _FILES if self._replaces else ():
                 (self.folder / name).unlink(missing_ok=True)
             self._scene, self._replaces = "", False

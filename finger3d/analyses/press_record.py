@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -145,13 +145,6 @@ class PressRecord:
             self._entries[key] = step, measure(self.problem.points, step)
         return self._entries[key][1]
 
-    def keep_penetration(self) -> None:
-        """Enter the penetration of the surface checks into the steps."""
-        left = iter(self.surface_checks)
-        self.steps = [
-            replace(step, penetration_mm=next(left).penetration_mm) if step.outcome.ok else step for step in self.steps
-        ]
-
     @property
     def all_factorizations(self) -> int:
         """Factorisations so far, with those of an earlier attempt."""
@@ -218,19 +211,13 @@ def _object_pose(pose: ObjectPose) -> Tree:
 
 
 def _mesh(problem: Problem) -> Tree:
-    report = problem.body.report
+    report = asdict(problem.body.report)
+    del report["seconds"]
     return {
         "finger": extent(problem.model.design),
-        "points": report.points,
-        "cells": report.cells,
+        **report,
         "dofs": int(problem.body.stiffness.upper.shape[0]),
         "contact_points": len(problem.surface.nodes),
-        "min_dihedral_deg": report.min_dihedral_deg,
-        "volume_mm3": report.volume_mm3,
-        "cad_volume_mm3": report.cad_volume_mm3,
-        "hash": report.hash,
-        "from_cache": report.from_cache,
-        "cache_path": report.cache_path,
         "symmetry": list(problem.axes),
         "formulation": "mixed quadratic/linear" if problem.body.elastic.mixed else "quadratic displacement",
     }

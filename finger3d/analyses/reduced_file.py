@@ -36,6 +36,13 @@ _SHAPES: dict[str, type[RigidObject]] = {r.__name__: r for r in OBJECTS.values()
 _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 """Mesh options that a file stores."""
 
+_OF_MODEL = ("legs", "gauges", "markers", "taxels", "domain", "rule", "warnings", "filled")
+"""Attributes of a model that a file stores as they are."""
+
+_OF_SURFACE = ("nodes", "face", "points", "area", "normals", "samples")
+_OF_POINTS = ("nodes", "face", "points", "area", "facets")
+"""Arrays of a surface, and of its contact points, that a file stores under these names."""
+
 _FRICTION: dict[str, type[FrictionLaw]] = {law.__name__: law for law in (Coulomb, TwoCoefficients)}
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
 
@@ -44,8 +51,8 @@ class _Header(BaseModel):
     """The header; `object` and `friction` are tables whose ``kind`` names a class."""
 
     model_config = _STRICT
-    format: str
-    version: int
+    format: str = FORMAT
+    version: int = VERSION
     about: dict[str, Any]
     body: DesignSummary
     material: Isotropic
@@ -70,8 +77,7 @@ def write(path: str | Path, problem: Problem, other: BoundarySurface, about: Tre
     if isinstance(problem.model.object, MeshObject):
         shape = problem.model.object.surface
         arrays |= {"object_points": shape.points, "object_faces": shape.faces}
-    header = {"format": FORMAT, "version": VERSION, "about": dict(about), **_header(problem)}
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    arrays["header"] = np.frombuffer(_header(problem, about).model_dump_json().encode(), dtype=np.uint8)
     write_arrays(path, arrays)
     return Path(path)
 
@@ -105,18 +111,12 @@ def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
         ) from None
     checked = _Header.model_validate_json(arrays["header"].tobytes())
     problem = assembled(_model(checked, arrays), arrays, checked.touch_mm, checked.axes)
-    return problem, _face("other", arrays, problem.dim), checked.about
+    return problem, _face("other", arrays), checked.about
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     mean, hats = face.average.tocsr(), face.hats.tocsr()
-    return {
-        f"{name}_nodes": face.nodes,
-        f"{name}_face": face.face,
-        f"{name}_points": face.points,
-        f"{name}_area": face.area,
-        f"{name}_normals": face.normals,
-        f"{name}_samples": face.samples,
+    return {f"{name}_{key}": getattr(face, key) for key in _OF_SURFACE} | {
         f"{name}_mean": mean.data,
         f"{name}_mean_at": mean.indices,
         f"{name}_mean_rows": mean.indptr,
@@ -124,29 +124,18 @@ def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
     }
 
 
-def _face(name: str, arrays: TreeView, dim: int) -> BoundarySurface:
+def _face(name: str, arrays: TreeView) -> BoundarySurface:
     """Return a surface with the quadrature points of the gap, and without traces of a mesh."""
-    samples, nodes = arrays[f"{name}_samples"].reshape(-1, dim), arrays[f"{name}_nodes"]
-    pattern, shape = (arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"]), (len(nodes), len(samples))
+    own = {key: arrays[f"{name}_{key}"] for key in _OF_SURFACE}
+    shape, pattern = (len(own["nodes"]), len(own["samples"])), (arrays[f"{name}_mean_at"], arrays[f"{name}_mean_rows"])
     mean, hats = (sp.csr_matrix((arrays[f"{name}_{data}"], *pattern), shape=shape) for data in ("mean", "hats"))
-    points = arrays[f"{name}_points"].reshape(-1, dim)
-    return BoundarySurface(
-        nodes=nodes,
-        face=arrays[f"{name}_face"],
-        points=points,
-        area=arrays[f"{name}_area"],
-        normals=arrays[f"{name}_normals"].reshape(-1, dim),
-        trace=sp.csr_matrix((len(nodes), 0)),
-        samples=samples,
-        average=mean,
-        interpolate=sp.csr_matrix((len(samples), 0)),
-        hats=hats,
-    )
+    trace, interpolate = (sp.csr_matrix((count, 0)) for count in shape)
+    return BoundarySurface(**own, trace=trace, average=mean, interpolate=interpolate, hats=hats)
 
 
 def bare(face: BoundarySurface) -> BoundarySurface:
     """Return the surface without traces of a mesh."""
-    return _face("it", _face_arrays("it", face), face.points.shape[1])
+    return _face("it", _face_arrays("it", face))
 
 
 def arrays_of(problem: Problem) -> dict[str, Array]:
@@ -158,12 +147,8 @@ def arrays_of(problem: Problem) -> dict[str, Array]:
         "parent": problem.symmetry.image_of,
         "sign": problem.symmetry.mirror_sign,
         "share": problem.symmetry.multiplicity,
-        "nodes": problem.points.nodes,
-        "face": problem.points.face,
-        "points": problem.points.points,
-        "area": problem.points.area,
+        **{key: getattr(problem.points, key) for key in _OF_POINTS},
         "band": np.array([problem.points.half_width_mm, problem.points.band_mm]),
-        "facets": problem.points.facets,
         "contact_compliance": problem.points.compliance,
         **_face_arrays("face", bare(problem.surface)),
     }
@@ -183,16 +168,12 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     c = len(arrays["face_nodes"])
     half_width, band = arrays["band"]
     system = ContactSystem(
-        surface=_face("face", arrays, d),
+        surface=_face("face", arrays),
         points=ContactPoints(
-            nodes=arrays["nodes"],
-            face=arrays["face"],
-            points=arrays["points"],
-            area=arrays["area"],
+            **{key: arrays[key] for key in _OF_POINTS},
             basis=vertical_frame(d),
             half_width_mm=float(half_width),
             band_mm=float(band),
-            facets=arrays["facets"],
             compliance=arrays["contact_compliance"],
         ),
         delassus=arrays["compliance"].reshape(c, d, c, d),
@@ -213,27 +194,21 @@ def assembled(model: Model, arrays: TreeView, touch_mm: float, axes: tuple[str, 
     return replace(problem, without_inclusions=replace(problem, system=without))
 
 
-def _header(problem: Problem) -> Tree:
-    model = problem.model
-    thing = model.object
-    placed = {f.name: getattr(thing, f.name) for f in fields(thing) if f.name != "surface"}
-    return {
-        "body": asdict(model.design),
-        "material": asdict(model.material.isotropic("a reduced model")),
-        "mesh": {name: getattr(model.mesh, name) for name in _OF_MESH},
-        "legs": [asdict(leg) for leg in model.legs],
-        "object": {"kind": type(thing).__name__, **placed},
+def _header(problem: Problem, about: TreeView) -> _Header:
+    model, obj = problem.model, problem.model.object
+    placed = {f.name: getattr(obj, f.name) for f in fields(obj) if f.name != "surface"}
+    header: Tree = {
+        "about": dict(about),
+        "body": model.design,
+        "material": model.material.isotropic("a reduced model"),
+        "mesh": MeshOptions(**{name: getattr(model.mesh, name) for name in _OF_MESH}),
+        "object": {"kind": type(obj).__name__, **placed},
         "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},
-        "gauges": [asdict(g) for g in model.gauges],
-        "markers": [asdict(m) for m in model.markers],
-        "taxels": [asdict(t) for t in model.taxels],
-        "domain": model.domain,
-        "rule": model.rule,
-        "warnings": list(model.warnings),
-        "filled": [list(f) for f in model.filled],
-        "axes": list(problem.axes),
+        "axes": problem.axes,
         "touch_mm": problem.system.first_contact_mm,
+        **{name: getattr(model, name) for name in _OF_MODEL},
     }
+    return _Header(**header)
 
 
 def _model(header: _Header, arrays: TreeView) -> Model:
@@ -243,20 +218,13 @@ def _model(header: _Header, arrays: TreeView) -> Model:
 
         surface = {"surface": Triangles(arrays["object_points"], arrays["object_faces"])}
     return Model(
-        header.body,
-        header.material,
-        header.mesh,
-        header.legs,
-        _of_kind(_SHAPES, header.object, surface),
-        _of_kind(_FRICTION, header.friction, {}),
-        gauges=header.gauges,
-        markers=header.markers,
-        taxels=header.taxels,
-        domain=header.domain,
-        rule=header.rule,
+        design=header.body,
+        material=header.material,
+        mesh=header.mesh,
+        object=_of_kind(_SHAPES, header.object, surface),
+        friction=_of_kind(_FRICTION, header.friction, {}),
         symmetry=header.axes,
-        warnings=header.warnings,
-        filled=header.filled,
+        **{name: getattr(header, name) for name in _OF_MODEL},
     )
 
 

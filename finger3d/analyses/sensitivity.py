@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,14 +93,7 @@ class Sensitivity:
             name: {key: {"value": e.value(self.changes[key]), **e._asdict()} for key, e in by_key.items()}
             for name, by_key in self.effects.items()
         }
-        return {
-            "title": self.title,
-            "numbers": dict(self.numbers),
-            "keys": dict(self.keys),
-            "changes": dict(self.changes),
-            "effects": effects,
-            "failures": dict(self.failures),
-        }
+        return {**asdict(self), "effects": effects}
 
     def rows(self) -> list[Tree]:
         """Return a row for each number and key, those first that change the number most."""
@@ -235,14 +228,17 @@ def effects_on(
         for ratio, companion in beside:
             report.stage(f"errors: the same changes on edges of {companion.model.mesh.size_mm:.3g} mm")
             others.append((ratio, differences(companion, some)))
-        for key, sides in own.changed.items():
+        for key in some:
+            sides = [own.changed[key, k] for k in (0, 1)]
             told = [f"{way}: {side}" for way, side in zip(_WAYS, sides, strict=True) if isinstance(side, str)]
             failures |= {key: "; ".join(told)} if told else {}
             if len(told) < len(sides):
-                errors = [
-                    _errors(own, [(ratio, other.changed[key][k]) for ratio, other in others], key, k) for k in (0, 1)
+                parts = [
+                    part
+                    for k, side in enumerate(sides)
+                    for part in (side if isinstance(side, dict) else {}, _errors(own, others, (key, k)))
                 ]
-                found[key] = {name: _effect(sides, errors, name) for name in own.numbers}
+                found[key] = {name: Effect(*(part.get(name, math.nan) for part in parts)) for name in own.numbers}
     return found, failures
 
 
@@ -251,23 +247,18 @@ Side = dict[str, float] | str
 
 
 class Differences(NamedTuple):
-    """Numbers of a press, its readings, and the changes of the numbers as each key falls and grows."""
+    """Numbers of a press, its readings, and the changes of the numbers as each key falls (0) and grows (1)."""
 
     numbers: dict[str, float]
     readings: list[Column]
-    changed: dict[str, tuple[Side, Side]]
+    changed: dict[tuple[str, int], Side]
 
 
-def _errors(own: Differences, beside: Sequence[tuple[float, Side]], key: str, k: int) -> dict[str, float]:
-    """Return the errors of the changes by a key that falls (0) or grows (1), from those on other meshes."""
-    side = own.changed[key][k]
-    known = [(ratio, other) for ratio, other in beside if isinstance(other, dict)]
+def _errors(own: Differences, others: Sequence[tuple[float, Differences]], at: tuple[str, int]) -> dict[str, float]:
+    """Return the errors of the changes by a key, from those on other meshes."""
+    side = own.changed[at]
+    known = [(ratio, told) for ratio, other in others if isinstance(told := other.changed[at], dict)]
     return spread_error(side, known, own.readings) if isinstance(side, dict) and known else {}
-
-
-def _effect(sides: tuple[Side, Side], errors: Sequence[Mapping[str, float]], name: str) -> Effect:
-    told = [side.get(name, math.nan) if isinstance(side, dict) else math.nan for side in sides]
-    return Effect(told[0], errors[0].get(name, math.nan), told[1], errors[1].get(name, math.nan))
 
 
 def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differences:
@@ -286,7 +277,9 @@ def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differenc
     if base.found is None:
         raise Finger3dError(f"sensitivity: {base.failure}")
     numbers, last = base.found
-    sides: dict[tuple[str, int], Side] = {}
+    sides: dict[tuple[str, int], Side] = {
+        (key, side): end for key, one in changes.items() for side, end in enumerate(one.ends) if isinstance(end, str)
+    }
     for at, variant in zip(pressed, variants, strict=True):
         sides[at] = _less(variant.found[0], numbers) if variant.found else variant.failure
     for at in read:
@@ -296,12 +289,7 @@ def differences(problem: Problem, changes: Mapping[str, KeyChange]) -> Differenc
         ratio = (2 * side - 1) * changes[key].change / changes[key].value
         sides[key, side] = {name: ratio * x if known[name].is_stress else 0.0 for name, x in numbers.items()}
 
-    def side_of(key: str, k: int) -> Side:
-        end = changes[key].ends[k]
-        return end if isinstance(end, str) else sides[key, k]
-
-    changed = {key: (side_of(key, 0), side_of(key, 1)) for key in changes}
-    return Differences(numbers, list(in_space(last.readings)), changed)
+    return Differences(numbers, list(in_space(last.readings)), sides)
 
 
 def _kept(problem: Problem, steps: Sequence[StepResult]) -> tuple[dict[str, float], StepResult]:

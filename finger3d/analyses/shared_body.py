@@ -20,7 +20,6 @@ from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
-from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.step_halving import march_automatic
@@ -132,19 +131,6 @@ class SharedBody(PressedBody):
         super().__init__(replace(model, legs=shared_legs(variants), gauges=gauges), report)
         self._results: dict[Variant, VariantResult | Exception] = {}
 
-    def press(self, variant: Variant) -> VariantResult:
-        """Return the result of a variant.
-
-        Raises
-        ------
-        Exception
-            The reason why the press failed, one of `FAILURES`.
-        """
-        found = next(self.presses([variant]))
-        if isinstance(found, Exception):
-            raise found
-        return found
-
     def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[VariantResult | Exception]:
         """Yield the result of each variant in order, or the reason why its press failed.
 
@@ -157,12 +143,12 @@ class SharedBody(PressedBody):
             Largest number of presses at once.
         """
         new = [v for v in dict.fromkeys(v.without_gauges() for v in variants) if v not in self._results]
-        runs, unpaid = zip(new, self._runs(new, most), strict=True), set(new)
+        runs, unpaid = self._runs(new, most), set(new)
         for variant in variants:
             press = variant.without_gauges()
             while press not in self._results:
-                done, run = next(runs)
-                self._results[done] = run.result(self._grid)
+                done, found = next(runs)
+                self._results[done] = found
             result = self._results[press]
             if isinstance(result, VariantResult):
                 seconds = result.seconds if press in unpaid else 0.0
@@ -179,75 +165,61 @@ class SharedBody(PressedBody):
         strains = {strain_columns(own)[0]: readings[strain_columns(name)[0]] for own, name in names.items()}
         return strains | {column: value for column, value in readings.items() if column.kind != "gauge"}
 
-    def _runs(self, variants: Sequence[Variant], most: int | None) -> Iterator[_Run]:
+    def _runs(
+        self, variants: Sequence[Variant], most: int | None
+    ) -> Iterator[tuple[Variant, VariantResult | Exception]]:
         """Press each variant; condense the whole contact face once contact goes beyond the candidate points."""
         left = deque(variants)
         while left:
-            with closing(map_parallel(self.problem, self._run, tuple(left), most)) as runs:
-                for run in runs:
-                    checked, covered = run.with_coverage()
-                    if not covered:
-                        try:
+            with closing(map_parallel(self.problem, self._march, tuple(left), most)) as runs:
+                for steps, seconds in runs:
+                    result: VariantResult | Exception | None
+                    try:
+                        if (result := self._result(steps, seconds)) is None:
                             self.widen()
-                        except FAILURES as error:
-                            checked = replace(run, frames=error.with_traceback(None))
-                        else:
                             break  # and press the variants that are left on the new body
-                    left.popleft()
-                    yield checked
+                    except FAILURES as error:
+                        result = error.with_traceback(None)  # a traceback would keep all arrays of its frames
+                    yield left.popleft(), result
 
-    def _run(self, variant: Variant, before: Sequence[_Run], workspace: Workspace, cancel: Event) -> _Run:
+    def _march(
+        self, variant: Variant, before: object, workspace: Workspace, cancel: Event
+    ) -> tuple[tuple[StepResult, ...] | Exception, float]:
+        """Return the increments of a variant, or why they failed, and the seconds that they took."""
         start = time.perf_counter()
-        frames: tuple[StepResult, ...] | Exception
+        steps: tuple[StepResult, ...] | Exception
         try:
-            problem = under(self.problem, variant.friction, variant.legs, variant.rule)
-            frames = march_automatic(problem, workspace, cancel)[0]
+            steps = march_automatic(
+                under(self.problem, variant.friction, variant.legs, variant.rule), workspace, cancel
+            )[0]
         except FAILURES as error:
-            frames = error.with_traceback(None)  # a traceback would keep all arrays of its frames
-        return _Run(self.problem, frames, time.perf_counter() - start)
+            steps = error.with_traceback(None)
+        return steps, time.perf_counter() - start
 
+    def _result(self, steps: tuple[StepResult, ...] | Exception, seconds: float) -> VariantResult | None:
+        """Return the quantities of the last step; None if contact reached beyond the candidate points.
 
-@dataclass(frozen=True)
-class _Run:
-    """Steps of a press of `problem`, or the reason why it failed."""
-
-    problem: Problem
-    frames: tuple[StepResult, ...] | Exception
-    seconds: float
-
-    def with_coverage(self) -> tuple[_Run, bool]:
-        """Return the run with its last penetration, and whether contact stayed within the candidate points.
-
-        The check counts as part of the run.
+        The check of the surface counts as part of the press.
         """
-        if isinstance(self.frames, Exception) or not self.frames[-1].outcome.ok:
-            return self, True
-        start = time.perf_counter()
-        try:
-            (check,) = check_surface(self.problem, self.frames[-1:])
-        except FAILURES as error:
-            return replace(self, frames=error.with_traceback(None)), True
-        last = replace(self.frames[-1], penetration_mm=check.penetration_mm)
-        seconds = self.seconds + time.perf_counter() - start
-        return replace(self, frames=(*self.frames[:-1], last), seconds=seconds), check.within_candidates
-
-    def result(self, grid: Sequence[Marker]) -> VariantResult | Exception:
-        """Return the quantities of the last step, those of a grid of markers included."""
-        if isinstance(self.frames, Exception):
-            return self.frames
-        residual = max(f.residual for f in self.frames)
-        for number, frame in enumerate(self.frames, start=1):
-            if not frame.outcome.ok:
-                at = f"increment {number} (depth {frame.target.depth_mm:.4g} mm)"
-                return VariantResult(f"{at}: {frame.outcome}", residual, {}, {}, self.seconds)
-        last = self.frames[-1]
+        if isinstance(steps, Exception):
+            raise steps
+        start, residual = time.perf_counter(), max(step.residual for step in steps)
+        for number, step in enumerate(steps, start=1):
+            if not step.outcome.ok:
+                at = f"increment {number} (depth {step.target.depth_mm:.4g} mm)"
+                return VariantResult(f"{at}: {step.outcome}", residual, {}, {}, seconds)
+        (check,) = check_surface(self.problem, steps[-1:])
+        if not check.within_candidates:
+            return None
+        seconds += time.perf_counter() - start
+        last = replace(steps[-1], penetration_mm=check.penetration_mm)
         numbers = table_row(self.problem.points, replace(last, readings={}))
         for key in ("iterations", "residual", "method", "outcome"):
             numbers.pop(key)
         readings = last.readings
-        if grid:
-            readings = readings | MarkerGrid.at(self.problem, grid).readings(self.problem, last)
-        return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), self.seconds)
+        if self._grid:
+            readings = readings | MarkerGrid.at(self.problem, self._grid).readings(self.problem, last)
+        return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), seconds)
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

@@ -69,15 +69,8 @@ class Case:
 
     def as_dict(self) -> Tree:
         """Return the entry of compare.json."""
-        return {
-            "model": self.model,
-            "width_mm": self.width_mm,
-            "size_mm": self.size_mm,
-            "mesher": self.mesher,
+        kept = ("model", "width_mm", "size_mm", "mesher", "outcome", "numbers", "errors", "lines", "seconds")
+        return {name: getattr(self, name) for name in kept} | {
             "outcome": str(self.outcome),
-            "numbers": dict(self.numbers),
-            "errors": dict(self.errors),
-            "lines": {k: dict(v) for k, v in self.lines.items()},
-            "seconds": self.seconds,
             "error_method": self.method,
         }

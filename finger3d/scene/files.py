@@ -69,19 +69,19 @@ def finger(path: str, table: TomlTable) -> Imported | GivenMesh:
     return imported(path, scale=file.scale, up=file.up)
 
 
-def unit_mistake(design: Design, obj: RigidObject) -> str:
-    """Return a line if a triangulated object is far too large or far too small for the finger, else an empty text."""
+def unit_mistakes(design: Design, obj: RigidObject) -> list[str]:
+    """Return a line if a triangulated object is far too large or far too small for the finger."""
     if not isinstance(obj, MeshObject):
-        return ""
+        return []
     longest = max(design.height_mm, 2.0 * design.half_length_mm, design.width_mm)
     extent = obj.surface.high - obj.surface.low
     ratio = float(extent.max()) / longest
     if 1.0 / _APART <= ratio <= _APART:
-        return ""
+        return []
     box = " x ".join(f"{e:.4g}" for e in extent)
     relation = f"{ratio:.3g} times as large as" if ratio > 1.0 else f"{1.0 / ratio:.3g} times smaller than"
     advice = "0.001 if it was drawn in micrometres" if ratio > 1.0 else "1000 if it was drawn in metres, 25.4 in inches"
-    return (
+    return [
         f"object.path: the object's box is {box} mm, {relation} the finger of {longest:.4g} mm; is its unit right? "
         f"Give object.scale, for instance {advice}"
-    )
+    ]

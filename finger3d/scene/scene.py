@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -25,15 +25,7 @@ from finger3d.scene.checked_tables import checked, design_of, effects_of, named,
 from finger3d.scene.derived import parts_of, path_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place
-from finger3d.scene.tables import (
-    AutoTable,
-    LegsTable,
-    LegTable,
-    PressTable,
-    SceneTable,
-    TomlTable,
-    record_of,
-)
+from finger3d.scene.tables import LegsTable, LegTable, SceneTable, record_of
 
 _AUTO_TOLERANCE = 0.02
 """Default relative change of a number above which an effect is needed."""
@@ -207,112 +199,60 @@ def parse(given: TreeView, path: Path | None = None, set_keys: Iterable[str] | M
     """
     given = tree.frozen(files.absolute(given, path))
     mistakes: dict[Place, str] = {}
-    parts = _read(given, mistakes)
-    if parts is None:
+    tables = checked(SceneTable, given, (), mistakes)
+    mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
+    geometry, dimensions = named(given, "finger", "geometry", designs(), mistakes)
+    design = design_of(geometry, dimensions, mistakes)
+    shape, placed = named({**given, "object": shaped(given.get("object", {}))}, "object", "shape", OBJECTS, mistakes)
+    rigid = object_of(shape, placed, mistakes)
+    press = press_of(given, mistakes)
+    settings, effects, auto = effects_of(given, mistakes)
+    if mistakes or not (tables and dimensions and design and placed and rigid and press and auto):
         order = [*given]
         places = sorted(mistakes, key=lambda p: order.index(p[0]) if p[0] in order else len(order))
         raise messages.refusal([mistakes[p] for p in places], path, set_keys)
-    if lines := parts.contradictions():
+    legs = press.leg if isinstance(press, LegsTable) else (press,)
+    lines = checks.check(tables, legs, design)
+    if lines := [*lines, *files.unit_mistakes(design, rigid)]:
         raise messages.refusal(lines, path, set_keys)
+    tolerance = auto.auto_tolerance or tables.mesh.tolerance or _AUTO_TOLERANCE
     try:
-        mesh = parts.mesh()
-        filled, auto, tolerance = parts.filled_in(mesh), parts.auto.auto, parts.tolerance_of_effects
-        scene = Scene(filled, parts.design, parts.object, mesh, parts.effects, auto, tolerance, given, path)
+        mesh = _mesh(tables, legs, design, rigid, settings)
+        filled = tables.model_copy(
+            update={
+                "finger": {"geometry": geometry, **dimensions.model_dump()},
+                "material": material.filled_in(tables.material),
+                "parts": {label: material.filled_in(part) for label, part in tables.parts.items()},
+                "object": {"shape": shape, **dict(placed)},
+                "press": {} if tables.grip else press.model_dump(),
+                # with a tolerance the press finds the sizes
+                "mesh": tables.mesh if tables.mesh.tolerance else tables.mesh.model_copy(update=mesh.as_table()),
+                "effects": auto.model_dump(exclude_none=True)
+                | ({"auto_tolerance": tolerance} if auto.auto else {})
+                | {name: table.model_dump() for name, table in settings.items()},
+            }
+        )
+        scene = Scene(filled, design, rigid, mesh, effects, auto.auto, tolerance, given, path)
         _ = scene._model  # effects may refuse what the rest of the scene asks for
     except Finger3dError as error:
         raise messages.refusal([str(error)], path, set_keys) from None
     return scene
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """Tables of a scene, each checked separately, and the objects built from them."""
+def _mesh(
+    tables: SceneTable, legs: Sequence[LegTable], design: Design, obj: RigidObject, effects: Iterable[str]
+) -> MeshOptions:
+    """Return the edge lengths, given or chosen.
 
-    tables: SceneTable
-    geometry: str
-    dimensions: TomlTable
-    design: Design
-    shape: str
-    placed: TomlTable
-    object: RigidObject
-    press: PressTable | LegsTable
-    settings: Mapping[str, TomlTable]
-    effects: TreeView
-    auto: AutoTable
-
-    @property
-    def legs(self) -> tuple[LegTable, ...]:
-        return self.press.leg if isinstance(self.press, LegsTable) else (self.press,)
-
-    def contradictions(self) -> list[str]:
-        """Return the mistakes that show only when tables are read together."""
-        unit = files.unit_mistake(self.design, self.object)
-        return checks.check(self.tables, self.legs, self.design) + ([unit] if unit else [])
-
-    @property
-    def tolerance_of_effects(self) -> float:
-        """Change of a number, over its natural scale, above which an effect is needed."""
-        return self.auto.auto_tolerance or self.tables.mesh.tolerance or _AUTO_TOLERANCE
-
-    def mesh(self) -> MeshOptions:
-        """Return the edge lengths, given or chosen.
-
-        Raises
-        ------
-        Finger3dError
-            If the contact conditions cannot describe the object's motion into the finger.
-        """
-        domain = self.tables.model.domain
-        legs = path_of([dict(leg) for leg in self.legs], self.design, self.object, self.tables)
-        box = first_contact(self.design, self.object, legs, domain).contact_box
-        linear = not set(self.settings) - {"kinetic_friction"}
-        # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
-        quick = linear and self.tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in legs)
-        return mesh_options(self.tables.mesh, self.design, domain, self.object, box, quick)
-
-    def filled_in(self, mesh: MeshOptions) -> SceneTable:
-        """Return the tables with every default."""
-        return self.tables.model_copy(
-            update={
-                "finger": {"geometry": self.geometry, **self.dimensions.model_dump()},
-                "material": material.filled_in(self.tables.material),
-                "parts": {label: material.filled_in(part) for label, part in self.tables.parts.items()},
-                "object": {"shape": self.shape, **dict(self.placed)},
-                "press": {} if self.tables.grip else self.press.model_dump(),
-                # with a tolerance the press finds the sizes
-                "mesh": self.tables.mesh
-                if self.tables.mesh.tolerance
-                else self.tables.mesh.model_copy(update=mesh.as_table()),
-                "effects": self.auto.model_dump(exclude_none=True)
-                | ({"auto_tolerance": self.tolerance_of_effects} if self.auto.auto else {})
-                | {name: settings.model_dump() for name, settings in self.settings.items()},
-            }
-        )
-
-
-def _read(document: TreeView, mistakes: dict[Place, str]) -> _Parts | None:
-    """Check every table by itself; None if there are mistakes, which are put into `mistakes`."""
-    tables = checked(SceneTable, document, (), mistakes)
-    mistakes |= material.mistakes(tables.material, ("material",)) if tables else {}
-    geometry, dimensions = named(document, "finger", "geometry", designs(), mistakes)
-    design = design_of(geometry, dimensions, mistakes)
-    with_shape = {**document, "object": shaped(document.get("object", {}))}
-    shape, placed = named(with_shape, "object", "shape", OBJECTS, mistakes)
-    rigid = object_of(shape, placed, mistakes)
-    press = press_of(document, mistakes)
-    settings, effects, auto = effects_of(document, mistakes)
-    if mistakes or not (tables and dimensions and design and placed and rigid and press and auto):
-        return None
-    return _Parts(
-        tables=tables,
-        geometry=geometry,
-        dimensions=dimensions,
-        design=design,
-        shape=shape,
-        placed=placed,
-        object=rigid,
-        press=press,
-        settings=settings,
-        effects=effects,
-        auto=auto,
-    )
+    Raises
+    ------
+    Finger3dError
+        If the contact conditions cannot describe the object's motion into the finger.
+    """
+    domain = tables.model.domain
+    path = path_of([dict(leg) for leg in legs], design, obj, tables)
+    box = first_contact(design, obj, path, domain).contact_box
+    linear = not set(effects) - {"kinetic_friction"}
+    # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
+    quick = linear and tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in path)
+    return mesh_options(tables.mesh, design, domain, obj, box, quick)

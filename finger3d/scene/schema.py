@@ -6,7 +6,7 @@ keys, such as a depth below the finger's height, are checked when the scene is l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from finger3d._types import Tree
@@ -44,16 +44,27 @@ def schema() -> Tree:
     """
     root = _of(SceneTable)
     keys = root["properties"]
-    keys["finger"] = _one_of("what is pressed", [*map(_design, designs().items()), *_files()])
-    shapes = [_named("shape", name, table_of(record), record) for name, record in OBJECTS.items()]
+    fingers = [_named("geometry", name, design) for name, design in designs().items()]
+    fingers += [_file("STEP or STL file", SUFFIXES, FileTable), _file("mesh file", MESH_SUFFIXES, MeshFileTable)]
+    shapes = [_named("shape", name, record) for name, record in OBJECTS.items()]
     plane = next(shape for shape in shapes if shape["properties"]["shape"]["const"] == "plane")
     plane["required"].remove("shape")  # [object] without a shape is a plane
-    keys["object"] = _one_of("what the finger is pressed on; without it a rigid plane", shapes)
-    keys["press"] = _one_of("the motion of the object", [_press(), _legs()])
-    keys["material"] |= _one_modulus()
-    effects = _of(AutoTable)["properties"] | {
-        name: {"oneOf": [{"type": "boolean"}, _documented(effect_type(name))]} for name in effect_names()
-    }
+    depth_or_force = {"oneOf": [{"required": ["depth_mm"]}, {"required": ["force_N"]}]}
+    press, legs = _of(PressTable, LegTable) | {"title": "one press"} | depth_or_force, _of(LegsTable)
+    leg = {"items": _of(LegTable) | depth_or_force, "description": "targets, each reached from the one before"}
+    legs["properties"]["leg"] |= leg
+    for key, description, choices in (
+        ("finger", "what is pressed", fingers),
+        ("object", "what the finger is pressed on; without it a rigid plane", shapes),
+        ("press", "the motion of the object", [press, legs | {"title": "legs"}]),
+    ):
+        keys[key] = {"description": description, "type": "object", "oneOf": choices}
+    one_modulus = [{"required": [key]} for key in MODULUS_KEYS]
+    keys["material"] |= {"oneOf": one_modulus, "dependentRequired": {"E_MPa": ["nu"]}}
+    effects = _of(AutoTable)["properties"]
+    for name in effect_names():
+        effect = effect_type(name)
+        effects[name] = {"oneOf": [{"type": "boolean"}, _of(table_of(effect), effect)]}
     keys["effects"] = {"type": "object", "additionalProperties": False, "properties": effects}
     root["oneOf"] = [{"required": ["press"]}, {"required": ["grip"]}]
     for name, description in descriptions(SceneTable).items():
@@ -61,61 +72,22 @@ def schema() -> Tree:
     return {"$schema": DIALECT, "title": "A scene of finger3d"} | root
 
 
-def _one_of(description: str, choices: list[Tree]) -> Tree:
-    return {"description": description, "type": "object", "oneOf": choices}
-
-
-def _design(item: tuple[str, type]) -> Tree:
-    name, design = item
-    return _named("geometry", name, table_of(design), design)
-
-
-def _named(key: str, name: str, table: type[TomlTable], documented: type) -> Tree:
-    """Return the schema of a table whose `key` must be `name`."""
-    table_schema = _of(table, documented)
+def _named(key: str, name: str, record: type) -> Tree:
+    """Return the schema of the table of a design or an object, whose `key` must be `name`."""
+    table_schema = _of(table_of(record), record)
     table_schema["title"] = name
     table_schema["properties"] = {key: {"const": name}} | table_schema["properties"]
     table_schema["required"] = [key, *table_schema["required"]]
     return table_schema
 
 
-def _files() -> list[Tree]:
-    kinds = (("STEP or STL file", SUFFIXES, FileTable), ("mesh file", MESH_SUFFIXES, MeshFileTable))
-    return [_file(title, suffixes, _of(table)) for title, suffixes, table in kinds]
-
-
-def _file(title: str, suffixes: Sequence[str], table: Tree) -> Tree:
-    names = _any_case("|".join(suffix.removeprefix(".") for suffix in suffixes))
-    path = {"type": "string", "pattern": rf"\.({names})$", "description": "path from the scene's folder"}
-    return table | {"title": title, "properties": {"geometry": path} | table["properties"], "required": ["geometry"]}
-
-
-def _any_case(text: str) -> str:
-    """Return a regular expression that matches a text in capitals too; JSON Schema has no flag for it."""
-    return "".join(f"[{c}{c.upper()}]" if c.isalpha() else c for c in text)
-
-
-def _one_modulus() -> Tree:
-    return {"oneOf": [{"required": [key]} for key in MODULUS_KEYS], "dependentRequired": {"E_MPa": ["nu"]}}
-
-
-def _press() -> Tree:
-    return _of(PressTable, LegTable) | {"title": "one press", **_depth_or_force()}
-
-
-def _legs() -> Tree:
-    table_schema = _of(LegsTable)
-    leg = _of(LegTable) | _depth_or_force()
-    table_schema["properties"]["leg"] |= {"items": leg, "description": "targets, each reached from the one before"}
-    return table_schema | {"title": "legs"}
-
-
-def _depth_or_force() -> Tree:
-    return {"oneOf": [{"required": ["depth_mm"]}, {"required": ["force_N"]}]}
-
-
-def _documented(record: type) -> Tree:
-    return _of(table_of(record), record)
+def _file(title: str, suffixes: Sequence[str], table: type[TomlTable]) -> Tree:
+    """Return the schema of [finger] with a file; JSON Schema has no flag for endings in capitals."""
+    either_case = ("".join(f"[{c}{c.upper()}]" if c.isalpha() else c for c in s.removeprefix(".")) for s in suffixes)
+    pattern = rf"\.({'|'.join(either_case)})$"
+    path = {"type": "string", "pattern": pattern, "description": "path from the scene's folder"}
+    own = _of(table)
+    return own | {"title": title, "properties": {"geometry": path} | own["properties"], "required": ["geometry"]}
 
 
 def _of(table: type[TomlTable], documented: type | None = None) -> Tree:
@@ -155,16 +127,8 @@ def _tidy(node: Any, definitions: Tree) -> Any:
             continue
         else:
             out[key] = _tidy(value, definitions)
-    return _without_null(out)
-
-
-def _without_null(node: Tree) -> Tree:
-    choices = [choice for choice in _list(node.get("anyOf")) if choice != {"type": "null"}]
-    rest = {key: value for key, value in node.items() if key != "anyOf"}
-    if len(choices) == 1:
-        return choices[0] | rest
-    return rest | {"anyOf": choices} if choices else rest
-
-
-def _list(value: object) -> Iterable[Tree]:
-    return value if isinstance(value, list) else ()
+    choices = out.get("anyOf")
+    if not isinstance(choices, list):
+        return out
+    choices = [choice for choice in out.pop("anyOf") if choice != {"type": "null"}]
+    return choices[0] | out if len(choices) == 1 else out | {"anyOf": choices}

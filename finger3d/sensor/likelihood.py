@@ -223,17 +223,13 @@ class Estimator:
         """Return the likelihood on the grid, or on a finer one around a peak that the grid does not resolve."""
         mu = self.model.grid
         for _ in range(_ZOOMS):
-            likelihood = self._on(mu, reading)
+            nominal, errors = self._on_grid if mu is self.model.grid else self._at(mu)
+            likelihood = _Likelihood.of(mu, reading - nominal, errors)
             good = np.flatnonzero(likelihood.density >= _NEGLIGIBLE)
             if len(good) >= _ENOUGH:
                 break
             mu = np.linspace(mu[max(good[0] - 1, 0)], mu[min(good[-1] + 1, len(mu) - 1)], _NODES)
         return likelihood
-
-    def _on(self, mu: Float, reading: Float) -> _Likelihood:
-        """Return the likelihood at mu (m,)."""
-        nominal, errors = self._on_grid if mu is self.model.grid else self._at(mu)
-        return _Likelihood.of(mu, reading - nominal, errors)
 
     def _status(self, likelihood: _Likelihood, p_value: float, intervals: int) -> Status:
         mu = self.model.mu

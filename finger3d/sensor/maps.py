@@ -140,10 +140,8 @@ class StrainMap:
 
     def slope_at(self, angle: float, mu: float) -> Float:
         """d strain / d mu (ny, nx) along a direction in the interval that holds mu."""
-        return np.asarray(self.slope(angle)[self._interval(mu)])
-
-    def _interval(self, mu: float) -> int:
-        return int(np.clip(np.searchsorted(self.mu, mu, side="right") - 1, 0, len(self.mu) - 2))
+        interval = np.clip(np.searchsorted(self.mu, mu, side="right") - 1, 0, len(self.mu) - 2)
+        return np.asarray(self.slope(angle)[interval])
 
     def worst_slope(self, angle: float, low: float = -math.inf, high: float = math.inf) -> Float:
         """Return the smallest |d strain / d mu| (ny, nx) over mu from `low` to `high`; 0 where it changes its sign."""

@@ -97,7 +97,10 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
         finite=finite,
         plane_stress=model.domain == "plane-stress",
         thickness_mm=thickness,
-        remarks=tuple(_ascii(line) for line in (*_head(title, axes, multiple), *_remarks(model))),
+        remarks=tuple(
+            line.encode("ascii", errors="replace").decode()
+            for line in (*_head(title, axes, multiple), *_remarks(model))
+        ),
         fields=True,
     )
     return PressDeck(deck, mesh_report, multiple, _remarks(model))
@@ -182,7 +185,3 @@ def _remarks(model: Model) -> tuple[str, ...]:
             f'steps = "auto": {AUTO_START} increments for each leg; CalculiX does not choose them by their error'
         )
     return tuple(lines)
-
-
-def _ascii(text: str) -> str:
-    return text.encode("ascii", errors="replace").decode()

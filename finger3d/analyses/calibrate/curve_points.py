@@ -35,6 +35,11 @@ class CurvePoints:
     factorizations_before: int = 0
 
     @property
+    def mu(self) -> Float:
+        """Mu (n,) of the presses that converged."""
+        return np.array(list(self.frames))
+
+    @property
     def frames(self) -> dict[float, StepResult]:
         """Last increment of every press that converged, by mu."""
         return {p.mu: p.frame for p in self.presses if p.frame.outcome.ok}

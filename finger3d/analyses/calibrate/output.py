@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from finger3d._types import Tree
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.io import atomic, write_csv
+from finger3d.io import write_csv, write_text
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.gauges import Gauge
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 def write_scene(folder: Path, scene: Scene) -> None:
     """Write scene.toml."""
-    with atomic(folder / "scene.toml") as path:
-        path.write_text(scene.to_toml(), encoding="utf-8")
+    write_text(folder / "scene.toml", scene.to_toml())
 
 
 def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings) -> None:

@@ -3,61 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from finger3d._types import Float, Int
-from finger3d.analyses.pressed_body import PressesByMu, presses
+from finger3d._types import Float
+from finger3d.analyses.pressed_body import presses
 from finger3d.mechanics.discretise.companions import built_like
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult
-
-
-@dataclass(frozen=True)
-class ReferenceReadings:
-    """Readings of the nominal body.
-
-    Attributes
-    ----------
-    mu : (n,) array
-    readings : (n,) by name
-    sample : (m,) array
-        Indices of the values of mu at which other bodies and paths are pressed.
-    frame : the last increment of any press
-    pressed : presses by mu
-    """
-
-    mu: Float
-    readings: Mapping[str, Float]
-    sample: Int
-    frame: StepResult
-    pressed: PressesByMu
 
 
 @dataclass(frozen=True)
 class ReferenceBody:
-    """Body that others are compared with: readings (k, m) by names (k) at mu (m,), and its presses by mu."""
+    """Body that others are compared with: readings (k, m) by names (k) at mu (m,)."""
 
     problem: Problem
     names: tuple[str, ...]
     mu: Float
     readings: Float
-    pressed: PressesByMu
 
     @classmethod
     def of(cls, problem: Problem, names: tuple[str, ...], mu: Float) -> ReferenceBody:
         """Press a problem at mu (m,)."""
-        pressed = {p.mu: p for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)}
-        return cls(problem, names, mu, _readings([p.frame for p in pressed.values()], names), pressed)
+        return cls(problem, names, mu, read(problem, names, mu))
 
-    def change(self, problem: Problem, initial: PressesByMu | None = None) -> Float:
-        """Return the changes (k, m) of the readings in another body or path; `initial` has the initial guesses."""
-        return np.asarray(read(problem, self.names, self.mu, initial or self.pressed) - self.readings)
+    def change(self, problem: Problem) -> Float:
+        """Return the changes (k, m) of the readings in another body or path."""
+        return np.asarray(read(problem, self.names, self.mu) - self.readings)
 
     def rebuilt(self, margin: float = MARGIN, **changes: Any) -> Problem:
         """Build the body with a changed model; other readings are omitted, except gauges that stiffen the body."""
@@ -77,11 +53,8 @@ def reading_only(model: Model, names: Sequence[str]) -> Model:
     )
 
 
-def read(problem: Problem, names: Sequence[str], mu: Float, initial: PressesByMu | None = None) -> Float:
+def read(problem: Problem, names: Sequence[str], mu: Float) -> Float:
     """Return readings (k, m) by names (k) at mu (m,), NaN where a press failed."""
-    return _readings([p.frame for p in sorted(presses(problem, mu.tolist(), initial), key=lambda p: p.mu)], names)
-
-
-def _readings(frames: Sequence[StepResult], names: Sequence[str]) -> Float:
+    frames = [p.frame for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)]
     every = [frame.named_readings if frame.outcome.ok else {} for frame in frames]
     return np.array([[one.get(name, math.nan) for one in every] for name in names])

@@ -5,19 +5,19 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d._machine import versions
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.increments import choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
 from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
-from finger3d.analyses.calibrate.reference import ReferenceReadings, read
+from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
 from finger3d.analyses.pressed_body import PressedBody, presses, under
@@ -46,8 +46,6 @@ _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz
 
 _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 """Keys of [mesh] with which a scene chooses its own mesh."""
-
-_SLOPES = {True: 7, False: 3}  # values of mu at which tolerances are evaluated, in small and finite strain
 
 
 def calibrate(
@@ -104,9 +102,7 @@ def calibrate(
         if not settings.only_gauge:
             raise Finger3dError("--map: maps the strain of one gauge; give a single --gauge")
         check(model)
-    if out is None:
-        return _calibrate_scene(scene, model, settings, None, report)
-    with claimed(out, "calibrate") as folder:
+    with nullcontext() if out is None else claimed(out, "calibrate") as folder:
         return _calibrate_scene(scene, model, settings, folder, report)
 
 
@@ -116,7 +112,9 @@ def _calibrate_scene(
     """Press every mu, apply the tolerances, and write the results."""
     start = time.perf_counter()
     if folder:
-        _prepare(folder, scene)
+        for name in _FILES:
+            (folder / name).unlink(missing_ok=True)
+        write_scene(folder, scene)
 
     def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration]:
         curve = _press_all(changed, settings, report, folder)
@@ -157,13 +155,6 @@ def calibrated(
     settings = CalibrationSettings(readings, tuple(mus), limit, with_defaults(tolerances))
     curve = _press_all(model, settings, report)
     return _calibration(curve, settings, report), curve
-
-
-def _prepare(folder: Path, scene: Scene) -> None:
-    """Remove the results of an earlier calibration, and write scene.toml."""
-    for name in _FILES:
-        (folder / name).unlink(missing_ok=True)
-    write_scene(folder, scene)
 
 
 def _press_all(
@@ -220,39 +211,20 @@ def _curve_points(problem: Problem, settings: CalibrationSettings, report: Progr
 def _calibration(curve: CurvePoints, settings: CalibrationSettings, report: Progress) -> Calibration:
     """Return the calibration of all readings with the effect of every tolerance; too few points are an error."""
     start = time.perf_counter()
-    mu = np.array(list(curve.frames))
     curves = tuple(
-        ReadingCurve(reading.name, mu, curve.reading(reading.name), reading.noise, kind=reading.kind)
+        ReadingCurve(reading.name, curve.mu, curve.reading(reading.name), reading.noise, kind=reading.kind)
         for reading in settings.readings
     )
     bare = Calibration(curves, settings.limit, tuple(sorted(curve.failed.items())))
     found: dict[str, list[Tolerance]] = {name: [] for name in settings.names}
-    if settings.tolerances:
-        frames = list(curve.frames.values())
-        base = ReferenceReadings(
-            mu=mu,
-            readings={name: curve.reading(name) for name in frames[0].named_readings},
-            sample=_sample(curve.problem, len(mu)),
-            frame=frames[-1],
-            pressed={p.mu: p for p in curve.presses if p.frame.outcome.ok},
-        )
-        every = evaluate_tolerances(
-            curve.problem, settings.readings, settings.tolerances, base, curve.increments, report
-        )
-        for name, tolerance in every:
-            found[name].append(tolerance)
+    for name, tolerance in evaluate_tolerances(curve, settings, report) if settings.tolerances else ():
+        found[name].append(tolerance)
     seconds = {**curve.seconds, "tolerances": time.perf_counter() - start}
     return replace(
         bare,
         readings=tuple(replace(one, tolerances=tuple(found[one.name])) for one in curves),
         about={"seconds": seconds},
     )
-
-
-def _sample(problem: Problem, count: int) -> NDArray[np.int64]:
-    """Return the indices, among `count` values of mu, of those at which tolerances are applied."""
-    wanted = _SLOPES[not problem.model.finite_strain]
-    return np.unique(np.linspace(0, count - 1, wanted).round().astype(int))
 
 
 def _about(scene: Scene, curve: CurvePoints) -> dict[str, object]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
@@ -21,20 +22,19 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float
 from finger3d.accuracy.richardson import gain
-from finger3d.analyses.calibrate.increments import Increments, error_of_increments
-from finger3d.analyses.calibrate.reference import ReferenceBody, ReferenceReadings, read
-from finger3d.analyses.calibrate.settings import CalibratedReading
+from finger3d.analyses.calibrate.curve_points import CurvePoints
+from finger3d.analyses.calibrate.increments import error_of_increments
+from finger3d.analyses.calibrate.reference import ReferenceBody, read
+from finger3d.analyses.calibrate.settings import CalibratedReading, CalibrationSettings
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
-from finger3d.analyses.pressed_body import PressesByMu, under
+from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
-from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import with_few_increments
-from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.path import targets
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import Column
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.quantities import Quantity
@@ -54,6 +54,9 @@ _NODE = math.sqrt(3.0)
 """Step of a difference over the standard deviation: a node of Gauss-Hermite quadrature of three points, with which a
 parabola has the mean and variance of the reading to fourth order, and contact points that close one by one matter
 little."""
+
+_SAMPLES = {False: 7, True: 3}
+"""Values of mu at which tolerances are evaluated, in small and at finite strain."""
 
 _CLEAR_MM = 1e-6
 """Distance from the border at which a displaced gauge is certainly in the mesh."""
@@ -130,42 +133,37 @@ def _depth_inside(model: Model, gauge: Gauge) -> float:
 
 
 def evaluate_tolerances(
-    problem: Problem,
-    readings: Sequence[CalibratedReading],
-    tolerances: Mapping[str, float],
-    base: ReferenceReadings,
-    increments: Increments,
-    report: Progress,
+    curve: CurvePoints, settings: CalibrationSettings, report: Progress
 ) -> Iterator[tuple[str, Tolerance]]:
-    """Yield the name of a reading and a tolerance, with its effect at all values of mu of `base`.
+    """Yield the name of a reading and a tolerance, with its effect at all values of mu of the presses.
 
     Parameters
     ----------
-    problem : the condensed body
-    readings : the calibrated ones
-    tolerances : standard deviations by name
-    base : readings of the nominal body; without inclusions they include those of displaced gauges
-    increments : of its path
+    curve : presses of the nominal body; without inclusions its readings include those of displaced gauges
+    settings : the calibrated readings, and standard deviations by name
     report : receives the messages
 
     Notes
     -----
     A tolerance is left out if the presses that it needs fail.
     """
-    names = tuple(r.name for r in readings)
-    mu = base.mu[base.sample]
-    own = np.array([base.readings[name][base.sample] for name in names])
+    problem, increments, tolerances = curve.problem, curve.increments, settings.tolerances
+    readings, names = settings.readings, settings.names
+    sample = np.linspace(0, len(curve.mu) - 1, _SAMPLES[problem.model.finite_strain]).round().astype(int)
+    sample = np.unique(sample)
+    mu, own = curve.mu[sample], np.array([curve.reading(name)[sample] for name in names])
     if increments.chosen and max(int(leg.steps) for leg in problem.model.legs) > _FEW:
         report.stage(f"{_FEW} increments")
         body = ReferenceBody.of(with_few_increments(problem, _FEW), names, mu)
     else:
-        body = ReferenceBody(problem, names, mu, own, base.pressed)
+        body = ReferenceBody(problem, names, mu, own)
     others = set(tolerances) - {*GAUGE_PLACES.values(), "increments"}
     coarse_suffices = len(problem.points.nodes) >= 2 ** (problem.dim - 1) * _LEAST_POINTS[problem.dim]
     coarse = None
     if "mesh" in tolerances or (coarse_suffices and others):
         report.stage("a coarser body")
-        coarse = _on_coarser_mesh(body, report)
+        with suppress(Finger3dError):  # where there is no coarser mesh
+            coarse = ReferenceBody.of(companion(body.problem, report), names, mu)
     varied = coarse if coarse and coarse_suffices else body
     for name, sd in tolerances.items():
         report.stage(f"tolerance {name}")
@@ -176,11 +174,11 @@ def evaluate_tolerances(
             error = error_of_increments(problem, own, increments.chosen, lambda other: read(other, names, mu))
             effects = [(sd, sd * error)]
         elif name in GAUGE_PLACES.values() and not problem.model.inclusions:
-            known = base.mu
-            effects = _effects_of_displaced_gauges(problem.model, readings, name, sd, base)
+            known = curve.mu
+            effects = _effects_of_displaced_gauges(curve, readings, name, sd)
         else:
             effects = list(_VARIATIONS[name](varied, readings, sd))
-        yield from _tolerances(readings, name, sd, effects, known, base.mu)
+        yield from _tolerances(readings, name, sd, effects, known, curve.mu)
 
 
 def _tolerances(
@@ -214,17 +212,17 @@ def _interpolated(mu: Float, known: Float, values: Float) -> Float:
 
 
 def _effects_of_displaced_gauges(
-    model: Model, readings: Sequence[CalibratedReading], name: str, sd: float, base: ReferenceReadings
+    curve: CurvePoints, readings: Sequence[CalibratedReading], name: str, sd: float
 ) -> list[Effect]:
     """Return the effects of displaced gauges, read in the presses of the nominal ones; NaN where one leaves the body.
 
     Only gauges have a tolerance of place: a camera sees where a marker is at rest.
     """
-    found: dict[float, Float] = {}
+    model, found = curve.problem.model, dict[float, Float]()
     for i, gauge in _gauges(model, readings):
         for d in displaced_gauges(model, gauge, {name: sd}):
-            change = found.setdefault(d.step, np.full((len(readings), len(base.mu)), math.nan))
-            change[i] = base.readings[d.gauge.name] - base.readings[gauge.name]
+            change = found.setdefault(d.step, np.full((len(readings), len(curve.mu)), math.nan))
+            change[i] = curve.reading(d.gauge.name) - curve.reading(gauge.name)
     return list(found.items())
 
 
@@ -239,8 +237,7 @@ def _vary_depth(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: 
     problem, model = body.problem, body.problem.model
     shallowest, node = min(leg.depth_mm for leg in model.legs if leg.depth_mm > 0.0), _NODE * sd
     for step in (node, -min(node, 0.5 * shallowest)):
-        legs = deeper(model.legs, step)
-        yield step, body.change(under(problem, legs=legs), _scaled_to_path(body, legs))
+        yield step, body.change(under(problem, legs=deeper(model.legs, step)))
 
 
 def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
@@ -305,28 +302,6 @@ _VARIATIONS: dict[str, Callable[[ReferenceBody, Sequence[CalibratedReading], flo
     **{name: partial(_vary_stiff_gauge, name) for name in GAUGE_PLACES.values()},
 }
 """By tolerance, the function that yields its effects on a reference body for one standard deviation."""
-
-
-def _scaled_to_path(body: ReferenceBody, legs: tuple[Leg, ...]) -> PressesByMu:
-    """Return the presses of a body with forces extrapolated to the depths of another path, as initial guesses."""
-    own = [t.depth_mm for t in targets(body.problem.model.legs)]
-    strides = np.diff([0.0, *own])
-    change = np.subtract([t.depth_mm for t in targets(legs)], own)
-    share = np.divide(change, strides, out=np.zeros(len(own)), where=strides != 0.0)
-
-    def extrapolated(forces: tuple[Float, ...]) -> tuple[Float, ...]:
-        before = (np.zeros_like(forces[0]), *forces)
-        return tuple(f + s * (f - last) for f, last, s in zip(forces, before, share, strict=False))
-
-    return {mu: replace(press, forces=extrapolated(press.forces)) for mu, press in body.pressed.items()}
-
-
-def _on_coarser_mesh(body: ReferenceBody, report: Progress) -> ReferenceBody | None:
-    """Return the body on the coarser mesh that the error bar comes from; None if there is no coarser mesh."""
-    try:
-        return ReferenceBody.of(companion(body.problem, report), body.names, body.mu)
-    except Finger3dError:
-        return None
 
 
 def _mesh_errors(body: ReferenceBody, coarse: ReferenceBody, readings: Sequence[CalibratedReading]) -> Float:

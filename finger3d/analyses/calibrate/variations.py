@@ -33,9 +33,7 @@ def poisson_steps(nu: float, step: float) -> tuple[float, float]:
 
 def with_modulus(problem: Problem, factor: float) -> Problem:
     """Return the problem with Young's moduli of all parts multiplied."""
-    model = problem.model
-    parts = tuple((label, times_modulus(material, factor)) for label, material in model.parts)
-    return changed(problem, replace(model, material=times_modulus(model.material, factor), parts=parts))
+    return changed(problem, times_modulus(problem.model, factor))
 
 
 def tilted_mesh(problem: Problem) -> MeshOptions:

@@ -14,8 +14,7 @@ from finger3d.fem.mesh.simplex import CONTACT
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.discretise.contact_points import ContactPoints
-from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.step_halving import StepEstimate, march_automatic
+from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.readings.columns import by_key, in_space, of_kind
 from finger3d.mechanics.results.history import StepResult, contact_table, measure
@@ -56,27 +55,25 @@ def widened(model: Model, width_mm: float) -> Model:
 def press_with_errors(name: str, model: Model) -> Case:
     """Press the model and estimate its errors; see `finger3d.accuracy.estimate.estimate`."""
     start = time.perf_counter()
-    problem, steps, chosen, case = _pressed(name, model)
-    if case.ok:
-        found = estimate(problem, steps, numbers=lambda p, f: quantities(p.points, f), chosen=chosen)
-        case = replace(
-            case, errors=found.totals(), companion=found.companion_numbers, ratio=found.ratio, method=found.method
-        )
-    return replace(case, seconds=time.perf_counter() - start)
-
-
-def _pressed(name: str, model: Model) -> tuple[Problem, tuple[StepResult, ...], StepEstimate | None, Case]:
-    start = time.perf_counter()
     # The whole contact face is a candidate, because the extent of contact differs from model to model.
     problem = build(model, margin=math.inf)
     steps, chosen = march_automatic(problem)
-    step = steps[-1]
+    step, points = steps[-1], problem.points
     mesher = "swept" if problem.dim == 2 else model.mesh.mesher
     case = Case(name, model.design.width_mm, model.mesh.size_mm, mesher, step.outcome)
-    if step.outcome.ok:
-        numbers, lines = quantities(problem.points, step), lines_along_x(problem.points, step)
-        case = replace(case, numbers=numbers, lines=lines, strains=of_kind(step.readings, "gauge"))
-    return problem, steps, chosen, replace(case, seconds=time.perf_counter() - start)
+    if case.ok:
+        found = estimate(problem, steps, numbers=lambda p, f: quantities(p.points, f), chosen=chosen)
+        case = replace(
+            case,
+            numbers=quantities(points, step),
+            lines=lines_along_x(points, step),
+            strains=of_kind(step.readings, "gauge"),
+            errors=found.totals(),
+            companion=found.companion_numbers,
+            ratio=found.ratio,
+            method=found.method,
+        )
+    return replace(case, seconds=time.perf_counter() - start)
 
 
 def quantities(points: ContactPoints, step: StepResult) -> dict[str, float]:

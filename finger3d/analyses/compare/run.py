@@ -16,7 +16,7 @@ from finger3d.analyses.compare.cases import press_with_errors, section_of, widen
 from finger3d.analyses.compare.verdict import WITHIN, Deviation, crossing_width, deviations, numbers_table, verdict
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.geometry.design import lacks_section
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.model import Model
 from finger3d.objects import PlacedObject
 from finger3d.progress import Progress
@@ -116,8 +116,7 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
     """Solve every case and write all of them after each, so that an interruption loses none."""
     for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
-    with atomic(folder / "scene.toml") as path:
-        path.write_text(solid.to_toml(), encoding="utf-8")
+    write_text(folder / "scene.toml", solid.to_toml())
     variants = list(_variants(model, widths))
     report.steps_total = len(variants)
     cases: list[Case] = []

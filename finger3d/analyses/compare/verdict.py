@@ -154,14 +154,11 @@ def deviations(model: str, cases: Sequence[Case]) -> list[Deviation]:
     """Return the deviations of a plane model from the solids of all widths, each on the same in-plane mesh."""
     found = []
     for solid in cases:
-        plane = next((c for c in cases if c.ok and c.model == model and _matches(c, solid)), None)
+        mesh = model, solid.width_mm, solid.size_mm
+        plane = next((c for c in cases if c.ok and (c.model, c.width_mm, c.size_mm) == mesh), None)
         if solid.ok and solid.model == "solid" and plane is not None:
             found.append(force_deviation(plane, solid))
     return sorted(found, key=lambda d: d.width_mm)
-
-
-def _matches(plane: Case, solid: Case) -> bool:
-    return plane.width_mm == solid.width_mm and plane.size_mm == solid.size_mm
 
 
 def _width_within(name: str, cases: Sequence[Case]) -> str:

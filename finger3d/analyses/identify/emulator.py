@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import RBFInterpolator
 
 from finger3d._types import Float
+from finger3d.analyses.free_keys import FreeKey, values_at
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress
-from finger3d.analyses.identify.scale import Scale, values_at
 from finger3d.analyses.identify.simulated import MODULI, OFFSET, Simulation
 from finger3d.errors import Finger3dError
 
@@ -45,26 +45,26 @@ class Emulator:
     _presses: dict[tuple[float, ...], Float] = field(default_factory=dict)
     _failures: dict[tuple[float, ...], Finger3dError] = field(default_factory=dict)
 
-    @cached_property
-    def scales(self) -> list[Scale]:
-        """Scales of the free keys."""
-        return [Scale.of(f) for f in self.simulation.free]
+    @property
+    def free(self) -> tuple[FreeKey, ...]:
+        """The free keys."""
+        return self.simulation.free
 
     @cached_property
     def pressed(self) -> list[int]:
         """Numbers of the shares whose change needs a press."""
-        return [i for i, f in enumerate(self.simulation.free) if f.key != OFFSET and i not in self._modulus]
+        return [i for i, f in enumerate(self.free) if f.key != OFFSET and i not in self._modulus]
 
     @cached_property
     def _modulus(self) -> list[int]:
         """Number of the share of Young's modulus, if all stresses are proportional to it."""
         if not self.simulation.scales_with_modulus:
             return []
-        return [i for i, f in enumerate(self.simulation.free) if f.key in MODULI]
+        return [i for i, f in enumerate(self.free) if f.key in MODULI]
 
     @cached_property
     def _offset(self) -> list[int]:
-        return [i for i, f in enumerate(self.simulation.free) if f.key == OFFSET]
+        return [i for i, f in enumerate(self.free) if f.key == OFFSET]
 
     @cached_property
     def _size(self) -> Float:
@@ -77,7 +77,7 @@ class Emulator:
         d = len(self.pressed)
         corners = [np.array(corner) for corner in itertools.product((0.0, 1.0), repeat=d)]
         middles = [np.full(d, 0.5) + sign * face for face in 0.5 * np.eye(d) for sign in (-1.0, 1.0)]
-        found = [np.full(len(self.scales), 0.5) for _ in range(1 if d == 0 else 1 + len(corners) + len(middles))]
+        found = [np.full(len(self.free), 0.5) for _ in range(1 if d == 0 else 1 + len(corners) + len(middles))]
         for shares, point in zip(found[1:], [*corners, *middles], strict=False):
             shares[self.pressed] = point
         return found
@@ -86,12 +86,12 @@ class Emulator:
         """Press at shares (k,)."""
         point = tuple(float(s) for s in shares[self.pressed])
         at = shares.copy()
-        at[self._modulus] = [self.scales[i].share(self.simulation.free[i].middle) for i in self._modulus]
+        at[self._modulus] = [self.free[i].share(self.free[i].middle) for i in self._modulus]
         rows = []
         try:
             for offset in _OFFSETS if self._offset else (0.0,):
                 at[self._offset] = offset
-                rows.append(np.concatenate([*self.simulation.at(values_at(self.scales, at), self.data).values()]))
+                rows.append(np.concatenate([*self.simulation.at(values_at(self.free, at), self.data).values()]))
         except Finger3dError as error:
             self._failures[point] = error
         else:
@@ -145,8 +145,8 @@ class Emulator:
             found = np.einsum("so,son->sn", weight, found)[:, None]
         found = found[:, 0]
         for i in self._modulus:
-            free, modulus = self.simulation.free[i], MODULI[self.simulation.free[i].key]
-            factor = [modulus(self.scales[i].value(float(share))) / modulus(free.middle) for share in shares[:, i]]
+            free, modulus = self.free[i], MODULI[self.free[i].key]
+            factor = [modulus(free.value(float(share))) / modulus(free.middle) for share in shares[:, i]]
             found = np.where(self._is_stress, np.array(factor)[:, None] * found, found)
         return np.asarray(found)
 
@@ -157,7 +157,7 @@ class Emulator:
     @cached_property
     def _is_stress(self) -> NDArray[np.bool_]:
         """Whether each of the numbers (n,) is proportional to the stresses."""
-        return np.repeat([self.simulation.is_stress(name) for name in self.data.columns], len(self.data.at))
+        return np.repeat([name in self.simulation.stresses for name in self.data.columns], len(self.data.at))
 
     def error(self, shares: Float) -> Float:
         """Return the error (s, n) at shares (s, k): half of the difference to another interpolation."""
@@ -168,7 +168,7 @@ class Emulator:
 
 def ends(emulator: Emulator, designed: Sequence[Float]) -> list[Float]:
     """Return designed shares, and those with the least and the largest of all that need no press."""
-    still = [i for i in range(len(emulator.scales)) if i not in emulator.pressed]
+    still = [i for i in range(len(emulator.free)) if i not in emulator.pressed]
     found = [*designed]
     for share in (0.0, 1.0):
         for one in designed:

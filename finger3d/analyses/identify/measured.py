@@ -87,21 +87,21 @@ class MeasuredPress:
                     "a strain that lengthens"
                 )
 
-    def check_units(self, smallest: Mapping[str, float], largest: Mapping[str, float]) -> None:
+    def check_units(self, magnitudes: Mapping[str, Sequence[float]]) -> None:
         """Raise an error for a column whose magnitude is far from that of the simulated ones.
 
         Parameters
         ----------
-        smallest, largest : by name, the largest magnitude of a column over the press, for the free keys at their bounds
+        magnitudes : by name, the largest of a column over the press, for each of the free keys at their bounds
         """
         for name, values in self.columns.items():
             row = int(np.argmax(np.abs(values)))
             found = abs(float(values[row]))
-            low, high = smallest[name] / _UNIT_RATIO, largest[name] * _UNIT_RATIO
-            if not low - SHARPEST <= found <= high + SHARPEST:
+            least, most = min(magnitudes[name]), max(magnitudes[name])
+            if not least / _UNIT_RATIO - SHARPEST <= found <= most * _UNIT_RATIO + SHARPEST:
                 raise Finger3dError(
                     f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
-                    f"{smallest[name]:.2g} to {largest[name]:.2g}; is the unit that of the name (strain is a plain "
+                    f"{least:.2g} to {most:.2g}; is the unit that of the name (strain is a plain "
                     "number, not percent), and the sensor the right one?"
                 )
 

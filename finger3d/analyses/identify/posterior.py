@@ -18,7 +18,7 @@ from scipy import optimize, special
 from scipy.stats import qmc
 
 from finger3d._types import Float
-from finger3d.analyses.identify.scale import Scale, values_at
+from finger3d.analyses.free_keys import FreeKey, values_at
 
 _EFFECTIVE = 0.5
 """Effective share of the samples that is left by a rise of the power."""
@@ -125,7 +125,7 @@ class FittedValues:
 
 
 def fitted_values(
-    scales: Sequence[Scale], shares: Float, samples: Samples, derivative: Float, errors: Float
+    free: Sequence[FreeKey], shares: Float, samples: Samples, derivative: Float, errors: Float
 ) -> FittedValues:
     """Return the values at shares (k,) with their uncertainty.
 
@@ -134,8 +134,8 @@ def fitted_values(
     derivative : (n, k) of the residuals, whose covariance is the identity, by shares
     errors : (n, n) part of the errors of the simulation in that covariance
     """
-    values = values_at(scales, shares)
-    sampled_values = np.array([values_at(scales, one) for one in samples.shares])
+    values = values_at(free, shares)
+    sampled_values = np.array([values_at(free, one) for one in samples.shares])
     stds = np.sqrt(np.mean((sampled_values - values) ** 2, axis=0))
     low, high = np.quantile(sampled_values, [_TAIL, 1.0 - _TAIL], axis=0)
     shift = np.linalg.pinv(derivative)
@@ -143,9 +143,9 @@ def fitted_values(
     numerical = stds * np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)
     about = samples.about(samples.shares.mean(axis=0))
     correlation = _correlation(samples.about(shares))
-    told = [*_untold(scales, about), *_correlated(scales, _correlation(about), about), *_bound(scales, shares)]
-    for number, scale in enumerate(scales):
-        told += _maxima(scale, samples, number)
+    told = [*_untold(free, about), *_correlated(free, _correlation(about), about), *_bound(free, shares)]
+    for number, key in enumerate(free):
+        told += _maxima(key, samples, number)
     low, high = np.minimum(low, values), np.maximum(high, values)
     return FittedValues(values, stds, low, high, correlation, shares, tuple(dict.fromkeys(told)), numerical)
 
@@ -155,14 +155,14 @@ def _correlation(covariance: Float) -> Float:
     return np.asarray(covariance / np.outer(sd, sd))
 
 
-def _untold(scales: Sequence[Scale], covariance: Float) -> list[str]:
+def _untold(free: Sequence[FreeKey], covariance: Float) -> list[str]:
     """Name the values, or combinations of them, that the data do not determine."""
     found = []
     values, vectors = np.linalg.eigh(covariance)
     for value, vector in zip(values, vectors.T, strict=True):
         if value >= _UNTOLD**2:
             parts = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) >= _PART]
-            names = [scales[i].key for i in parts]
+            names = [free[i].key for i in parts]
             if len(names) == 1:
                 found.append(f"the data cannot tell {names[0]} within its bounds")
             else:
@@ -172,24 +172,24 @@ def _untold(scales: Sequence[Scale], covariance: Float) -> list[str]:
     return found
 
 
-def _correlated(scales: Sequence[Scale], correlation: Float, covariance: Float) -> list[str]:
+def _correlated(free: Sequence[FreeKey], correlation: Float, covariance: Float) -> list[str]:
     """Name pairs of values that are known much better together than each alone."""
     if np.linalg.eigvalsh(covariance).max() >= _UNTOLD**2:
         return []
-    pairs = [(i, j) for i in range(len(scales)) for j in range(i) if abs(correlation[i, j]) > _STRONG]
+    pairs = [(i, j) for i in range(len(free)) for j in range(i) if abs(correlation[i, j]) > _STRONG]
     return [
-        f"{scales[j].key} and {scales[i].key} are correlated by {correlation[i, j]:.3f}: fix one, and the other is "
+        f"{free[j].key} and {free[i].key} are correlated by {correlation[i, j]:.3f}: fix one, and the other is "
         "known better"
         for i, j in pairs
     ]
 
 
-def _bound(scales: Sequence[Scale], shares: Float) -> list[str]:
-    ends = [(scale, share) for scale, share in zip(scales, shares, strict=True) if min(share, 1.0 - share) < _AT_BOUND]
-    return [f"{scale.key} is at its {'lower' if share < 0.5 else 'upper'} bound: widen it" for scale, share in ends]
+def _bound(free: Sequence[FreeKey], shares: Float) -> list[str]:
+    ends = [(key, share) for key, share in zip(free, shares, strict=True) if min(share, 1.0 - share) < _AT_BOUND]
+    return [f"{key.key} is at its {'lower' if share < 0.5 else 'upper'} bound: widen it" for key, share in ends]
 
 
-def _maxima(scale: Scale, samples: Samples, number: int) -> list[str]:
+def _maxima(key: FreeKey, samples: Samples, number: int) -> list[str]:
     """Say that several ranges of a value fit about as well."""
     share, beyond = samples.shares[:, number], 2.0 * (samples.log_likelihood.max() - samples.log_likelihood)
     edges = np.linspace(share.min(), share.max(), _BINS + 1)
@@ -205,6 +205,6 @@ def _maxima(scale: Scale, samples: Samples, number: int) -> list[str]:
         end for end, at in (("below", ranges[1][0] < _TO_BOUND), ("above", ranges[-1][1] > 1.0 - _TO_BOUND)) if at
     ]
     if len(reaches) == 1 and share.std() > _TO_BOUND:
-        return [f"the data do not bound {scale.key} from {reaches[0]}"]
-    texts = [f"{scale.value(a):.3g} to {scale.value(b):.3g}" for a, b in ranges[1:]]
-    return [f"{scale.key} = {' and '.join(texts)} fit about as well"] if len(texts) > 1 else []
+        return [f"the data do not bound {key.key} from {reaches[0]}"]
+    texts = [f"{key.value(a):.3g} to {key.value(b):.3g}" for a, b in ranges[1:]]
+    return [f"{key.key} = {' and '.join(texts)} fit about as well"] if len(texts) > 1 else []

@@ -14,24 +14,21 @@ from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
 from finger3d.analyses.identify.emulator import Emulator, ends
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
-from finger3d.analyses.identify.scale import values_at
 from finger3d.analyses.identify.simulated import (
     OFFSET,
     Curve,
     Simulation,
     check_rows,
     fitted_scene,
-    has_zones,
-    largest,
     moving_part,
     names_of,
 )
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
@@ -86,25 +83,19 @@ class Identification:
 
     def as_dict(self) -> Tree:
         """Return the content of identify.json."""
-        fitted = self.fitted
+        fitted, names = self.fitted, ("value", "std", "std_numerical", "low", "high")
+        rows = np.column_stack([fitted.values, fitted.stds, fitted.numerical, fitted.low, fitted.high]).tolist()
+        tables = zip(self.keys, rows, fitted.correlation.tolist(), strict=True)
+        values, correlation = {}, {}
+        for key, row, correlated in tables:
+            values[key] = dict(zip(names, row, strict=True))
+            correlation[key] = dict(zip(self.keys, correlated, strict=True))
         return {
             "scene": self.scene.as_dict(),
             "measured": str(self.measured.path),
             "index": self.measured.index,
-            "values": {
-                key: {
-                    "value": float(fitted.values[i]),
-                    "std": float(fitted.stds[i]),
-                    "std_numerical": float(fitted.numerical[i]),
-                    "low": float(fitted.low[i]),
-                    "high": float(fitted.high[i]),
-                }
-                for i, key in enumerate(self.keys)
-            },
-            "correlation": {
-                key: dict(zip(self.keys, map(float, fitted.correlation[i]), strict=True))
-                for i, key in enumerate(self.keys)
-            },
+            "values": values,
+            "correlation": correlation,
             "reduced_chi_square": self.reduced_chi_square,
             "residual_rms": {
                 name: float(np.sqrt(np.mean((values - self.simulated[name]) ** 2)))
@@ -174,7 +165,7 @@ def identify(
         claimed(out, "identify") as folder,
         opened(folder / "presses.jsonl", folder / "task.json", task) as journal,
     ):
-        simulation = Simulation(given, path, keys, journal, has_zones(data.columns), data)
+        simulation = Simulation(given, path, keys, journal, data)
         found = _fitted(simulation, data, start, report)
         _write(folder, found)
         return found
@@ -214,7 +205,7 @@ class _Misfit:
             n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
             for n, v in data.columns.items()
         }
-        shares = np.array([scale.share(v) for scale, v in zip(emulator.scales, start, strict=True)])
+        shares = np.array([key.share(v) for key, v in zip(emulator.free, start, strict=True)])
         return cls(emulator, shares, stds, np.eye(data.count))
 
     def with_errors(self, known: Mapping[str, Float]) -> _Misfit:
@@ -273,7 +264,7 @@ class _Misfit:
         for _ in range(rounds):
             samples = sampled(self.log_likelihood, len(self.start), _FEW)
             best = self.best(samples)
-            named = zip(simulation.free, values_at(emulator.scales, best), strict=True)
+            named = zip(simulation.free, values_at(emulator.free, best), strict=True)
             told = ", ".join(f"{free.key} = {value:.5g}" for free, value in named)
             report.stage(f"fitting, {simulation.solved} presses: {told}")
             unsure = np.sum(self.whitened(emulator.error(samples.shares)) ** 2, axis=1)
@@ -299,8 +290,14 @@ class _Misfit:
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
-        data = self.emulator.data
-        return replace(self, stds={**self.stds, **_by_residuals(data, self.emulator.columns(shares), len(shares))})
+        data, simulated, stds = self.emulator.data, self.emulator.columns(shares), {**self.stds}
+        left = 1.0 - min(len(shares) / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
+        for name, values in data.columns.items():
+            if name not in data.stds:
+                least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
+                std = max(_rms(values - simulated[name]) / math.sqrt(left), least)
+                stds[name] = np.full(len(values), std)
+        return replace(self, stds=stds)
 
 
 def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
@@ -315,7 +312,7 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     misfit = _Misfit.of(emulator, start)
     shares = misfit.explored(report, 2)
     report.stage("errors of mesh and increments")
-    known = simulation.errors(values_at(emulator.scales, shares), data)
+    known = simulation.errors(values_at(emulator.free, shares), data)
     misfit = misfit.with_errors(known)
     shares = misfit.explored(report)
     if set(data.stds) != set(data.columns):
@@ -325,13 +322,17 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     part, misfit = misfit.part_of_errors, misfit.as_far_as_it_fits(shares)
     samples = sampled(misfit.log_likelihood, len(start), _MANY)
     shares = misfit.best(samples)
-    fitted = fitted_values(emulator.scales, shares, samples, misfit.derivative(shares), part)
+    fitted = fitted_values(emulator.free, shares, samples, misfit.derivative(shares), part)
     values = fitted.values
     simulated = simulation.at(values, data)
     reduced = _reduced_chi_square(data, simulated, len(values))
     unknown = sorted(set(data.columns) - set(known))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
-    notes = [*fitted.untold, *missing, *([text] if reduced == reduced and (text := _misfit_text(reduced)) else [])]
+    notes, ratio = [*fitted.untold, *missing], math.sqrt(reduced)
+    if ratio > _MISFIT:
+        notes.append(
+            f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
+        )
     return Identification(
         scene=simulation.scene(values),
         keys=tuple(f.key for f in simulation.free),
@@ -351,30 +352,8 @@ def _check_columns(emulator: Emulator, tried: Sequence[Float]) -> None:
     good = [shares for shares in tried if not emulator.fails(shares[None])[0]]
     curves = [emulator.columns(shares) for shares in good]
     emulator.data.check_signs(curves)
-    magnitudes = [largest(curve) for curve in curves]
-    columns = emulator.data.columns
-    emulator.data.check_units(
-        {n: min(m[n] for m in magnitudes) for n in columns}, {n: max(m[n] for m in magnitudes) for n in columns}
-    )
-
-
-def _misfit_text(reduced: float) -> str:
-    """Say whether residuals are larger than their standard deviations, from the reduced chi-square."""
-    ratio = math.sqrt(reduced)
-    if ratio <= _MISFIT:
-        return ""
-    return f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
-
-
-def _by_residuals(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> dict[str, Float]:
-    """Return the standard deviations (n,) of columns that have none in the file, from their residuals."""
-    left = 1.0 - min(keys / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
-    found = {}
-    for name, values in data.columns.items():
-        if name not in data.stds:
-            least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
-            found[name] = np.full(len(values), max(_rms(values - simulated[name]) / math.sqrt(left), least))
-    return found
+    magnitudes = {n: [float(np.abs(curve[n]).max()) for curve in curves] for n in emulator.data.columns}
+    emulator.data.check_units(magnitudes)
 
 
 def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> float:
@@ -402,8 +381,7 @@ def _write(folder: Path, found: Identification) -> None:
             f"{name}_simulated": found.simulated[name],
         }
     write_csv(folder / "identify.csv", columns)
-    with atomic(folder / "identified.toml") as temporary:
-        temporary.write_text(found.scene.to_toml(), encoding="utf-8")
+    write_text(folder / "identified.toml", found.scene.to_toml())
     offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
     part = moving_part(found.curve[data.index], data)
     curve = {name: values[part] for name, values in found.curve.items()}

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -18,7 +18,7 @@ from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.analyses.free_keys import FreeKey, scene_with
 from finger3d.analyses.identify.measured import CLOCKS, SLIDES, MeasuredPress
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.pressed_body import PressedBody, kept, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
@@ -49,11 +49,6 @@ _SHORTEST = 1.0 / 30.0
 _LOAD, _SIZE = "normal_force_N", "contact_half_length_mm"
 """Numbers that say how strongly the finger is pressed, and how large the contact is."""
 
-_MAX_STORED = 4  # bodies, and presses
-
-Key = TypeVar("Key")
-Value = TypeVar("Value")
-
 Curve = Mapping[str, Float]
 """Columns of history.csv, a value for each increment."""
 
@@ -72,7 +67,6 @@ class Simulation:
     given : the scene as written, overrides included
     free : keys and bounds
     journal : the solutions that are known
-    with_zones : whether curves have lengths and areas of zones, which take most of the time of their numbers
     measured : the press at whose rows increments end; None for those of the scene
     """
 
@@ -80,7 +74,6 @@ class Simulation:
     path: Path | None
     free: tuple[FreeKey, ...]
     journal: Journal
-    with_zones: bool = True
     measured: MeasuredPress | None = None
     _known: dict[tuple[float, ...], Curve | str] = field(default_factory=dict)
     _bodies: dict[str, PressedBody] = field(default_factory=dict)
@@ -141,18 +134,14 @@ class Simulation:
         return self._scaled(self._unscaled(point), factor)
 
     @cached_property
-    def _stresses(self) -> set[str]:
+    def stresses(self) -> set[str]:
         """Names of the numbers that are proportional to the stresses."""
         columns = self.scene([f.middle for f in self.free]).model().columns
         return {name for name, one in quantities(columns).items() if one.is_stress}
 
-    def is_stress(self, name: str) -> bool:
-        """Return whether a number is proportional to the stresses."""
-        return name in self._stresses
-
     def _scaled(self, curve: Curve, factor: float) -> Curve:
         """Return a curve with stresses times a factor."""
-        return {name: factor * v if name in self._stresses else v for name, v in curve.items()}
+        return {name: factor * v if name in self.stresses else v for name, v in curve.items()}
 
     def _unscaled(self, point: tuple[float, ...]) -> Curve:
         """Return the curve of a press with the values that it is solved with."""
@@ -169,14 +158,10 @@ class Simulation:
         """Return the simulated values of every measured column at its rows, by monotone cubic interpolation."""
         point, factor = self._point(values)
         curve = self._unscaled(point)
-        offset = self._offset(values, measured)
+        offsets = [float(value) for free, value in zip(self.free, values, strict=True) if free.key == OFFSET]
+        offset = sum(offsets) if measured.index == "depth_mm" else 0.0
         _check_range(measured, offset, curve[measured.index])
         return dict(self._scaled(_at_rows(curve, measured, offset), factor))
-
-    def _offset(self, values: Sequence[float] | Float, measured: MeasuredPress) -> float:
-        """Return what is added to the measured depths, mm."""
-        offset = dict(zip((f.key for f in self.free), values, strict=True)).get(OFFSET, 0.0)
-        return float(offset) if measured.index == "depth_mm" else 0.0
 
     def errors(self, values: Float, measured: MeasuredPress) -> dict[str, Float]:
         """Return independent errors (m, n) of every measured column whose error at the end of the press is known.
@@ -206,11 +191,11 @@ class Simulation:
             model = scene.model()
             model = replace(model, legs=self._legs(model))
             key = json.dumps([body_key(scene), scene.as_dict()["press"], repr(model.gauges)])
-            body = _kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
+            body = kept(self._bodies, key, lambda: PressedBody(model, problem=self._in_same_mesh(model)))
             steps = body.steps(model.friction, model.rule)  # which may condense it again
             return under(body.problem, model.friction, rule=model.rule), steps
 
-        return _kept(self._presses, point, pressed)
+        return kept(self._presses, point, pressed)
 
     def _in_same_mesh(self, model: Model) -> Problem | None:
         """Return the condensed body of a model in the mesh of one that differs in materials and friction, if any."""
@@ -229,7 +214,9 @@ class Simulation:
         bad = next((f for f in frames if not f.outcome.ok), None)
         if bad is not None:
             return {"values": list(point), "outcome": bad.failure, "curve": {}}
-        columns = _curve_of(problem, frames, self.with_zones)
+        # lengths and areas of zones take most of the time of the numbers
+        with_zones = self.measured is None or has_zones(self.measured.columns)
+        columns = _curve_of(problem, frames, with_zones)
         return {"values": list(point), "outcome": "converged", "curve": {n: v.tolist() for n, v in columns.items()}}
 
     def _keep(self, row: Mapping[str, Any]) -> None:
@@ -238,20 +225,8 @@ class Simulation:
         if row["outcome"] == "converged":
             self._known[point] = {name: np.array(v, dtype=float) for name, v in row["curve"].items()}
         else:
-            self._known[point] = f"the press fails with {self._named(point)}: {row['outcome']}"
-
-    def _named(self, point: tuple[float, ...]) -> str:
-        return ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
-
-
-def _kept(store: dict[Key, Value], key: Key, made: Callable[[], Value]) -> Value:
-    """Return what is stored under a key; if nothing is, make and store it in place of the oldest."""
-    if key not in store:
-        found = made()
-        while len(store) >= _MAX_STORED:
-            store.pop(next(iter(store)))
-        store[key] = found
-    return store[key]
+            named = ", ".join(f"{f.key} = {v:.5g}" for f, v in zip(self.free, point, strict=True))
+            self._known[point] = f"the press fails with {named}: {row['outcome']}"
 
 
 def has_zones(columns: Iterable[str]) -> bool:
@@ -331,8 +306,3 @@ def _check_range(measured: MeasuredPress, offset: float, path: Float) -> None:
         f"{text}with {OFFSET} = {offset:g} it is {last + offset:g}, and the path of the scene ends at {end:g}; "
         f"free the offset up to {end - last:g} only, or raise press.depth_mm"
     )
-
-
-def largest(curve: Mapping[str, Float]) -> dict[str, float]:
-    """Return the largest magnitude of every column."""
-    return {name: float(np.abs(v).max(initial=0.0)) for name, v in curve.items()}

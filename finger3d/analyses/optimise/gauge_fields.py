@@ -28,6 +28,7 @@ from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects
 from finger3d.sensor.maps import Reader
+from finger3d.sensor.model import SHARED
 
 _STEPS, _STEPS_OF_SECTION = 20, 80
 """Number of increments of a leg with automatic increments; few suffice, as places are only compared.  In a section in
@@ -105,11 +106,10 @@ class GaugeFields:
         ends = body.ends(list(mus), legs)
         nominal = StrainField.of_frames(under(body.problem, legs=legs), ends, mus)
         problem, shared = nominal.problem, {}
-        for name, make in (("depth_mm", _depth), ("E_percent", _modulus), ("nu", _nu), ("tilt_deg", _tilt)):
+        for name in SHARED:
             if name in tolerances:
                 report.stage(f"tolerance {name}")
-                found = make(nominal, mus, tolerances[name])
-                if found is not None:
+                if (found := _effect(nominal, name, mus, tolerances[name])) is not None:
                     shared[name] = found
         coarse, ratio = None, 1.0
         if "mesh" in tolerances:
@@ -165,29 +165,27 @@ class GaugeFields:
 Effect = Callable[[Float, Float], Float]
 
 
-def _depth(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
-    """Press deeper by one standard deviation."""
-    problem = nominal.problem
-    legs = deeper(problem.model.legs, sd)
-    other = StrainField.of(under(problem, legs=legs), mus)
-    return lambda points, angles: other.strain(points, angles) - nominal.strain(points, angles)
+def _effect(nominal: StrainField, name: str, mus: Sequence[float], sd: float) -> Effect | None:
+    """Return the effect of a tolerance that all gauges share, None if it has none.
 
-
-def _modulus(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect | None:
-    """Raise Young's modulus; where all forces are proportional to it no strain changes."""
-    if nominal.problem.model.forces_scale_with_modulus:
+    The press goes deeper, and the modulus or Poisson's ratio is raised; where all forces are proportional to the
+    modulus, no strain depends on it.
+    """
+    problem, model, sign = nominal.problem, nominal.problem.model, 1.0
+    if name == "tilt_deg":
+        return _tilt(nominal, mus, sd)
+    if name == "depth_mm":
+        changed = under(problem, legs=deeper(model.legs, sd))
+    elif name == "nu":
+        material = model.material.isotropic("the tolerance of nu")
+        step, _ = poisson_steps(material.nu, sd)
+        changed = built_like(problem, replace(model, material=replace(material, nu=material.nu + step)))
+        sign = math.copysign(1.0, step)
+    elif model.forces_scale_with_modulus:
         return None
-    other = StrainField.of(with_modulus(nominal.problem, 1.0 + 0.01 * sd), mus)
-    return lambda points, angles: other.strain(points, angles) - nominal.strain(points, angles)
-
-
-def _nu(nominal: StrainField, mus: Sequence[float], sd: float) -> Effect:
-    """Return the effect of raising Poisson's ratio."""
-    material = nominal.problem.model.material.isotropic("the tolerance of nu")
-    step, _ = poisson_steps(material.nu, sd)
-    model = replace(nominal.problem.model, material=replace(material, nu=material.nu + step))
-    other = StrainField.of(built_like(nominal.problem, model), mus)
-    sign = math.copysign(1.0, step)
+    else:
+        changed = with_modulus(problem, 1.0 + 0.01 * sd)
+    other = StrainField.of(changed, mus)
     return lambda points, angles: sign * (other.strain(points, angles) - nominal.strain(points, angles))
 
 

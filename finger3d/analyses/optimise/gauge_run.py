@@ -16,16 +16,15 @@ from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
 from finger3d.analyses.optimise.gauge_search import NOWHERE, SPACING_MM, Candidates, GaugeSet, Region, search
-from finger3d.analyses.optimise.task import MUS
+from finger3d.analyses.optimise.task import MUS, check_readings
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic, claimed, write_csv, write_json
+from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.model import Model
 from finger3d.plotting.optimise import GaugeMap, draw_places
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene.derived import largest_spread
-from finger3d.sensor.curve import LARGEST_STRAIN
 
 MOST = 8
 """Gauges that are placed together at most."""
@@ -65,16 +64,12 @@ class GaugePlaces:
             "spacing_mm": self.found.spacing_mm,
             "gauges": [
                 {
-                    "name": f"g{i + 1}",
-                    "x_mm": float(g.place[0]),
-                    "y_mm": float(g.place[1]),
-                    "z_mm": float(g.place[2]),
-                    "angle_deg": math.degrees(g.angle),
+                    **table,
                     "mean_mu_sd_alone": float(own.mean()),
-                    "mean_mu_sd_with_those_before": first[i],
+                    "mean_mu_sd_with_those_before": before,
                     "mu_sd_alone": own,
                 }
-                for i, (g, own) in enumerate(zip(gauges, each, strict=True))
+                for table, own, before in zip(_gauge_tables(self.found), each, first, strict=True)
             ],
         }
 
@@ -121,7 +116,11 @@ def place_gauges(
     given, path = tables_of(scene, overrides)
     given = settled_tables(given, path, report)
     keys, mus = free_keys(free or ()), MUS if mus is None else mus
-    _check(count, mus, noise, spacing_mm)
+    if not 1 <= count <= MOST:
+        raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
+    check_readings(mus, 3, noise)
+    if not 0.0 <= spacing_mm <= FARTHEST_MM:
+        raise Finger3dError(f"--spacing {spacing_mm:g}: must be a number from 0 to {FARTHEST_MM:g} (mm)")
     scene = parse(given, path)
     model = scene.model()
     if model.inclusions is not None:
@@ -138,17 +137,6 @@ def place_gauges(
         report.stage("writing")
         _write(folder, result, model)
     return result
-
-
-def _check(count: int, mus: Sequence[float], noise: float, spacing_mm: float) -> None:
-    if not 1 <= count <= MOST:
-        raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")
-    if len(mus) < 3 or any(b <= a for a, b in zip(mus, mus[1:], strict=False)):
-        raise Finger3dError("--mu: must be at least three numbers, ascending")
-    if not 1e-12 <= noise <= LARGEST_STRAIN:
-        raise Finger3dError(f"--noise {noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
-    if not 0.0 <= spacing_mm <= FARTHEST_MM:
-        raise Finger3dError(f"--spacing {spacing_mm:g}: must be a number from 0 to {FARTHEST_MM:g} (mm)")
 
 
 def _region(model: Model, free: Sequence[FreeKey]) -> Region:
@@ -182,24 +170,24 @@ def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, F
     return places, best
 
 
+def _gauge_tables(found: GaugeSet) -> list[Tree]:
+    """Return the keys of the gauges as tables of a scene have them."""
+    places = [dict(zip(("x_mm", "y_mm", "z_mm"), gauge.place.tolist(), strict=True)) for gauge in found.gauges]
+    return [
+        {"name": f"g{i}", **place, "angle_deg": math.degrees(gauge.angle)}
+        for i, (place, gauge) in enumerate(zip(places, found.gauges, strict=True), start=1)
+    ]
+
+
 def _with_gauges(given: TreeView, path: Path | None, found: GaugeSet) -> Scene:
     """Return the scene with the gauges that were found instead of its own."""
-    gauges = [
-        {
-            "name": f"g{i + 1}",
-            "x_mm": round(float(g.place[0]), 3),
-            "y_mm": round(float(g.place[1]), 3),
-            "z_mm": round(float(g.place[2]), 3),
-            "angle_deg": round(math.degrees(g.angle), 2),
-        }
-        for i, g in enumerate(found.gauges)
-    ]
+    digits = {"x_mm": 3, "y_mm": 3, "z_mm": 3, "angle_deg": 2}
+    gauges = [table | {k: round(table[k], n) for k, n in digits.items()} for table in _gauge_tables(found)]
     return parse(tree.frozen(tree.plain(given) | {"gauge": gauges}), path)
 
 
 def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
-    with atomic(folder / "best.toml") as temporary:
-        temporary.write_text(result.scene.to_toml(defaults=False), encoding="utf-8")
+    write_text(folder / "best.toml", result.scene.to_toml(defaults=False))
     places = result.maps[0][0]
     columns: Tree = {f"{axis}_mm": places[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"mean_mu_sd_g{i + 1}_here": values for i, (_, values) in enumerate(result.maps)}

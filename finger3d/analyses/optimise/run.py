@@ -14,11 +14,10 @@ from finger3d.analyses.optimise.task import (
     Evaluation,
     OptimisationProblem,
     checked_start,
-    evaluation_of,
     objective_of,
 )
 from finger3d.errors import MissingError
-from finger3d.io import atomic, claimed, write_json
+from finger3d.io import claimed, write_json, write_text
 from finger3d.plotting.optimise import draw
 from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
@@ -119,37 +118,34 @@ def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | 
     ):
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)
-        known = {e.values: e for e in map(evaluation_of, journal.rows)}
-        search = Search(problem, report or Progress(), objective, journal, known)
-        first = _run_search(search, folder, start)
-        return _write_result(search, folder, first)
+        search = Search(problem, report or Progress(), objective, journal)
+        _run_search(search, folder, start)
+        return _write_result(search, folder)
 
 
-def _run_search(search: Search, folder: Path, start: tuple[float, ...]) -> Evaluation:
-    """Search, and write the best design even if interrupted; return the evaluation of the start."""
+def _run_search(search: Search, folder: Path, start: tuple[float, ...]) -> None:
+    """Search from the evaluation of the start, and write the best design even if interrupted."""
     if search.known:
         search.report.say(f"{len(search.known)} designs are kept from an earlier run")
         search.restore_increments(start)
     search.report.stage("searching")
     try:
-        first = search.evaluate(start)
+        search.evaluate(start)
         search.run(start)
     finally:
         if search.known:
             search.write_table(folder / "evaluations.csv")
-        best = search.best()
-        if best is not None:
-            _write_best(search, folder, best, search.done[0])
-    return first
+        if best := search.best():
+            _write_best(search, folder, best)
 
 
-def _write_result(search: Search, folder: Path, first: Evaluation) -> OptimisationResult:
+def _write_result(search: Search, folder: Path) -> OptimisationResult:
     """Write the best design with its increments, the figure and the page."""
-    problem, best = search.problem, search.best()
+    problem, best, first = search.problem, search.best(), search.done[0]
     if best is None:
         raise MissingError(f"optimise: no design within the bounds gives a number; the first: {first.outcome}")
     search.report.stage("increments of the best")
-    _write_best(search, folder, best, first, search.increments(best.values))
+    _write_best(search, folder, best, search.increments(best.values))
     known = tuple(search.known.values())
     draw(
         folder / "design.png",
@@ -171,16 +167,9 @@ def _write_result(search: Search, folder: Path, first: Evaluation) -> Optimisati
     )
 
 
-def _write_best(
-    search: Search,
-    folder: Path,
-    best: Evaluation,
-    first: Evaluation,
-    increments: Mapping[str, object] | None = None,
-) -> None:
-    problem = search.problem
-    with atomic(folder / "best.toml") as path:
-        path.write_text(problem.scene(best.values).to_toml(defaults=False), encoding="utf-8")
+def _write_best(search: Search, folder: Path, best: Evaluation, increments: Mapping[str, object] | None = None) -> None:
+    problem, first = search.problem, search.done[0]
+    write_text(folder / "best.toml", problem.scene(best.values).to_toml(defaults=False))
     names = [f.key for f in problem.free]
     write_json(
         folder / "design.json",

@@ -5,20 +5,21 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
-from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem, evaluation_of
+from finger3d.analyses.pressed_body import PressedBody, kept, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
@@ -32,7 +33,6 @@ from finger3d.scene import Scene
 
 _GAUGE_BUDGET = 60  # evaluations of gauges on one body
 _INFEASIBLE = 1e30  # cost of a design that cannot be built: finite, as annealing asks
-_MAX_STORED = 4  # bodies with their increments
 
 
 @dataclass(frozen=True)
@@ -81,18 +81,23 @@ class Search:
     report: Progress
     objective: Objective
     journal: Journal
-    known: dict[tuple[float, ...], Evaluation] = field(default_factory=dict)
+    known: dict[tuple[float, ...], Evaluation] = field(init=False)
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
-    evaluated: int = 0
     chosen: tuple[int | Literal["auto"], ...] | None = None
     _stored: dict[str, _PressedDesign] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Take over the evaluations of an earlier run."""
+        self.known = {found.values: found for found in map(evaluation_of, self.journal.rows)}
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
         """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
         point = tuple(float(v) for v in values)
         if point not in self.known:
-            self._record(self._evaluate_new(point))
+            new = self._evaluate_new(point)
+            self.known[point] = new
+            self.journal.append({"values": list(point), "objective": new.value, "outcome": new.outcome})
         found = self.known[point]
         self.done.append(found)
         return found
@@ -103,34 +108,24 @@ class Search:
         except Finger3dError as error:
             return Evaluation(point, math.nan, " ".join(str(error).split()))
         pressed = self._press(scene)
-        table = self._table(scene, pressed)
-        if table is None:
+        if pressed.read is None:
             return Evaluation(point, math.nan, pressed.outcome)
-        value = self.objective(table)
+        strain = {g.name: pressed.read(g) for g in scene.model().gauges}
+        gauge, mus = self.problem.gauge or next(iter(strain)), np.array(self.problem.mus)
+        value = self.objective(ObjectiveTable(mus, strain, pressed.steps, self.problem.noise, gauge, scene))
         return Evaluation(point, value, "converged" if math.isfinite(value) else "the objective is no finite number")
 
-    def _table(self, scene: Scene, pressed: _PressedDesign) -> ObjectiveTable | None:
-        """Return what the objective reads; None if a press fails."""
-        if pressed.read is None:
-            return None
-        strain = {g.name: pressed.read(g) for g in scene.model().gauges}
-        gauge = self.problem.gauge or next(iter(strain))
-        return ObjectiveTable(np.array(self.problem.mus), strain, pressed.steps, self.problem.noise, gauge, scene)
-
     def _press(self, scene: Scene) -> _PressedDesign:
-        key = json.dumps([body_key(scene), scene.as_dict()["press"], scene.as_dict()["contact"]])
-        model = scene.model()
+        """Return the increments of a body, pressed anew unless it is one of the last."""
+        model, tables = scene.model(), scene.as_dict()
+        key = json.dumps([body_key(scene), tables["press"], tables["contact"]])
         if model.inclusions is not None:
             key += repr(model.gauges)
-        if key not in self._stored:
-            while len(self._stored) >= _MAX_STORED:
-                self._stored.pop(next(iter(self._stored)))
-            self._stored[key] = self._press_body(model)
-            self.bodies += 1
-        return self._stored[key]
+        return kept(self._stored, key, lambda: self._press_body(model))
 
     def _press_body(self, model: Model) -> _PressedDesign:
         mus = self.problem.mus
+        self.bodies += 1
         try:
             body = _DesignBody(model, self.report)
             legs = self._legs(body, model)
@@ -161,12 +156,10 @@ class Search:
 
     def restore_increments(self, start: Sequence[float]) -> None:
         """Choose the increments at the start design, whose evaluation in the journal does not store them."""
-        try:
+        with suppress(Finger3dError):  # as in a new search, they are chosen at the first design that can be built
             model = self.problem.scene(start).model()
             if automatic(model):
                 self._legs(_DesignBody(model, self.report), model)
-        except Finger3dError:
-            pass  # as in a new search, the increments are chosen at the first design that can be built
 
     def increments(self, values: Sequence[float]) -> Tree:
         """Return the increments of a design and the resulting error of its strain; none where no gauge is read."""
@@ -177,17 +170,13 @@ class Search:
         body = _DesignBody(model, self.report)
         problem = with_steps(under(body.problem, legs=self._legs(body, model)), AUTO_START)
 
-        def strain(other: Any) -> Float:
+        def strain(other: Problem) -> Float:
             return body.strain(gauge, mus, other.model.legs)
 
         chosen = automatic(model)
         left = error_of_increments(problem, strain(problem), chosen, strain)
         steps = [leg.steps for leg in problem.model.legs]
         return {"steps": steps, "chosen": chosen, "strain_error": float(left.max())}
-
-    def _record(self, found: Evaluation) -> None:
-        self.known[found.values] = found
-        self.journal.append({"values": list(found.values), "objective": found.value, "outcome": found.outcome})
 
     def write_table(self, path: Path) -> None:
         """Write every evaluated design as a line of a CSV file."""
@@ -203,60 +192,50 @@ class Search:
 
     def run(self, start: Sequence[float]) -> None:
         """Search until the optimiser converges or the budget is used up."""
-        p = self.problem
+        p, count = self.problem, 0
         gauges = [i for i, key in enumerate(p.keys()) if key.startswith("gauge.")]
         body = [i for i in range(len(p.free)) if i not in gauges]
-        outer, inner = (body, gauges) if body and gauges else (list(range(len(p.free))), [])
-        x = np.array(start)
+        outer, inner = (body, gauges) if body and gauges else ([*body, *gauges], [])
 
-        def cost(values: Float) -> float:
-            if self.evaluated >= p.budget:
-                raise _BudgetExhausted
-            self.evaluated += 1
-            trial = x.copy()
-            trial[outer] = values
-            value = self._search_gauges(trial, inner) if inner else self.evaluate(trial).value
+        def of_gauges(trial: Float) -> float:
+            return self.evaluate(trial).value
+
+        def of_body(trial: Float) -> float:
+            nonlocal count
+            count += 1
+            value = self._largest(of_gauges, trial, inner, _GAUGE_BUDGET) if inner else of_gauges(trial)
             best = self.best()
-            text = f"best {best.value:.4g}" if best else "none can be built yet"
-            self.report.step(self.evaluated, p.budget, text)
-            return -value if math.isfinite(value) else _INFEASIBLE
+            self.report.step(count, p.budget, f"best {best.value:.4g}" if best else "none can be built yet")
+            return value
 
-        try:
-            _minimise(cost, [p.free[i] for i in outer], x[outer], p.seed)
-        except _BudgetExhausted:
-            pass
+        self._largest(of_body, np.array(start), outer, p.budget)
 
-    def _search_gauges(self, here: Float, inner: list[int]) -> float:
-        """Return the largest objective over the keys of gauges on one body."""
-        count, values = 0, []
+    def _largest(self, value: Callable[[Float], float], start: Float, which: list[int], budget: int) -> float:
+        """Return the largest value over some of the free keys, the others as at the start; NaN if none is a number.
+
+        The search, by differential evolution, ends after `budget` trials at the latest.
+        """
+        from scipy import optimize
+
+        found = [math.nan]
 
         def cost(chosen: Float) -> float:
-            nonlocal count
-            if count >= _GAUGE_BUDGET:
+            if len(found) > budget:
                 raise _BudgetExhausted
-            count += 1
-            trial = here.copy()
-            trial[inner] = chosen
-            value = self.evaluate(trial).value
-            values.append(value if math.isfinite(value) else -_INFEASIBLE)
-            return -values[-1]
+            trial = start.copy()
+            trial[which] = chosen
+            found.append(value(trial))
+            return -found[-1] if math.isfinite(found[-1]) else _INFEASIBLE
 
-        try:
-            free = [self.problem.free[i] for i in inner]
-            _minimise(cost, free, here[inner], self.problem.seed)
-        except _BudgetExhausted:
-            pass
-        best = max(values)
-        return best if best > -_INFEASIBLE else math.nan
+        bounds = [(self.problem.free[i].low, self.problem.free[i].high) for i in which]
+        size = max(5, 12 // len(which))
+        with suppress(_BudgetExhausted):
+            optimize.differential_evolution(
+                cost, bounds, x0=start[which], rng=self.problem.seed, popsize=size, polish=False
+            )
+        return max(filter(math.isfinite, found), default=math.nan)
 
 
 def _first_middle_last(mus: Sequence[float]) -> tuple[float, ...]:
     """Return the first, the middle and the last value."""
     return tuple(dict.fromkeys((mus[0], mus[len(mus) // 2], mus[-1])))
-
-
-def _minimise(cost: Callable[[Float], float], free: Sequence[FreeKey], start: Float, seed: int) -> None:
-    from scipy import optimize
-
-    bounds = [(f.low, f.high) for f in free]
-    optimize.differential_evolution(cost, bounds, x0=start, rng=seed, popsize=max(5, 12 // len(free)), polish=False)

@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,14 @@ class OptimisationProblem:
         }
 
 
+def check_readings(mus: Sequence[float], fewest: int, noise: float) -> None:
+    """Raise an error for values of mu that are too few or do not ascend, or for a noise out of range."""
+    if len(mus) < fewest or any(b <= a for a, b in pairwise(mus)):
+        raise Finger3dError(f"--mu: must be at least {('two', 'three')[fewest - 2]} numbers, ascending")
+    if not 1e-12 <= noise <= LARGEST_STRAIN:
+        raise Finger3dError(f"--noise {noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
+
+
 def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     """Return the values of the scene, or the middle of the bounds where they lie outside."""
     if problem.budget < 1:
@@ -140,12 +149,9 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     if not keys:
         raise Finger3dError("optimise: nothing is free; give at least one --free, such as finger.radius_mm=60:200")
     check_distinct(keys)
-    if len(problem.mus) < 2 or any(b <= a for a, b in zip(problem.mus, problem.mus[1:], strict=False)):
-        raise Finger3dError("--mu: must be at least two numbers, ascending")
+    check_readings(problem.mus, 2, problem.noise)
     if problem.seed < 0:
         raise Finger3dError(f"--seed {problem.seed}: must be a whole number from 0 up")
-    if not 1e-12 <= problem.noise <= LARGEST_STRAIN:
-        raise Finger3dError(f"--noise {problem.noise:g}: must be a finite number from 1e-12 to {LARGEST_STRAIN:g}")
     names = [g.name for g in parse(problem.given, problem.path).tables.gauge]
     if problem.objective == "sensitivity" and not names:
         raise Finger3dError("optimise: the objective reads a gauge, and the scene has no [[gauge]]; add one")

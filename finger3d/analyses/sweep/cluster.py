@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from finger3d import _extras
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.store import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import DIED, BodyPoints, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.results.journal import Row
 
@@ -142,7 +142,9 @@ class Cluster:
             return
         body, _ = self._running.pop(future)
         if future.status != "finished":
-            self._give_up(body, _reason(future))
+            if self.client.status != "running":  # a lost connection cancels every future
+                raise self._lost("scheduler")
+            self.progress.give_up(body, _reason(future))
             return
         address = next(iter(self.client.who_has([future]).get(future.key, ())), None)
         rows: list[Row] = future.result()
@@ -160,11 +162,6 @@ class Cluster:
             del self._running[future]
             self.client.cancel([future], force=True)
             self._submit(body)
-
-    def _give_up(self, body: BodyPoints, reason: str) -> None:
-        if self.client.status != "running":  # a lost connection cancels every future
-            raise self._lost("scheduler")
-        self.progress.give_up(body, reason)
 
     def _workers(self) -> int:
         """Return the number of workers.
@@ -191,10 +188,7 @@ def _reason(future: Future[list[Row]]) -> str:
 
     error = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
-        return (
-            "every worker that was given this body died, perhaps for lack of memory; "
-            "try a coarser mesh or fewer --workers; the same command tries it again"
-        )
+        return DIED
     if error is None:
         return "its task was cancelled; the same command tries it again"
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._machine import cores, end_with, reserve_for_linear_algebra
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.store import BodyPoints, SweepProgress
+from finger3d.analyses.sweep.store import DIED, BodyPoints, SweepProgress
 from finger3d.errors import MissingError
 from finger3d.results.journal import Row
 
@@ -112,7 +112,7 @@ def _take(
         deaths[id(body)] += 1
         one.replace()
         if deaths[id(body)] == ATTEMPTS:
-            _give_up(body, progress, _died(error))
+            _give_up(body, progress, f"{DIED} ({' '.join(str(error).split())})")
     except Exception as error:  # noqa: BLE001 - whatever a worker raised is reported with the points that are lost
         _give_up(body, progress, f"{type(error).__name__}: {' '.join(str(error).split())}")
     else:
@@ -124,13 +124,6 @@ def _take(
 def _give_up(body: BodyPoints, progress: SweepProgress, reason: str) -> None:
     progress.give_up(body, reason)
     body.left = []
-
-
-def _died(error: BrokenProcessPool) -> str:
-    return (
-        "every worker that was given this body died, perhaps for lack of memory; try a coarser mesh or fewer "
-        f"--workers; the same command tries it again ({' '.join(str(error).split())})"
-    )
 
 
 def default_workers(bodies: int) -> int:

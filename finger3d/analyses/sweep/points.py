@@ -13,6 +13,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.effects_by_need import settled
+from finger3d.analyses.free_keys import FreeKey, check_distinct
 from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
@@ -80,10 +81,7 @@ def varied(texts: Iterable[str]) -> tuple[Vary, ...]:
     found = tuple(Vary.of(text) for text in texts)
     if not found:
         raise Finger3dError(f"sweep: nothing varies; give at least one key, for instance {_EXAMPLE}")
-    keys = [v.key for v in found]
-    for i, key in enumerate(keys):
-        if key in keys[:i]:
-            raise Finger3dError(f"--vary {key}: given twice; put all its values into one list")
+    check_distinct([v.key for v in found], "--vary", "; put all its values into one list")
     return found
 
 
@@ -141,7 +139,7 @@ class Sweep:
     points: tuple[Point, ...]
     bodies: dict[str, BodySpec]
     title: str
-    is_list: bool = False
+    is_list: bool
 
     def identity(self) -> Tree:
         """Return what identifies the sweep; the hashes of bodies include the contents of files that vary."""
@@ -155,35 +153,19 @@ class Sweep:
         }
 
 
-def combinations(source: Source, overrides: Sequence[str], texts: Sequence[str], report: Progress = QUIET) -> Sweep:
-    """Read a scene and check every combination of some values.
-
-    Parameters
-    ----------
-    overrides : as for ``--set``
-    texts : as for ``--vary``, such as ``friction.mu=0.06,0.25,1``
-
-    Raises
-    ------
-    Finger3dError
-        For the first mistake, in one line that names the key and the value.
-    """
-    vary = varied(texts)
-    count = math.prod(len(v.texts) for v in vary)
-    if count > MOST:
-        raise Finger3dError(f"--vary: {count} combinations; at most {MOST} in one sweep, split it")
-    return _checked(source, overrides, vary, "--vary", itertools.product, report)
-
-
-def listed_points(
-    source: Source, overrides: Sequence[str], columns: tuple[Vary, ...], option: str, report: Progress = QUIET
+def checked_points(
+    source: Source,
+    overrides: Sequence[str],
+    vary: tuple[Vary, ...],
+    option: str = "--vary",
+    report: Progress = QUIET,
 ) -> Sweep:
-    """Read a scene and check every point of a list.
+    """Read a scene and check every point of a sweep.
 
     Parameters
     ----------
     overrides : as for ``--set``
-    columns : the keys, each with its value at every point
+    vary : the keys; with ``--vary`` every combination of their values is a point, else values at the same place are
     option : what gave them, for messages
 
     Raises
@@ -191,30 +173,18 @@ def listed_points(
     Finger3dError
         For the first mistake, in one line that names the key and the value.
     """
-    count = len(columns[0].texts)
+    is_list = option != "--vary"
+    count = len(vary[0].texts) if is_list else math.prod(len(v.texts) for v in vary)
     if count > MOST:
-        raise Finger3dError(f"{option}: {count} points; at most {MOST} in one sweep, split it")
-    return replace(_checked(source, overrides, columns, option, zip, report), is_list=True)
-
-
-def _checked(
-    source: Source,
-    overrides: Sequence[str],
-    vary: tuple[Vary, ...],
-    option: str,
-    joined: Callable[..., Iterable[tuple[Any, ...]]],
-    report: Progress,
-) -> Sweep:
-    """Return the sweep over values that `joined` makes points of, each a checked scene."""
+        points = "points" if is_list else "combinations"
+        raise Finger3dError(f"{option}: {count} {points}; at most {MOST} in one sweep, split it")
+    joined: Callable[..., Iterable[tuple[Any, ...]]] = zip if is_list else itertools.product
     base, path = tables_of(source, overrides)
     keys = [tree.numbered(v.key, base, option) for v in vary]
-    if len(set(keys)) < len(keys):
-        both = next(v.key for i, v in enumerate(vary) if keys[i] in keys[:i])
-        raise Finger3dError(f"{option} {both}: given twice; put all its values into one list")
+    check_distinct(keys, option, "; put all its values into one list")
     options = {o.partition("=")[0].strip(): "--set" for o in overrides} | dict.fromkeys(keys, option)
-    settings = list(joined(*(v.texts for v in vary)))
     scenes: list[Scene] = []
-    for texts in settings:
+    for texts in joined(*(v.texts for v in vary)):
         changes = [f"{key}={text}" for key, text in zip(keys, texts, strict=True)]
         scene = parse(tree.override(base, changes, option), path=path, set_keys=options)
         if scene.tables.mesh.tolerance is not None:
@@ -242,7 +212,7 @@ def _checked(
         )
         for key, of in members.items()
     }
-    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title)
+    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title, is_list)
 
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
@@ -347,26 +317,13 @@ def drawn(sample: str, ranges: Sequence[str], seed: int) -> tuple[Vary, ...]:
         )
     if seed < 0:
         raise Finger3dError(f"--seed {seed}: must be 0 or more")
-    bounds = [_range(text) for text in ranges]
-    keys = [key for key, *_ in bounds]
-    if twice := next((key for i, key in enumerate(keys) if key in keys[:i]), ""):
-        raise Finger3dError(f"--range {twice}: given twice")
+    bounds = [FreeKey.of(text, "--range", f"as in {_SAMPLE_EXAMPLE}") for text in ranges]
+    check_distinct([free.key for free in bounds], "--range")
     random = np.random.default_rng(seed)
     columns = []
-    for key, low, high in bounds:
+    for free in bounds:
         share = random.random(count)
         if kind == "lhs":
             share = (random.permutation(count) + share) / count
-        columns.append(Vary(key, tuple(map(repr, (low + (high - low) * share).tolist()))))
+        columns.append(Vary(free.key, tuple(map(repr, (free.low + (free.high - free.low) * share).tolist()))))
     return tuple(columns)
-
-
-def _range(text: str) -> tuple[str, float, float]:
-    key, _, bounds = text.partition("=")
-    try:
-        low, high = (float(part) for part in bounds.split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not key.strip() or not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise Finger3dError(f"--range {shown(text)}: must be KEY=LOW:HIGH with LOW below HIGH, as in {_SAMPLE_EXAMPLE}")
-    return key.strip(), low, high

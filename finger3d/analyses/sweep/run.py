@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._extras import require
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Point, Sweep, columns_of, combinations, drawn, listed_points, rows_of
+from finger3d.analyses.sweep.points import Point, Sweep, checked_points, columns_of, drawn, rows_of, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
@@ -89,14 +89,17 @@ def sweep(
     report = report or Progress()
     report.stage("checking every point")
     if isinstance(vary, str | Path):
-        points = listed_points(scene, overrides, rows_of(Path(vary)), "--points", report)
+        columns, option = rows_of(Path(vary)), "--points"
     elif isinstance(vary, Mapping) and sample == "list":
-        lists = {key: [_as_toml(value) for value in values] for key, values in vary.items()}
-        points = listed_points(scene, overrides, columns_of(lists), "vary", report)
+        columns, option = (
+            columns_of({key: [_as_toml(value) for value in values] for key, values in vary.items()}),
+            "vary",
+        )
     elif sample == "grid":
-        points = combinations(scene, overrides, _texts(vary, ","), report)
+        columns, option = varied(_texts(vary, ",")), "--vary"
     else:
-        points = listed_points(scene, overrides, drawn(sample, _texts(vary, ":"), seed), "--sample", report)
+        columns, option = drawn(sample, _texts(vary, ":"), seed), "--sample"
+    points = checked_points(scene, overrides, columns, option, report)
     store = press_points(points, out, scheduler, workers, report)
     columns = store.columns()
     return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]), store)
@@ -124,7 +127,7 @@ def press_points(
 
     Parameters
     ----------
-    points : from `finger3d.analyses.sweep.points.combinations`
+    points : from `finger3d.analyses.sweep.points.checked_points`
     out : folder for points.jsonl, results.csv, report.html and, with pyarrow, results.parquet; a sweep found there is
         continued
     scheduler : address of a Dask scheduler; None starts workers on this machine

@@ -167,6 +167,12 @@ def _difference(found: Mapping[str, object], wanted: Mapping[str, object]) -> st
     return "of another scene" if list(was) == list(now) else "its keys are in another order"
 
 
+DIED = (
+    "every worker that was given this body died, perhaps for lack of memory; try a coarser mesh or fewer --workers; "
+    "the same command tries it again"
+)
+"""Why points have no rows whose body has killed its workers."""
+
 _SHOW_S = 0.2
 """Interval of progress reports."""
 

@@ -1,27 +1,42 @@
-"""Error bars: the arithmetic of the estimate, and that true errors lie below twice of it."""
+"""Error bars: of the mesh, of the increments, and of the modulus."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from finger3d.accuracy.companion_presses import CompanionThread, companion_presses
+from finger3d.accuracy.error_bars import ErrorBars, with_error
 from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers
+from finger3d.accuracy.modulus import modulus_errors
+from finger3d.accuracy.richardson import spread_error
 from finger3d.cli import main
+from finger3d.effects.elastic_object import Effect as ElasticObject
+from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
+from finger3d.fem.laws.material import Isotropic
+from finger3d.geometry.registry import designs
+from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
 from finger3d.mechanics.readings.columns import RESULTANTS, by_key
+from finger3d.mechanics.readings.quantities import ORDER
+from finger3d.mechanics.readings.reading import Taxel
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
+from finger3d.progress import QUIET
 from finger3d.scene import load
 from tests.models import half_cylinder, run, swept_fig9
 from tests.scenes import HALF_CYLINDER, changed, solid
@@ -256,3 +271,238 @@ def test_scenes_that_pytetwild_meshes_get_bars_that_tell_something(name: str) ->
     again = estimate(problem, frames)
     assert again.discretisation == pytest.approx(found.discretisation)
     assert "paid once" not in again.method
+
+
+def large(size: float) -> Problem:
+    return run(LargeDeformation().apply(half_cylinder(size, steps=3)))[0]
+
+
+def test_there_are_three_with_longer_edges_in_the_same_increments() -> None:
+    found = companion_presses(run(half_cylinder(0.08))[0])
+    assert [one.ratio for one in found] == pytest.approx([2.0, 2.0**0.5, 4.0], rel=0.01)
+    assert all(one.end.outcome.ok and one.end.target.depth_mm == 1.0 for one in found)
+
+
+def test_those_pressed_beside_the_press_are_the_same() -> None:
+    problem = large(0.3)
+    alone = companion_presses(problem)
+    with CompanionThread() as thread:
+        thread.begin(problem)
+        run(problem.model)
+        beside = thread.of(problem, None, QUIET)
+    assert len(alone) == len(beside) > 1
+    for one, other in zip(alone, beside, strict=True):
+        assert main_numbers(*one[1:]) == pytest.approx(main_numbers(*other[1:]), rel=1e-12)
+
+
+def test_those_of_another_mesh_are_pressed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, second = large(0.4), large(0.3)
+    with CompanionThread() as thread:
+        thread.begin(first)
+        found = thread.of(second, None, QUIET)
+    assert found[0].problem.model.mesh.size_mm == pytest.approx(0.15)  # of few unknowns: finer
+
+
+def test_an_interruption_ends_them() -> None:
+    problem = large(0.1)
+    many = replace(problem, model=replace(problem.model, legs=(Leg(1.0, steps=400),)))
+
+    def interrupted() -> None:
+        with CompanionThread() as thread:
+            thread.begin(many)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):  # and the thread does not go on through 400 increments
+        interrupted()
+
+
+def test_the_order_is_that_of_the_corners_of_the_base() -> None:
+    # Williams 1952: where a held face meets a free one at a right angle, in plane strain and along an edge of a solid,
+    # displacements go as r^lambda, sin^2(lambda pi/2) = (4 (1 - nu)^2 - lambda^2)/(3 - 4 nu), forces converge in
+    # 2 lambda; at nu = 0.49 that is 1.20
+    nu = 0.49
+    root = brentq(lambda p: np.sin(p * np.pi / 2) ** 2 - (4 * (1 - nu) ** 2 - p**2) / (3 - 4 * nu), 0.5, 0.8)
+    assert pytest.approx(2.0 * root, abs=0.01) == ORDER
+
+
+NUMBERS = {"normal_force_N": 2.0, "contact_half_length_mm": 1.0, "stick_area_mm2": 0.5, "force_x_N": 0.0}
+
+
+def test_an_error_of_the_assumed_order_is_found_exactly_from_coarser_and_finer_meshes() -> None:
+    exact, scale = 7.0, 0.3
+    by_edge = {h: NUMBERS | {"normal_force_N": exact + scale * h**ORDER} for h in (0.5, 1.0, 2.0**0.5, 2.0, 4.0)}
+    companions = [(h, numbers) for h, numbers in by_edge.items() if h != 1.0]
+    found = spread_error(by_edge[1.0], companions)
+    assert found["normal_force_N"] == pytest.approx(0.9 * scale, rel=1e-12)
+
+
+def test_one_companion_that_agrees_by_chance_does_not_make_the_error_vanish() -> None:
+    other = NUMBERS | {"normal_force_N": 2.3}
+    one, both = spread_error(NUMBERS, [(2.0, other)]), spread_error(NUMBERS, [(2.0, other), (4.0, NUMBERS)])
+    assert both["normal_force_N"] == pytest.approx(one["normal_force_N"] / 2.0**0.5, rel=1e-12)
+
+
+def test_no_error_is_below_what_the_distance_of_the_points_leaves_open() -> None:
+    found = spread_error(NUMBERS, [(2.0, NUMBERS)], spacing=0.1)
+    # 0.002 h/a of the number itself, for a net force of the normal force; 0.04 of a length or an area
+    assert found == pytest.approx(dict(zip(NUMBERS, (4e-4, 4e-3, 2e-3, 4e-4), strict=True)), rel=1e-12)
+
+
+def test_an_error_bar_is_the_sum_of_both_errors() -> None:
+    bars = ErrorBars(discretisation={"normal_force_N": 0.3, "gauge_g": 0.1}, steps={"normal_force_N": 0.2})
+    assert bars.totals() == {"normal_force_N": 0.5, "gauge_g": 0.1}
+    assert bars.total("friction_sum_N") is None
+    assert ErrorBars.of_summary({"error_estimate": bars.as_dict()}) == bars
+    assert ErrorBars.of_summary({"error_estimate": None}).totals() == {}
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (304.36368, 1.9, "304.4 ± 1.9"),
+        (304.4123, 12.3, "304 ± 12"),
+        (1234.5, 234.5, "1230 ± 230"),
+        (0.0324, 0.00331, "0.0324 ± 0.0033"),
+        (1.0, 9.99e-3, "1.0000 ± 0.0100"),
+        (3.4e-8, 1e-9, "(3.40 ± 0.10) 1e-8"),
+        (304.36368, None, "304.36"),
+        (304.36368, math.nan, "304.36"),
+        (3.0, 0.0, "3 ± 0"),
+        (math.nan, 0.1, "nan"),
+    ],
+)
+def test_a_number_and_its_error_end_at_the_second_digit_of_the_error(
+    value: float, error: float | None, text: str
+) -> None:
+    assert with_error(value, error) == text
+
+
+def test_digits_and_sign_are_chosen() -> None:
+    assert with_error(0.034024128, digits=3) == "0.034"
+    # where all sticks, an error may be a millionth of a millionth of a number above 1
+    assert with_error(5.0, 1e-8) == "5.000000000 ± 0.000000010"
+    assert with_error(0.5, 1e-9) == "(5.000000000 ± 0.000000010) 1e-1"
+    assert with_error(2.0, 1e-300) == "2 ± 0"
+    assert with_error(2.0, 0.5, sign="+-") == "2.00 +- 0.50"
+
+
+SPREAD = 0.25
+
+
+def model_at(E_MPa: float, leg: Leg) -> Model:
+    model = half_cylinder(0.4)
+    gauges, taxels = (Gauge("g", 1.5, 3.5),), (Taxel("t", 0.0, 0.0, 1.0, 1.0),)
+    material = Isotropic(E_MPa, 0.4)
+    return replace(model, legs=(leg,), gauges=gauges, taxels=taxels, material=material)
+
+
+def test_on_a_path_of_depths_numbers_scale_with_the_modulus() -> None:
+    problem, steps = run(model_at(1.0, Leg(1.0, steps=8)))
+    told, (found, reason) = (
+        press_numbers(problem, steps[-1]),
+        modulus_errors(problem, steps, {"": SPREAD}, press_numbers),
+    )
+    assert not reason
+    assert found == pytest.approx({name: SPREAD * abs(told[name]) for name in found})
+    assert set(found) == {name for name in told if name.endswith(("_N", "_mJ", "_Nmm", "_MPa"))}
+
+
+def test_there_are_none_where_the_modulus_is_given() -> None:
+    problem, steps = run(model_at(1.0, Leg(1.0, steps=2)))
+    assert modulus_errors(problem, steps, {}, press_numbers) == ({}, "")
+    assert modulus_errors(problem, [], {"": SPREAD}, press_numbers) == ({}, "")
+
+
+def _to_forces(model: Model) -> Model:
+    legs = (Leg(1.0, steps=4, force_N=1.5), Leg(1.0, slide_x_mm=0.2, steps=3, force_N=1.2))
+    return replace(model, legs=legs)
+
+
+@pytest.mark.parametrize(
+    "changed_model",
+    [
+        _to_forces,
+        lambda model: LargeDeformation().apply(_to_forces(model)),
+        lambda model: ElasticObject(2.0, 0.3).apply(model),
+        lambda model: Foil(300.0, 0.1, 0.5).apply(replace(model, gauges=(Gauge("g", 1.0, 4.2, length_mm=1.0),))),
+        lambda model: replace(
+            model,
+            design=designs()["fingertip"](
+                radius_mm=5.0, half_length_mm=4.0, edge_height_mm=3.0, width_mm=2.0, skin_mm=0.8
+            ),
+            parts=(("skin", Isotropic(3.0, 0.4)),),
+        ),
+    ],
+    ids=["forces", "large deformation to forces", "elastic object", "foil", "elastic part"],
+)
+def test_elsewhere_they_are_half_the_change_between_both_ends_of_the_spread(
+    changed_model: Callable[[Model], Model],
+) -> None:
+    def at(E_MPa: float) -> Model:
+        return changed_model(replace(model_at(E_MPa, Leg(1.0, steps=4)), mesh=MeshOptions(0.2, 0.8, "swept")))
+
+    problem, steps = run(at(1.0))
+    found, reason = modulus_errors(problem, steps, {"": SPREAD}, press_numbers)
+    told = press_numbers(problem, steps[-1])
+    assert not reason
+    soft, stiff = (press_numbers(*_last(run(at(1.0 + sign * SPREAD)))) for sign in (-1.0, 1.0))
+    for name in set(told) & {"normal_force_N", "depth_mm", "gauge_g", "external_work_mJ", "taxel_t"}:
+        change = 0.5 * abs(stiff[name] - soft[name])
+        # on another mesh, whose error is some 5 % of the change, and more where that is small
+        assert found.get(name, 0.0) == pytest.approx(change, rel=0.05, abs=0.02 * abs(told[name])), name
+
+
+def _last(pressed: tuple) -> tuple:
+    return pressed[0], pressed[1][-1]
+
+
+def test_spreads_of_several_moduli_add_as_squares_and_each_counts_alone() -> None:
+    tip = designs()["fingertip"](radius_mm=5.0, half_length_mm=4.0, edge_height_mm=3.0, width_mm=2.0, skin_mm=0.8)
+
+    def at(skin: float) -> Model:
+        model = replace(model_at(1.0, Leg(1.0, steps=4)), design=tip, mesh=MeshOptions(0.2, 0.8, "swept"))
+        return replace(model, parts=(("skin", Isotropic(skin, 0.4)),))
+
+    (problem, steps), stiff = run(at(3.0)), run(at(3.0 * (1.0 + SPREAD)))
+    alone = {
+        label: modulus_errors(problem, steps, {label: SPREAD}, press_numbers)[0]["normal_force_N"]
+        for label in ("", "skin")
+    }
+    told, more = (press_numbers(*_last(one))["normal_force_N"] for one in ((problem, steps), stiff))
+    # the change is not linear in E, by up to the spread
+    assert alone["skin"] == pytest.approx(more - told, rel=SPREAD + 0.05)
+    both = modulus_errors(problem, steps, {"": SPREAD, "skin": SPREAD}, press_numbers)[0]["normal_force_N"]
+    assert both == pytest.approx(math.hypot(*alone.values()), rel=1e-9)
+    # the force is proportional to both moduli together
+    assert sum(alone.values()) == pytest.approx(SPREAD * told, rel=0.1)
+
+
+def test_the_compliance_of_an_elastic_object_makes_them_smaller(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    text = changed(HALF_CYLINDER, domain="plane-strain", size_mm=0.3).replace("E_MPa = 1.0\n", "shore_A = 30\n")
+    scene.write_text(text + "[effects.elastic_object]\nE_MPa = 2.0\nnu = 0.4\n", encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    share = summary["error_estimate"]["modulus"]["normal_force_N"] / summary["steps"][-1]["normal_force_N"]
+    # two springs in series: the softer one has E = 1.14 MPa
+    assert 0.3 * SPREAD_A < share < 0.9 * SPREAD_A
+
+
+def test_table_page_and_summary_keep_them_apart_from_those_of_the_mesh(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    text = changed(HALF_CYLINDER, domain="plane-strain", size_mm=0.4)
+    scene.write_text(text.replace("E_MPa = 1.0\n", "shore_A = 30\n"), encoding="utf-8")
+    assert main(["press", str(scene), "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    bars, force = summary["error_estimate"], summary["steps"][-1]["normal_force_N"]
+    spread = bars["modulus"]["normal_force_N"] / force
+    assert spread == pytest.approx(SPREAD_A, rel=1e-9)
+    assert bars["discretisation"]["normal_force_N"] < 0.05 * force
+    said = f"+- {spread * force:.2g} N by the modulus"
+    printed = next(line for line in capsys.readouterr().out.splitlines() if "normal force" in line)
+    assert said in printed
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert said.replace("+-", "±").replace(" N by", " by") in page
+    assert "of the modulus" in page

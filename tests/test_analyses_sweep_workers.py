@@ -1,4 +1,4 @@
-"""Sweeps in real processes: killed, interrupted, resumed, and on a scheduler and workers of their own."""
+"""Workers of a sweep: on a cluster, in processes of this machine, and in this process."""
 
 from __future__ import annotations
 
@@ -10,14 +10,167 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 
-from finger3d.analyses.sweep.points import combinations
-from tests.sweep_cases import table
+from finger3d.analyses.sweep import local, worker
+from finger3d.analyses.sweep import run as running
+from finger3d.analyses.sweep.cluster import Cluster
+from finger3d.analyses.sweep.points import Sweep, checked_points, varied
+from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
+from finger3d.errors import Finger3dError, MissingError
+from finger3d.progress import Progress
+from tests.scenes import HALF_CYLINDER, written
+from tests.sweep_cases import points_of, pressed_here, table
+
+
+def pressed(sweep: Sweep, folder: Path, workers: int) -> ResultStore:
+    with ResultStore(sweep, folder).open() as store:
+        bodies = [BodyPoints(spec, [p for p in sweep.points if p.body == key]) for key, spec in sweep.bodies.items()]
+        local.press(bodies, SweepProgress(store, Progress()), workers)
+        return store
+
+
+def test_workers_return_the_rows_of_a_press_here(paper_scene: Path, tmp_path: Path) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,0.1", "material.nu=0.3,0.4")
+    store = pressed(sweep, tmp_path, 2)
+    here = {row["point"]: row["normal_force_N"] for row in pressed_here(sweep)}
+    assert {number: row["normal_force_N"] for number, row in store.rows.items()} == here
+
+
+def killed_by(nu: str) -> Any:
+    """A batch that kills its process if the body has this Poisson's ratio.
+
+    `worker` is looked up where it runs: `worker.batch` itself would be pickled with the body that this process holds.
+    """
+
+    def batch(spec: Any, points: Any, size: int) -> Any:
+        if spec.given["material"]["nu"] == float(nu):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return worker.batch(spec, points, size)
+
+    return batch
+
+
+@pytest.mark.slow
+def test_a_body_that_kills_every_worker_is_given_up_and_others_are_pressed(
+    paper_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local.worker, "batch", killed_by("0.3"))
+    store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 2)
+    assert list(store.rows) == [1], store.lost
+    assert "SIGKILL" in store.lost[0]["outcome"]
+
+
+def test_what_a_worker_raises_is_told_with_the_points_that_are_lost(
+    paper_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def batch(spec: Any, points: Any, size: int) -> Any:
+        raise LookupError("no such body")
+
+    monkeypatch.setattr(local.worker, "batch", batch)
+    store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 1)
+    assert not store.rows
+    assert all(row["outcome"] == "LookupError: no such body" for row in store.lost.values())
+
+
+def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_scene, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()
+        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
+        start = time.monotonic()
+        with pytest.raises(MissingError, match="scheduler"):
+            running.press_points(points_of(paper_scene, "friction.mu=0.1"), tmp_path, scheduler=address)
+        assert time.monotonic() - start < 60.0
+
+
+@pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
+@pytest.mark.slow
+def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
+    """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
+    pools = []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self, most: int, **settings: object) -> None:
+            pools.append(most)
+            super().__init__(most, **settings)
+
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.ThreadPoolExecutor", Pool)
+    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
+    # from 1000 contact rows on presses run at once
+    scene, vary = written(tmp_path, HALF_CYLINDER), varied(["friction.mu=0.06,0.3,1"])
+    sweep = checked_points(scene, ["mesh.size_mm=0.0045"], vary)
+    (body,) = sweep.bodies.values()
+    rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
+    assert [row["point"] for row in rows] == [0, 1, 2]
+    assert {row["outcome"] for row in rows} == {"converged"}
+    assert pools == ([] if threads else [2])
+
+
+class Restarted:
+    """A cluster whose worker has been started again at another address after the first batch of a body."""
+
+    status = "running"
+
+    def __init__(self) -> None:
+        self.workers, self.sent = {"tcp://old:1": 1}, []
+
+    def nthreads(self) -> dict[str, int]:
+        return self.workers
+
+    def who_has(self, futures):
+        return {f.key: ("tcp://old:1",) for f in futures}
+
+    def cancel(self, futures, force: bool) -> None:
+        for future in futures:
+            future.cancelled = True
+
+    def submit(self, task, spec, left, size, *, pure, workers, allow_other_workers):
+        stranded = bool(self.sent)
+        self.sent.append(workers)
+        if len(self.sent) == 2:  # the worker dies while it presses this one
+            self.workers = {"tcp://new:2": 1}
+        reached = workers is None or not stranded
+        return Batch(
+            f"batch {len(self.sent)}", [{"point": p.number, "outcome": "converged"} for p in left[:1]], reached
+        )
+
+
+class Batch:
+    """A future of Dask, which is there at once, or never if its worker is gone."""
+
+    status = "finished"
+
+    def __init__(self, key, rows, reached: bool) -> None:
+        self.key, self.rows, self.reached, self.cancelled = key, rows, reached, False
+
+    def add_done_callback(self, told) -> None:
+        if self.reached:
+            told(self)
+
+    def result(self):
+        return self.rows
+
+
+def test_a_batch_whose_worker_is_gone_is_sent_to_any(paper_scene, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("finger3d.analyses.sweep.cluster._POLL_S", 0.01)
+    sweep = points_of(paper_scene, "friction.mu=0.1,0.2,0.3")
+    client = Restarted()
+    with ResultStore(sweep, tmp_path).open() as store:
+        (spec,) = sweep.bodies.values()
+        kept = Cluster(client, SweepProgress(store, Progress()))
+        monkeypatch.setattr(kept.progress, "add", lambda row: None)
+        kept.press([BodyPoints(spec, list(sweep.points))])
+    assert client.sent[:3] == [None, ["tcp://old:1"], None]
+
 
 SETTINGS = (
     "model.domain=plane-strain",
@@ -228,7 +381,7 @@ def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, pape
 
 def load_points(paper_scene: Path) -> list:
     nu = ",".join(f"{0.3 + 0.19 * i / 4:.4f}" for i in range(4))
-    return list(combinations(paper_scene, SETTINGS, ["friction.mu=0.02", f"material.nu={nu}"]).points)
+    return list(checked_points(paper_scene, SETTINGS, varied(["friction.mu=0.02", f"material.nu={nu}"])).points)
 
 
 AT_ONCE = "import finger3d.mechanics.march.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
@@ -256,3 +409,30 @@ def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) 
     assert 5 <= count < 120
     assert said.splitlines()[-1].startswith(f"finger3d: interrupted; {count} of 120 points")
     assert len(table(out)) == count
+
+
+def test_a_body_that_cannot_be_built_and_a_point_that_fails_are_rows(paper_scene, monkeypatch) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06,1")
+
+    def fails(*arguments: object, **settings: object) -> None:
+        raise Finger3dError("no mesh")
+
+    monkeypatch.setattr(worker, "SharedBody", fails)
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["no mesh", "no mesh"]
+
+    class Weak:
+        seconds = 0.0
+
+        def presses(self, variants: list, most: int | None) -> list:
+            return [MemoryError() for _ in variants]
+
+    monkeypatch.setattr(worker, "SharedBody", lambda *a, **k: Weak())
+    assert [row["outcome"] for row in pressed_here(sweep)] == ["MemoryError: no further information"] * 2
+
+
+def test_a_worker_with_other_source_presses_nothing(paper_scene) -> None:
+    sweep = points_of(paper_scene, "friction.mu=0.06")
+    (spec,) = sweep.bodies.values()
+    with pytest.raises(Finger3dError, match="not the one that the sweep was started with"):
+        worker.batch(replace(spec, key="other"), sweep.points, 1)
+    assert worker.batch(spec, sweep.points, 1)[0]["outcome"] == "converged"

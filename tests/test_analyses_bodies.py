@@ -1,15 +1,21 @@
-"""Scenes that share a body: which do, and that sharing changes no number."""
+"""Pressed bodies: presses that share one, and bodies that have to be condensed again."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from finger3d.analyses import pressed_body as pressing
+from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest, shared_legs
+from finger3d.contact import acceleration
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
+from finger3d.errors import UnresolvedError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import surface
 from finger3d.mechanics.discretise.build import build
@@ -20,6 +26,85 @@ from finger3d.mechanics.postprocess.penetration import beyond_candidates, check_
 from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, parse, tree
 from tests.logs import Log
+from tests.sensor_cases import scene as fig9_scene
+
+
+def test_presses_started_from_their_neighbours_end_where_cold_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {"size_mm": 6.0, "base_size_mm": 14.0, "mesher": "swept"}
+    problem = build(fig9_scene(model={"domain": "solid"}, mesh=sizes).model())
+    replaced: list[bool] = []  # for every increment, whether its initial guess differs from the expected forces
+    warm_start = acceleration.warm_start
+
+    def counted(problem: ContactProblem, expected: Any) -> Any:
+        guess = warm_start(problem, expected)
+        replaced.append(guess is not expected)
+        return guess
+
+    monkeypatch.setattr(acceleration, "warm_start", counted)
+    cold = {mu: pressing.press(problem, mu) for mu in runs.MUS}
+    alone = sum(replaced)
+    assert alone == len(replaced) == 6 * len(runs.MUS)  # each of four increments, the first in three parts
+    chain = list(pressing.presses(problem, runs.MUS))
+    unguided = 2 * len(runs.MUS)  # the first parts, at whose ends the neighbours have no forces
+    assert sum(replaced) - alone - unguided < 0.5 * alone  # forces of a neighbour touch where they should
+    for found in chain:
+        assert found.frame.outcome.ok
+        assert found.frame.gauges["g36"] == pytest.approx(cold[found.mu].frame.gauges["g36"], rel=1e-9)
+    far = list(pressing.presses(problem, (0.06, 0.5, 1.0)))  # forces at half the friction would be no help
+    assert [p.frame.iterations for p in far] == [pressing.press(problem, p.mu).frame.iterations for p in far]
+
+
+NARROW = -0.8
+"""Margin with which only points deep inside the object are candidates."""
+
+
+def test_all_presses_are_of_the_body_that_is_wide_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, mus = (
+        fig9_scene(model={"domain": "plane-strain"}, mesh={"size_mm": 2.0, "base_size_mm": 8.0}).model(),
+        (0.1, 0.6),
+    )
+    wide, said = pressing.PressedBody(model), Log()
+    ends, steps = wide.ends(mus), wide.steps()
+    monkeypatch.setattr(pressing, "build", lambda m, report, margin=NARROW: build(m, report, margin))
+    narrow = pressing.PressedBody(model, said)
+    few = len(narrow.problem.surface.nodes)
+    again = narrow.ends(mus)
+    count = len(narrow.problem.surface.nodes)
+    assert sum("beyond" in line for line in said.lines) == 1
+    assert few < len(wide.problem.surface.nodes) <= count
+    for one, other in zip(again, ends, strict=True):
+        assert one.meshed_state.contact.force.shape == (count, 2)
+        assert one.gauges == pytest.approx(other.gauges, rel=1e-9)
+        assert one.penetration_mm == pytest.approx(other.penetration_mm, rel=1e-9)
+    (last,) = (one[-1] for one in [narrow.steps()])
+    assert last.gauges == pytest.approx(steps[-1].gauges, rel=1e-9)
+    assert sum("beyond" in line for line in said.lines) == 1
+
+
+def test_a_body_under_a_force_is_meshed_for_the_depth_that_it_is_reached_at() -> None:
+    legs = (Leg(0.2, steps=2, force_N=8.0),)  # a forecast that is far too small
+    section = fig9_scene(model={"domain": "plane-strain"}, mesh={"size_mm": 2.0, "base_size_mm": 8.0})
+    model = replace(section.model(), legs=legs)
+    said = Log()
+    body = pressing.PressedBody(model, said)
+    last = body.steps()[-1]
+    assert sum("deeper" in line for line in said.lines) == 1
+    # the depth reached on the first mesh, from that on the mesh for it
+    assert body.problem.model.legs[0].depth_mm == pytest.approx(last.target.depth_mm, rel=0.01)
+    assert -float(last.state.force[:, 0].sum()) == pytest.approx(-8.0, rel=1e-6)
+
+
+def test_another_path_is_refused_where_the_object_passes_between_the_points() -> None:
+    model = fig9_scene(
+        model={"domain": "plane-strain"}, mesh={"size_mm": 4.0, "base_size_mm": 16.0}, press={"depth_mm": 5.0},
+        object={"shape": "wedge", "angle_deg": 60.0, "tip_radius_mm": 0.5},
+    ).model()  # fmt: skip
+    problem = build(model)
+    assert pressing.under(problem, model.friction.with_mu(0.9)).model.friction.mu == 0.9
+    assert pressing.under(problem).model == model
+    with pytest.raises(UnresolvedError):
+        pressing.under(problem, legs=(Leg(0.05),))
+
 
 BLOCK = {
     "finger": {"geometry": "block", "half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0},
@@ -35,6 +120,12 @@ BLOCK = {
 
 def scene(*changes: str) -> Scene:
     return parse(tree.override(tree.frozen(BLOCK), changes))
+
+
+def press(body: SharedBody, variant: Variant) -> VariantResult:
+    (found,) = body.presses([variant])
+    assert isinstance(found, VariantResult)
+    return found
 
 
 def strains(result: VariantResult) -> dict[str, float]:
@@ -58,7 +149,7 @@ def test_a_body_pressed_as_its_variants_is_each_pressed_on_its_own() -> None:
     for model in models:
         own = build(model)
         alone = measure(own.points, list(march(own))[-1])
-        shared = body.press(Variant.of(model))
+        shared = press(body, Variant.of(model))
         assert shared.outcome == "converged"
         # both are exact solutions of one contact problem; one has the mirrored half meshed, too, and round-off differs
         for key in ("normal_force_N", "friction_sum_N", "stick_area_mm2", "dissipation_mJ"):
@@ -76,7 +167,7 @@ def test_a_slide_among_the_variants_costs_the_mirror_plane_only() -> None:
     for model in models:
         own = build(model)
         alone = measure(own.points, list(march(own))[-1])
-        assert body.press(Variant.of(model)).numbers["friction_sum_N"] == pytest.approx(
+        assert press(body, Variant.of(model)).numbers["friction_sum_N"] == pytest.approx(
             alone["friction_sum_N"], rel=1e-9
         )
 
@@ -84,7 +175,7 @@ def test_a_slide_among_the_variants_costs_the_mirror_plane_only() -> None:
 def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
     models = [scene().model(), scene("press.depth_mm=0.15").model()]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
-    shared = body.press(Variant.of(models[1]))
+    shared = press(body, Variant.of(models[1]))
     # other candidate points on the same mesh: open points change nothing but round-off
     every = replace(build(models[0], margin=math.inf), model=models[1])
     assert len(every.surface.nodes) > len(body.problem.surface.nodes)
@@ -98,12 +189,12 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
 
 def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) -> None:
     model = scene("friction.mu=0.0").model()
-    wide = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
+    wide = press(SharedBody(model, [Variant.of(model)]), Variant.of(model))
     said = Log()
     first = [lambda m, report, margin=-0.98: build(m, report, margin)]
     monkeypatch.setattr("finger3d.analyses.pressed_body.build", lambda m, report, *margin: first[0](m, report, *margin))
     narrow = SharedBody(model, [Variant.of(model)], said)
-    again = narrow.press(Variant.of(model))
+    again = press(narrow, Variant.of(model))
     assert any("beyond" in text for text in said.lines)
     assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
 
@@ -111,7 +202,7 @@ def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) ->
 def test_gauges_alone_cost_no_press() -> None:
     models = [scene().model(), scene("gauge.0.x_mm=0.5").model()]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
-    first, second = (body.press(Variant.of(m)) for m in models)
+    first, second = (press(body, Variant.of(m)) for m in models)
     assert first.seconds > 0.0
     assert second.seconds == 0.0
     assert first.readings != second.readings
@@ -136,7 +227,7 @@ def test_a_gauge_that_is_stiff_shapes_the_body() -> None:
     body = SharedBody(models[0], [Variant.of(m) for m in models])
     own = build(models[1])
     alone = measure(own.points, list(march(own))[-1])
-    assert strains(body.press(Variant.of(models[1]))) == pytest.approx(alone["gauges"], rel=1e-9)
+    assert strains(press(body, Variant.of(models[1]))) == pytest.approx(alone["gauges"], rel=1e-9)
 
 
 def test_chosen_sizes_follow_the_depth_and_are_shared() -> None:
@@ -150,7 +241,7 @@ def test_chosen_sizes_follow_the_depth_and_are_shared() -> None:
 def test_a_step_that_fails_is_named() -> None:
     """The paper's rule, which does not exclude friction that helps slip."""
     model = scene("contact.rule=paper", "material.nu=0.3", "mesh.size_mm=0.1", "press.depth_mm=0.6").model()
-    pressed = SharedBody(model, [Variant.of(model)]).press(Variant.of(model))
+    pressed = press(SharedBody(model, [Variant.of(model)]), Variant.of(model))
     assert pressed.outcome.startswith("increment ")
     assert pressed.numbers == {}
     assert pressed.readings == {}
@@ -207,17 +298,6 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
     assert all(check_surface(problem, [end])[0].within_candidates for end in ends)
 
 
-def test_one_solver_proves_as_the_other(monkeypatch) -> None:
-    problem = build(scene().model())
-    ends = [list(march(problem))[-1]] * 3
-    monkeypatch.setenv("FINGER3D_SOLVER", "superlu")
-    other = build(scene().model())
-    assert other.body.condensed.solver == "superlu"
-    forces = [f.meshed_state.contact.force for f in ends]
-    for a, b in zip(problem.unknowns_of(forces), other.unknowns_of(forces), strict=True):
-        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max()
-
-
 def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
     """Then nothing that a plane could touch is beyond them, and no press pays a proof."""
     level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
@@ -226,13 +306,13 @@ def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
     assert 0 in beyond_candidates(part).face
 
 
-NARROW = -0.98
+NARROWEST = -0.98
 """Margin of a body at first: its candidates reach to a fifth of the depth, where a shallow press ends."""
 
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "finger3d.analyses.pressed_body.build", lambda m, report, margin=NARROW: build(m, report, margin)
+        "finger3d.analyses.pressed_body.build", lambda m, report, margin=NARROWEST: build(m, report, margin)
     )
 
 
@@ -247,7 +327,7 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     models = [scene(*change).model() for change in changes]
     variants = [Variant.of(m) for m in models]
     wide = SharedBody(models[1], variants)
-    alone = [wide.press(v) for v in variants]
+    alone = [press(wide, v) for v in variants]
     narrowed(monkeypatch)
     said = Log()
     body = SharedBody(models[1], variants, said)
@@ -282,8 +362,8 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
     first, second, third = body.presses([Variant.of(m) for m in models])
     assert isinstance(second, MemoryError)
     assert first.outcome == third.outcome == "converged"
-    with pytest.raises(MemoryError, match="none left"):
-        body.press(Variant.of(models[1]))
+    (again,) = body.presses([Variant.of(models[1])])
+    assert str(again) == "none left"
 
 
 def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch) -> None:
@@ -308,7 +388,7 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
     models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
     variants = [Variant.of(m) for m in models]
 
-    def once(model, report, margin=NARROW):
+    def once(model, report, margin=NARROWEST):
         if margin == math.inf:
             raise MemoryError
         return build(model, report, margin)
