@@ -26,7 +26,7 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body, Shell, shell
 from finger3d.mold.cover import Ports
-from finger3d.mold.demould import Draft, check_opening, undercut_depth
+from finger3d.mold.demould import Undercut, check_opening, undercut_depth
 from finger3d.mold.fasteners import Bolts, bolts, half_pegs, lid_pegs, screws
 from finger3d.mold.foils import FoilSlot, check_foils, slot
 from finger3d.mold.layout import Layout, layout_of
@@ -54,7 +54,7 @@ class Mold:
     parts : half_a (z above the split), half_b (below, with the pegs), lids, inserts; without the cavity where the body
         has no CAD, see `shell`
     pours : in their order
-    draft : how the halves come off
+    undercut : the deepest, over which the silicone is stretched
     """
 
     options: MoldOptions
@@ -63,7 +63,7 @@ class Mold:
     parts: dict[str, Solid]
     pours: tuple[Pour, ...]
     foils: tuple[FoilSlot, ...]
-    draft: Draft
+    undercut: Undercut
 
     @property
     def silicone_mm3(self) -> float:
@@ -78,7 +78,7 @@ class Mold:
     @property
     def openings_mm3(self) -> float:
         """Volume of pour holes and vents, of all pours."""
-        return sum(ports.volume_mm3(self.options.lid_mm) for ports in self.ports)
+        return sum(ports.volume_mm3 for ports in self.ports)
 
     @property
     def bolts(self) -> Bolts | None:
@@ -139,7 +139,7 @@ def mold(
     layout = layout_of(*body.box, options)
     slots = {foil: slot(foil, layout, options) for foil in gauges}
     check_strips(planned, slots)
-    draft = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
+    undercut = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
     cavity = [] if body.cad is None else [body.cad, *fillings]
     features = [
         screws(layout, options),
@@ -149,10 +149,10 @@ def mold(
     ]
     parts = halves(layout, features)
     for pour in planned:
-        parts |= lid_parts(pour, layout, features, options)
+        parts |= lid_parts(pour, layout, features)
     for name, solid in parts.items():
         solid.label = name
-    assembled = Mold(options, body, layout, parts, planned, tuple(gauges), draft)
+    assembled = Mold(options, body, layout, parts, planned, tuple(gauges), undercut)
     check_parts(assembled)
     return assembled
 

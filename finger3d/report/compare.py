@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, number, write_page
+from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Table, number
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -46,8 +46,7 @@ def compare_page(folder: str | Path) -> Path:
         "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
         "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
     )
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
@@ -61,6 +60,7 @@ def compare_page(folder: str | Path) -> Path:
         good=data["outcome"] == "converged",
         versions=data["versions"],
     )
+    return page.write(folder)
 
 
 _BARS = (
