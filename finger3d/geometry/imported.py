@@ -42,7 +42,7 @@ def in_mm(*lengths: float) -> str:
     return " x ".join(f"{length:.4g}" for length in lengths) + " mm"
 
 
-class FileDesign:
+class FileDesign(Design):
     """Base of the bodies that are read from files, whose extent is that of their surface.
 
     Attributes
@@ -80,9 +80,6 @@ class FileDesign:
         base = self.surface.corners[(self.surface.corners[:, :, 1] == 0.0).all(axis=1)].reshape(-1, 3)
         foot = np.ptp(base, axis=0)
         return f"{in_mm(*(self.surface.high - self.surface.low))} (x, y up, z), base {in_mm(foot[0], foot[2])}"
-
-    def section(self) -> None:
-        """Return None: no constant section is known of a file."""
 
     def top(self, x: Float, z: Float) -> Float:
         """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
