@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
 from finger3d.errors import Finger3dError
@@ -20,11 +17,8 @@ def cost(
     scene: Path,
     /,
     *,
-    of: Annotated[
-        str | None,
-        Parameter(help="Numbers whose errors are meant, separated by commas, or all; default: the normal force."),
-    ] = None,
-    png: Annotated[Path | None, Parameter(help="Draw the errors against the time.")] = None,
+    of: str | None = None,
+    png: Path | None = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -36,6 +30,10 @@ def cost(
     ----------
     scene
         The scene file (TOML).
+    of
+        Numbers whose errors are meant, separated by commas, or all; default: the normal force.
+    png
+        Draw the errors against the time.
     """
     if png is not None and png.suffix.lower() != ".png":
         raise Finger3dError(f"--png {png}: the name must end in .png")
