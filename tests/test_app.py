@@ -18,7 +18,6 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.app.live_body import MU_STEP, STEPS, LiveBody, LivePress, LiveReading
 from finger3d.app.page import (
     HOST,
-    LocalServer,
     local_server,
     numbers_of,
     page,
@@ -204,14 +203,14 @@ def page_at(prefix: str) -> Dash:
 
 
 @contextmanager
-def served(page: Dash) -> Iterator[LocalServer]:
-    server = local_server(page)
-    thread = threading.Thread(target=server.serve)
+def served(page: Dash) -> Iterator[str]:
+    url, server = local_server(page)
+    thread = threading.Thread(target=server.serve_forever)
     thread.start()
     try:
-        yield server
+        yield url
     finally:
-        server.stop()
+        server.shutdown()
         thread.join()
 
 
@@ -226,7 +225,7 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
         tab.on("pageerror", lambda error: complaints.append(str(error)))
         asked: list[str] = []
         tab.on("request", lambda request: asked.append(request.url))
-        tab.goto(running.url)
+        tab.goto(running)
         expect(tab.locator("#numbers")).to_contain_text("N", timeout=60_000)
         before = tab.locator("#numbers").inner_text()
         handle = tab.locator("#mu").get_by_role("slider").or_(tab.locator("[role=slider]")).first
@@ -237,7 +236,7 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
         expect(tab.locator("#traction .main-svg").first).to_be_visible()
         browser.close()
     assert complaints == []
-    assert all(url.startswith((running.url, "data:", "blob:")) for url in asked)
+    assert all(url.startswith((running, "data:", "blob:")) for url in asked)
 
 
 @pytest.mark.browser
@@ -247,7 +246,7 @@ def test_what_the_page_shows_belongs_together() -> None:
     with served(page(LiveBody.of(parse(SCENE)), 0.3)) as running, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         tab = browser.new_page()
-        tab.goto(running.url)
+        tab.goto(running)
         numbers, reading = tab.locator("#numbers"), tab.locator("#reading")
         expect(numbers).to_contain_text("mu = 0.3, 0.6 mm deep", timeout=60_000)
         for name, typed, value, said in (
@@ -274,9 +273,9 @@ def test_what_the_page_shows_belongs_together() -> None:
 
 
 @pytest.fixture
-def running() -> Iterator[LocalServer]:
-    with served(page_at("/secret/")) as server:
-        yield server
+def running() -> Iterator[str]:
+    with served(page_at("/secret/")) as url:
+        yield url
 
 
 def status(url: str, **headers: str) -> int:
@@ -288,26 +287,26 @@ def status(url: str, **headers: str) -> int:
         return error.code
 
 
-def test_only_the_secret_address_is_answered(running: LocalServer) -> None:
-    base = running.url.removesuffix("secret/")
+def test_only_the_secret_address_is_answered(running: str) -> None:
+    base = running.removesuffix("secret/")
     assert base.startswith(f"http://{HOST}:")
-    assert status(running.url) == 200
+    assert status(running) == 200
     for path in ("", "guess/", "_dash-layout", "guess/_dash-layout", "%C3%BC/", "%ff/", "?token=%C3%BC"):
         assert status(base + path) == 404, path
-    assert status(running.url + "_dash-layout", Cookie="token=\xfc") == 200
+    assert status(running + "_dash-layout", Cookie="token=\xfc") == 200
 
 
-def test_a_name_that_another_site_had_resolved_to_this_machine_is_refused(running: LocalServer) -> None:
-    assert status(running.url, Host="evil.example:8000") == 403
+def test_a_name_that_another_site_had_resolved_to_this_machine_is_refused(running: str) -> None:
+    assert status(running, Host="evil.example:8000") == 403
 
 
-def test_two_pages_are_open_at_once(running: LocalServer) -> None:
+def test_two_pages_are_open_at_once(running: str) -> None:
     with served(page_at("/other/")) as other:
-        assert (status(running.url), status(other.url), status(running.url)) == (200, 200, 200)
+        assert (status(running), status(other), status(running)) == (200, 200, 200)
 
 
-def test_a_port_that_is_taken_is_refused_by_number(running: LocalServer) -> None:
-    port = int(running.url.split(":")[2].split("/")[0])
+def test_a_port_that_is_taken_is_refused_by_number(running: str) -> None:
+    port = int(running.split(":")[2].split("/")[0])
     with pytest.raises(Finger3dError, match=str(port)):
         local_server(page_at("/secret/"), port)
 

@@ -227,29 +227,8 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
 HOST = "127.0.0.1"
 
 
-@dataclass(frozen=True)
-class LocalServer:
-    """A server that waits for requests once `serve` is called.
-
-    Attributes
-    ----------
-    url : of the page
-    """
-
-    url: str
-    _server: BaseWSGIServer
-
-    def serve(self) -> None:
-        """Answer requests until the process is interrupted or `stop` is called from another thread."""
-        self._server.serve_forever()
-
-    def stop(self) -> None:
-        """End `serve`."""
-        self._server.shutdown()
-
-
-def local_server(page: Dash, port: int = 0) -> LocalServer:
-    """Return a server of a page on 127.0.0.1.
+def local_server(page: Dash, port: int = 0) -> tuple[str, BaseWSGIServer]:
+    """Return the address of a page on 127.0.0.1, and the server that answers there once it is told to.
 
     The address of the page is secret, and requests for another host name (DNS rebinding) are refused. Nothing is kept
     in the browser: cookies of one port would be sent to every other port of this machine.
@@ -271,7 +250,7 @@ def local_server(page: Dash, port: int = 0) -> LocalServer:
         server = make_server(HOST, port, page.server, threaded=True)
     except (OSError, SystemExit):
         raise Finger3dError(f"app: port {port} is not free; name another with --port, or none") from None
-    return LocalServer(f"http://{HOST}:{server.port}{page.config.requests_pathname_prefix}", server)
+    return f"http://{HOST}:{server.port}{page.config.requests_pathname_prefix}", server
 
 
 def _refuse_other_hosts() -> None:

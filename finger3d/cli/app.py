@@ -43,10 +43,10 @@ def app_(
     with job(False, lambda report: "nothing was to be written") as report:
         report.stage("condensing")
         body = LiveBody.of(loaded, report)
-    server = local_server(page(body, loaded.tables.friction.mu), port)
+    url, server = local_server(page(body, loaded.tables.friction.mu), port)
     print(body.remark)
-    print(f"open {server.url}", flush=True)
+    print(f"open {url}", flush=True)
     if browser:
-        webbrowser.open(server.url)
-    server.serve()  # until Ctrl-C, which it takes for its end
+        webbrowser.open(url)
+    server.serve_forever()  # until Ctrl-C, which it takes for its end
     raise Interrupted("interrupted; the page is closed")

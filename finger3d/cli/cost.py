@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
@@ -47,7 +46,8 @@ def cost(
         return
     head, *lines = found.table()
     print_columns(head, lines)
-    print(f"meshes are chosen for the errors of {_names(found.of)}; expected errors of mesh and increments")
+    chosen_for = ", ".join(found.of) if len(found.of) <= _MOST_NAMES else f"all {len(found.of)} numbers"
+    print(f"meshes are chosen for the errors of {chosen_for}; expected errors of mesh and increments")
     for row in found.rows:
         if row.limit:
             print(f"{100 * (row.error or 0.0):g} %: {row.limit}")
@@ -57,7 +57,3 @@ def cost(
             print(f"  {100 * row.error:g} %: " + " ".join(f"--set {key}" for key in row.keys))
     if png is not None:
         print(f"{png} written")
-
-
-def _names(of: Sequence[str]) -> str:
-    return ", ".join(of) if len(of) <= _MOST_NAMES else f"all {len(of)} numbers"

@@ -217,6 +217,8 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
     base: list[Face] = []
     parts: dict[str, list[Solid]] = {}
     if path.suffix.lower() in STEP:
+        from build123d import Axis
+
         from finger3d.geometry.cad import enlarged
 
         read = read_step(path)
@@ -230,7 +232,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
         if scale != 1.0:
             moves.append(lambda shape: enlarged(shape, scale))
         if upside_down and not base:
-            moves.append(_upside_down)
+            moves.append(lambda shape: shape.rotate(Axis.Z, 180.0))
         for move in moves:
             solid, parts = move(solid), {label: [move(s) for s in found] for label, found in parts.items()}
         surface = tessellated(solid)
@@ -287,12 +289,6 @@ def _moved(parts: Mapping[str, list[Solid]], middle: Float) -> dict[str, Compoun
 
     place = Location(tuple(float(-m) for m in middle))
     return {label: Compound([solid.moved(place) for solid in found]) for label, found in parts.items()}
-
-
-def _upside_down(solid: Solid) -> Solid:
-    from build123d import Axis
-
-    return solid.rotate(Axis.Z, 180.0)
 
 
 def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:

@@ -149,30 +149,25 @@ def _locked(finger: Body, axis: int, sign: float, at_mm: float) -> tuple[float, 
     """
     if finger.cad is None:
         return None
-    from build123d import Axis, Box, Pos
+    from build123d import Box, Pos
 
     low, high = finger.box
-    direction = Axis.X if axis == 0 else Axis.Z
     reach = 4.0 * float(np.linalg.norm(high - low))
     middle = np.zeros(3)
     middle[axis] = at_mm + sign * reach / 2.0
     worst, place = -_NORMAL_TOLERANCE, None
     for piece in (finger.cad & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
         for face in piece.faces():
-            centre = np.array([*face.center()])
-            on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _ON_PLANE_MM
-            if _is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
+            centre, normal = np.array([*face.center()]), np.array([*face.normal_at(face.center())])
+            on_base = abs(centre[1]) < _ON_PLANE_MM and normal[1] < -0.5  # which the lid covers
+            on_split = abs(centre[axis] - at_mm) < _ON_PLANE_MM and abs(normal[axis]) > 0.5
+            if face.is_planar and (on_base or on_split):
                 continue
             points, normals = _normals(face)
             along = sign * normals[:, axis]
             if along.min() < worst:
                 worst, place = float(along.min()), tuple(float(c) for c in points[int(np.argmin(along))])
     return place
-
-
-def _is_base(face: Face) -> bool:
-    """Return whether a face is the finger's base, which the lid covers."""
-    return bool(face.is_planar) and abs(face.center().Y) < _ON_PLANE_MM and face.normal_at(face.center()).Y < -0.5
 
 
 def _normals(face: Face) -> tuple[Float, Float]:

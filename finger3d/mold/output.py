@@ -29,8 +29,6 @@ from finger3d.progress import Progress
 from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
 
 PAGE = "mold.html"
-
-
 _THICKNESS_TOLERANCE = 0.97  # chords and slanted rays make walls look thinner
 
 

@@ -91,29 +91,22 @@ def colour(name: str) -> str:
     return COLOURS.get(name, COLOURS.get(kind(name), "#a8a8a8"))
 
 
-def separations(parts: Mapping[str, Triangles]) -> dict[str, Float]:
-    """Return the shift (3,), mm, of each part that takes an assembled mold apart, in the axes of the mold.
+def taken_apart(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
+    """Return the parts of an assembled mold apart, in the axes of the mold.
 
     Halves move along z, lids one above the other along -y, and inserts to below the last lid.
     """
-    size = max(float((part.high - part.low).max()) for part in parts.values())
-    halves = [parts[name] for name in ("half_a", "half_b") if name in parts]
+    size = max(float((part.high - part.low).max()) for part in assembled.values())
+    halves = [assembled[name] for name in ("half_a", "half_b") if name in assembled]
     thick = float(max(half.high[2] for half in halves) - min(half.low[2] for half in halves)) if halves else 0.0
-    apart, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
-    lids = [name for name in parts if kind(name) == "lid"]
-    shifts = dict.fromkeys(parts, np.zeros(3))
-    for name in parts:
-        if kind(name) in ("half_a", "half_b"):
-            shifts[name] = np.array([0.0, 0.0, apart if name == "half_a" else -apart])
-        elif kind(name) in ("lid", "insert"):
-            shifts[name] = np.array([0.0, -above * (lids.index(name) + 1.0 if name in lids else len(lids) - 0.5), 0.0])
-    return shifts
-
-
-def taken_apart(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
-    """Return the parts of an assembled mold apart."""
-    shifts = separations(assembled)
-    return {name: Triangles(part.points + shifts[name], part.faces) for name, part in assembled.items()}
+    away, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
+    shifts = {"half_a": [0.0, 0.0, away], "half_b": [0.0, 0.0, -away]}
+    lids = [name for name in assembled if kind(name) == "lid"]
+    shifts |= {name: [0.0, -above * number, 0.0] for number, name in enumerate(lids, 1)}
+    shifts |= {name: [0.0, -above * (len(lids) - 0.5), 0.0] for name in assembled if kind(name) == "insert"}
+    return {
+        name: Triangles(part.points + shifts.get(name, [0.0, 0.0, 0.0]), part.faces) for name, part in assembled.items()
+    }
 
 
 def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:

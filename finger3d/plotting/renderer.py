@@ -93,20 +93,14 @@ def framed(
     extent : tuple of four floats, mm
         Left, right, lower and upper edge of the cropped images in the picture plane of `flat`.
     """
-    kept, (top, left) = _cropped(images)
+    inked = np.min(images, axis=(0, 3)) < _WHITE
+    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
+    top, left = int(rows[0]), int(columns[0])
+    kept = images[:, top : rows[-1] + 1, left : columns[-1] + 1]
     middle, size = frame
     pixel = 2.0 * half_height(size) / images.shape[1]
     x, y = flat(middle) + pixel * np.array([left - 0.5 * images.shape[2], 0.5 * images.shape[1] - top])
     return kept, (x, x + pixel * kept.shape[2], y - pixel * kept.shape[1], y)
-
-
-def _cropped(images: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Return images (s, h, w, 3) without their common white margins, and the first row and column kept."""
-    stack = images[..., :3]
-    inked = np.min(stack, axis=(0, 3)) < _WHITE
-    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
-    kept = stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return kept, (int(rows[0]), int(columns[0]))
 
 
 Image = NDArray[np.uint8]

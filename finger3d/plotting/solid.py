@@ -164,7 +164,10 @@ def skin_of(finger: DeformedFinger) -> Skin:
     contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
     rims = [_rim(mesh.facets[label]) for label in touched]
-    between = [_rim(part) for f in mesh.facets.values() for part in _by_part(mesh, f)] if mesh.part is not None else []
+    between = []
+    for f in mesh.facets.values() if mesh.part is not None else ():
+        part = part_of_facets(mesh, f)
+        between += [_rim(f[part == number]) for number in np.unique(part)]
     chosen, arrow, largest = _arrows(moved[finger.nodes], shear, status)
     return Skin(
         body=body,
@@ -233,12 +236,6 @@ def _rim(facets: Int) -> Int:
     _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
     rim: Int = np.hstack([ends, middles])[first[count == 1]]
     return rim
-
-
-def _by_part(mesh: Mesh, facets: Int) -> list[Int]:
-    """Return the facets of each part."""
-    part = part_of_facets(mesh, facets)
-    return [facets[part == number] for number in np.unique(part)]
 
 
 def _edge_points(edges: Int, points: Float) -> Float:

@@ -134,7 +134,9 @@ class Page:
         with atomic(target) as temporary, temporary.open("wb") as stream:
             stream.write(before.encode())
             if scripts:
-                stream.write(b"<script>" + _plotly() + b"</script>\n")
+                # "</script" would end the element
+                plotly = asset("plotly/plotly-gl3d.min.js").encode().replace(b"</script", b"<\\/script")
+                stream.write(b"<script>" + plotly + b"</script>\n")
             stream.write("".join([*scripts, after]).encode())
         return target
 
@@ -164,11 +166,6 @@ def number(value: object, error: float | None = None) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return with_error(value, error)
-
-
-def _plotly() -> bytes:
-    """Return plotly.js, its edition of lines and 3D, with "</script" escaped, which would end the script element."""
-    return asset("plotly/plotly-gl3d.min.js").encode().replace(b"</script", b"<\\/script")
 
 
 def _card(row: HeadlineRow) -> str:

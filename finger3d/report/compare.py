@@ -35,7 +35,7 @@ def compare_page(folder: str | Path) -> Path:
             c["model"],
             c["width_mm"],
             c["size_mm"],
-            *(_with_error(c["numbers"].get(k), c["errors"].get(k)) for k in keys),
+            *(number(c["numbers"][k], c["errors"].get(k)) if k in c["numbers"] else "" for k in keys),
             c["seconds"],
             c["outcome"],
         )
@@ -69,7 +69,3 @@ _BARS = (
     "sections of one width have the same edge lengths; on swept meshes the difference of their forces is therefore "
     "more accurate than either force. The verdict calls a deviation significant if it exceeds two error bars."
 )
-
-
-def _with_error(value: float | None, error: float | None) -> str:
-    return "" if value is None else number(value, error)

@@ -60,7 +60,11 @@ def press_page(folder: str | Path) -> Path:
     last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
-        *([_two_fingers(summary)] if "fingers" in summary else []),
+        *(
+            [PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])]
+            if "fingers" in summary
+            else []
+        ),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
@@ -81,11 +85,6 @@ def press_page(folder: str | Path) -> Path:
         versions=summary["versions"],
     )
     return page.write(folder)
-
-
-def _two_fingers(summary: TreeView) -> PageSection:
-    """Return whether the object is held, its pose, and how near each finger is to slipping."""
-    return PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])
 
 
 def _remark(bars: ErrorBars) -> str:
