@@ -46,34 +46,27 @@ def named_numbers(
     Finger3dError
         For text that is no number, an unknown name, or a number given twice.
     """
-    numbers: dict[str, float] = {}
+    names, numbers = calibration.names, dict[str, float]()
+    alike = len(names) == 1 or (plain_for_all and len({c.kind for c in calibration.readings}) == 1)
     for text in texts:
-        name, equals, value = text.rpartition("=")
+        name, _, value = text.rpartition("=")
+        name = name.strip()
         try:
             number = float(value)
         except ValueError:
             raise Finger3dError(f"{option} {text}: must be a number, or NAME=NUMBER") from None
-        for one in _meant(calibration, f"{option} {text}", name.strip() if equals else "", plain_for_all):
+        if name and name not in names:
+            raise Finger3dError(f"{option} {text}: {name} is not calibrated; calibrated: {', '.join(names)}")
+        if not name and not alike:
+            raise Finger3dError(
+                f"{option} {text}: {', '.join(names)} are calibrated; give the name of the reading, for instance "
+                f"{option} {names[0]}={text}"
+            )
+        for one in (name,) if name else names:
             if one in numbers:
                 raise Finger3dError(f"{option} {text}: {one} is given twice")
             numbers[one] = number
     return numbers
-
-
-def _meant(calibration: Calibration, given: str, name: str, plain_for_all: bool) -> tuple[str, ...]:
-    """Return the readings that a name stands for; the name is empty for a plain number."""
-    names = calibration.names
-    if name in names:
-        return (name,)
-    if name:
-        raise Finger3dError(f"{given}: {name} is not calibrated; calibrated: {', '.join(names)}")
-    if len(names) == 1 or (plain_for_all and len({c.kind for c in calibration.readings}) == 1):
-        return names
-    option, text = given.split(" ", 1)
-    raise Finger3dError(
-        f"{given}: {', '.join(names)} are calibrated; give the name of the reading, for instance "
-        f"{option} {names[0]}={text}"
-    )
 
 
 @dataclass(frozen=True)
