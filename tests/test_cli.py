@@ -23,7 +23,7 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
 from finger3d.scene.reference import reference
 from finger3d.scene.schema import schema
-from tests.commands import loaded, run
+from tests.commands import loaded, refused, run
 from tests.scenes import BLOCK, written
 
 # --- the command line: exit codes, one-line errors, and what each command prints. Presses are faked here -------------
@@ -52,11 +52,7 @@ COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)
 )
 def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(*arguments) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert expected in err
+    assert expected in refused(capsys, *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -159,10 +155,7 @@ def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch,
 @pytest.mark.parametrize("command", ["press", "compare", "plan"])
 def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys) -> None:
     out = [] if command == "plan" else ["--out", tmp_path / "out"]
-    assert run(command, tmp_path / "nothing.toml", *out, "--json") == 2
-    printed, err = capsys.readouterr()
-    assert printed == ""
-    assert len(err.splitlines()) == 1
+    refused(capsys, command, tmp_path / "nothing.toml", *out, "--json")
 
 
 # --- A command does its work whatever becomes of the terminal, and however narrow that is ----------------------------
@@ -309,11 +302,9 @@ def test_a_refused_command_leaves_no_folder(
 def test_a_finger_from_a_file_that_is_not_there_is_told_before_the_keys_of_the_old_design(
     name: str, block: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["plan", str(block), "--set", f"finger.geometry={name}"]) == 2
-    err = capsys.readouterr().err
+    err = refused(capsys, "plan", block, "--set", f"finger.geometry={name}")
     assert f"--set finger.geometry: finger.geometry: {tmp_path / name}: " in err
     assert "half_length_mm" not in err
-    assert len(err.splitlines()) == 1
 
 
 def test_beside_a_file_that_is_there_the_keys_of_a_design_are_told(
