@@ -200,7 +200,8 @@ def test_a_finger_that_does_not_touch_is_drawn(tmp_path: Path, monkeypatch: pyte
     count = len(result["contact_nodes"])
     none = {name: np.zeros(count) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa")}
     table = {**result["table"], **none, "status": ["open"] * count}
-    finger_picture(tmp_path / "f.png", mesh, np.zeros_like(mesh.points), table, result["contact_nodes"])
+    result |= {"displacement": np.zeros_like(mesh.points), "table": table}
+    finger_picture(tmp_path / "f.png", mesh, **result)
     assert pixels(tmp_path / "f.png").std() > 0.05
     assert share(tmp_path / "f.png", render.COLOURS[STICK]) < 5e-3  # the legend's patch only
 
