@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -108,10 +109,14 @@ def sweep(
     where, sample = (options.scheduler, options.workers), options.sample or "grid"
     with job(json_, lambda done: _kept(done, out)) as report:
         store = run(scene, given, out, set_ or (), *where, report, sample, options.seed).store
+    points = _points(store)
     if json_:
-        print_json(_as_dict(store, out))
+        kept, bodies = len(store.rows), len(store.sweep.bodies)
+        without = sum(row["outcome"] != "converged" for row in points)
+        counts = {"points": len(store.sweep.points), "kept": kept, "failed": without, "bodies": bodies}
+        print_json({"results": out, **counts, "rows": points})
     else:
-        _print_points(store)
+        _print_points(store, points)
         print_rows(store.sweep.title, _rows(store, out))
     failed = [row for row in (store.rows | store.lost).values() if row["outcome"] != "converged"]
     if failed:
@@ -133,20 +138,7 @@ def _points(store: ResultStore) -> list[dict[str, object]]:
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
 
 
-def _as_dict(store: ResultStore, out: Path) -> dict[str, object]:
-    points = _points(store)
-    failed = sum(row["outcome"] != "converged" for row in points)
-    return {
-        "results": out,
-        "points": len(store.sweep.points),
-        "kept": len(store.rows),
-        "failed": failed,
-        "bodies": len(store.sweep.bodies),
-        "rows": points,
-    }
-
-
-def _print_points(store: ResultStore) -> None:
+def _print_points(store: ResultStore, points: Sequence[Mapping[str, object]]) -> None:
     """Print the varied keys and the main numbers of the first points."""
     from finger3d.mechanics.readings.columns import MAIN
     from finger3d.report.build import number
@@ -155,7 +147,6 @@ def _print_points(store: ResultStore) -> None:
     def cell(value: object) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
-    points = _points(store)
     if not points:
         return
     gauges = [c.key for c in strains_of(store.sweep.given) if c.key in points[0]][:_MOST_GAUGES]
