@@ -133,7 +133,7 @@ def paper_mold(paper_finger: Design) -> Mold:
     from tests.mold_cases import GAUGES
 
     options = MoldOptions(shrinkage=0.01)
-    return mold(paper_finger.solid(), foils(GAUGES, options, None), options)
+    return mold(paper_finger.solid(), foils(GAUGES), options)
 
 
 @pytest.fixture(scope="session")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+
+import numpy as np
 
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge
 from finger3d.mold.body import shell
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.parts import Mold, mold
+from finger3d.mold.parts import HALVES, Mold, mold
+from finger3d.mold.solids import common
 from finger3d.scene import parse
 
 BODIES = {
@@ -56,3 +60,27 @@ def made(name: str, options: dict, rigid: tuple[str, ...] = ()) -> Mold:
     design = designs()[name](**BODIES[name])
     shape = shell(design.solid(), 0.1, name).surface if kind else design.solid()
     return mold(shape, (), MoldOptions(**options), design.solids(), rigid)
+
+
+def overlaps(mold: Mold) -> dict[str, float]:
+    """Return the common volume (mm3) of each pair of parts in the assembled position, the cast bodies included.
+
+    Parts of different pours are never in the mold together.
+    """
+    boxes = {}
+    for name, solid in mold.parts.items():
+        box = solid.bounding_box()
+        boxes[name] = np.array([*box.min]), np.array([*box.max])
+    shared: dict[str, float] = {}
+    for pour in mold.pours:
+        names = [*HALVES, *pour.others]
+        for a, b in itertools.combinations(names, 2):
+            apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
+            if f"{a}, {b}" not in shared:
+                shared[f"{a}, {b}"] = 0.0 if apart else common(mold.parts[a], mold.parts[b])
+        for name in names:
+            if pour.cast[0].cad is None and name in HALVES:
+                continue  # cut from each other by a boolean of triangles
+            volume = sum(body.shared(mold.parts[name]) for body in pour.cast)
+            shared[f"{name}, sensor"] = max(volume, shared.get(f"{name}, sensor", 0.0))
+    return shared

@@ -11,8 +11,9 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import CONTACT, Mesh, quadratic
 from finger3d.objects import Plane
 from finger3d.plotting import solid as render
-from finger3d.plotting.deformed import DeformedFinger, draw_fingers
+from finger3d.plotting.deformed import draw_fingers
 from finger3d.plotting.layout import save
+from finger3d.plotting.solid import DeformedFinger
 from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 from tests.meshes import grid
 
@@ -92,10 +93,10 @@ def pressed(mesh: Mesh) -> dict[str, Any]:
     return {"displacement": u, "table": table, "contact_nodes": nodes}
 
 
-def finger_picture(path: Path, mesh: Mesh, displacement: np.ndarray, table: dict[str, Any], contact_nodes: np.ndarray,
-                   thing: np.ndarray | None = None, **more: Any) -> str:  # fmt: skip
-    """Draw the finger, and return the renderer."""
-    step = DeformedFinger(
+def deformed(mesh: Mesh, displacement: np.ndarray, table: dict[str, Any], contact_nodes: np.ndarray,
+             thing: np.ndarray | None = None, **more: Any) -> DeformedFinger:  # fmt: skip
+    """Return the finger of a picture."""
+    return DeformedFinger(
         mesh=mesh,
         displacement=displacement,
         pressure=table["pressure_MPa"],
@@ -106,7 +107,11 @@ def finger_picture(path: Path, mesh: Mesh, displacement: np.ndarray, table: dict
         thing=thing,
         **more,
     )
-    (figure,), renderer = draw_fingers([step])
+
+
+def finger_picture(path: Path, mesh: Mesh, **more: Any) -> str:
+    """Draw the finger, and return the renderer."""
+    (figure,), renderer = draw_fingers([deformed(mesh, **more)])
     save(figure, path)
     return renderer
 

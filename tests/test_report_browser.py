@@ -13,7 +13,7 @@ import pytest
 from finger3d.analyses.compare.run import compare
 from finger3d.cli import main
 from finger3d.plotting.layout import DPI
-from finger3d.report.build import write_page
+from finger3d.report.build import Page
 from finger3d.report.chart import Chart, Line
 from finger3d.results.states import load_states
 from tests.scenes import HALF_CYLINDER, SECTION, SOLID, changed, pressed, solid
@@ -165,7 +165,7 @@ _PLACES = """[...document.querySelectorAll(".chart > div")].map((box) => {
 @pytest.mark.parametrize("width", [1280, 400])
 def test_the_tool_bar_of_a_chart_covers_neither_its_axes_nor_a_point(browser: Any, tmp_path: Path, width: int) -> None:
     rising = [Line(f"{i}", (0.0, 1.0, 2.0), (0.0, 1.0, 2.0 - 0.1 * i)) for i in range(2)]  # points at the top right
-    write_page(tmp_path, "tools", charts=[Chart("a chart", "x", "y", rising, "a key")] * 2)
+    Page("tools", charts=[Chart("a chart", "x", "y", rising, "a key")] * 2).write(tmp_path)
     visit = Visit(browser, tmp_path, width)
     for chart in visit.page.evaluate(_PLACES):
         assert len(chart["tools"]) >= 4
@@ -182,7 +182,7 @@ def test_charts_of_long_names_and_of_any_text_are_drawn_within_their_boxes(brows
     text = "<!--<script>"  # leaves a script open, unless it is escaped
     legend = ", ".join(["material.E_MPa", "finger.edge_height_mm", "object.radius_mm", text])
     lines = [Line(f"{i}, {i}, {text}", (0.0, 1.0), (0.0, float(i))) for i in range(6)]
-    write_page(tmp_path, "long names", charts=[Chart(text, text, text, lines, legend)] * 2)
+    Page("long names", charts=[Chart(text, text, text, lines, legend)] * 2).write(tmp_path)
     for width in (1280, 400):
         visit = Visit(browser, tmp_path, width)
         for chart in visit.page.evaluate(_CHARTS):

@@ -13,9 +13,12 @@ from flask import abort, request
 from werkzeug.serving import BaseWSGIServer, make_server
 
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
+from finger3d.contact.friction import STATUS_NAMES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.plotting.gauges import COLOUR
 from finger3d.plotting.panels import middle_section
+from finger3d.plotting.solid import COLOURS
 from finger3d.sensor.curve import NOISE
 
 if TYPE_CHECKING:
@@ -23,10 +26,9 @@ if TYPE_CHECKING:
     from dash import Dash, html
 
 
-_COLOURS = {"open": "#c4c4c4", "stick": "#1f3f77", "slip": "#f28e2b"}
+_COLOURS = {STATUS_NAMES[state]: colour for state, colour in COLOURS.items()}
 _LARGEST_MU = 1.5
 _LEAST_DEPTH_SHARE = 0.05
-_GAUGE = "#b0006e"
 _LAYOUT = {
     "template": "plotly_white",
     "margin": {"l": 60, "r": 20, "t": 40, "b": 50},
@@ -216,7 +218,7 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
     figure = go.Figure()
     figure.add_scatter(x=x, y=y, fill="toself", fillcolor="#e8e5de", line_color="#8d8a84", mode="lines", name="finger")
     figure.add_scatter(
-        x=ends[:, 0], y=ends[:, 1], mode="lines+markers", line={"color": _GAUGE, "width": 3}, name="gauge"
+        x=ends[:, 0], y=ends[:, 1], mode="lines+markers", line={"color": COLOUR, "width": 3}, name="gauge"
     )
     title = "gauge in the middle section, at rest"
     figure.update_layout(_LAYOUT, title=title, xaxis_title="x (mm)", yaxis_title="y (mm)")
@@ -227,29 +229,8 @@ def section_figure(body: LiveBody, gauge: Gauge) -> go.Figure:
 HOST = "127.0.0.1"
 
 
-@dataclass(frozen=True)
-class LocalServer:
-    """A server that waits for requests once `serve` is called.
-
-    Attributes
-    ----------
-    url : of the page
-    """
-
-    url: str
-    _server: BaseWSGIServer
-
-    def serve(self) -> None:
-        """Answer requests until the process is interrupted or `stop` is called from another thread."""
-        self._server.serve_forever()
-
-    def stop(self) -> None:
-        """End `serve`."""
-        self._server.shutdown()
-
-
-def local_server(page: Dash, port: int = 0) -> LocalServer:
-    """Return a server of a page on 127.0.0.1.
+def local_server(page: Dash, port: int = 0) -> tuple[str, BaseWSGIServer]:
+    """Return the address of a page on 127.0.0.1, and the server that answers there once it is told to.
 
     The address of the page is secret, and requests for another host name (DNS rebinding) are refused. Nothing is kept
     in the browser: cookies of one port would be sent to every other port of this machine.
@@ -271,7 +252,7 @@ def local_server(page: Dash, port: int = 0) -> LocalServer:
         server = make_server(HOST, port, page.server, threaded=True)
     except (OSError, SystemExit):
         raise Finger3dError(f"app: port {port} is not free; name another with --port, or none") from None
-    return LocalServer(f"http://{HOST}:{server.port}{page.config.requests_pathname_prefix}", server)
+    return f"http://{HOST}:{server.port}{page.config.requests_pathname_prefix}", server
 
 
 def _refuse_other_hosts() -> None:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import webbrowser
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from finger3d._extras import require
 from finger3d.cli.common import Interrupted, Set, app, job, load
@@ -17,8 +14,8 @@ def app_(
     scene: Path,
     /,
     *,
-    port: Annotated[int, Parameter(help="Port on 127.0.0.1; default: a free one.")] = 0,
-    browser: Annotated[bool, Parameter(help="Open the page in the browser.")] = True,
+    port: int = 0,
+    browser: bool = True,
     set_: Set = None,
 ) -> None:
     """Open a local page with sliders for friction, depth and a gauge, which shows presses of the condensed finger.
@@ -33,6 +30,10 @@ def app_(
     ----------
     scene
         The scene file (TOML).
+    port
+        Port on 127.0.0.1; default: a free one.
+    browser
+        Open the page in the browser.
     """
     require("app", "dash")
     loaded = load(scene, set_)
@@ -42,10 +43,10 @@ def app_(
     with job(False, lambda report: "nothing was to be written") as report:
         report.stage("condensing")
         body = LiveBody.of(loaded, report)
-    server = local_server(page(body, loaded.tables.friction.mu), port)
+    url, server = local_server(page(body, loaded.tables.friction.mu), port)
     print(body.remark)
-    print(f"open {server.url}", flush=True)
+    print(f"open {url}", flush=True)
     if browser:
-        webbrowser.open(server.url)
-    server.serve()  # until Ctrl-C, which it takes for its end
+        webbrowser.open(url)
+    server.serve_forever()  # until Ctrl-C, which it takes for its end
     raise Interrupted("interrupted; the page is closed")

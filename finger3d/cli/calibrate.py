@@ -2,14 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Noise, Set, app, job, load, print_json, print_rows
+from finger3d.cli.common import Flag, Json, Noise, Out, Set, app, job, load, print_json, print_rows
 from finger3d.cli.tolerances import Tolerances, parsed_tolerances
 from finger3d.errors import MissingError
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationOptions:
+    """What is calibrated, and how well readings and scene are known.
+
+    Parameters
+    ----------
+    gauge
+        Name of a [[gauge]] of the scene; or several readings together, with commas: gauges, m1.x of a
+        [[marker]], taxels.
+    mu
+        Values of mu: first:last:count, or numbers separated by commas.
+    marker_noise
+        Standard deviation of a reading of a marker, mm.
+    taxel_noise
+        Standard deviation of a reading of a taxel, MPa.
+    resolution
+        Largest standard deviation of mu at which the sensor is usable.
+    map
+        Also map the sensitivity of strain to mu over the section.
+    """
+
+    gauge: str
+    mu: str = "0.02:1.2:25"
+    noise: Noise = 1.5e-4
+    marker_noise: float = 0.02
+    taxel_noise: float = 1e-3
+    resolution: float = 0.1
+    tolerance: Tolerances = None
+    map: Flag = False
 
 
 @app.command
@@ -17,27 +49,8 @@ def calibrate(
     scene: Path,
     /,
     *,
-    gauge: Annotated[
-        str,
-        Parameter(
-            help="Name of a [[gauge]] of the scene; or several readings together, with commas: gauges, m1.x of a "
-            "[[marker]], taxels."
-        ),
-    ],
-    out: Annotated[Path, Parameter(help="Folder for the results.")],
-    mu: Annotated[
-        str, Parameter(help="Values of mu: first:last:count, or numbers separated by commas.")
-    ] = "0.02:1.2:25",
-    noise: Noise = 1.5e-4,
-    marker_noise: Annotated[float, Parameter(help="Standard deviation of a reading of a marker, mm.")] = 0.02,
-    taxel_noise: Annotated[float, Parameter(help="Standard deviation of a reading of a taxel, MPa.")] = 1e-3,
-    resolution: Annotated[
-        float, Parameter(help="Largest standard deviation of mu at which the sensor is usable.")
-    ] = 0.1,
-    tolerance: Tolerances = None,
-    map_: Annotated[
-        bool, Parameter(name="--map", negative=(), help="Also map the sensitivity of strain to mu over the section.")
-    ] = False,
+    out: Out,
+    options: Annotated[CalibrationOptions, Parameter(name="*")],
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -62,16 +75,16 @@ def calibrate(
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
         calibration = run(
             loaded,
-            [name.strip() for name in gauge.split(",")],
+            [name.strip() for name in options.gauge.split(",")],
             out,
-            parsed_mus(mu),
-            noise,
-            resolution,
-            parsed_tolerances(tolerance),
+            parsed_mus(options.mu),
+            options.noise,
+            options.resolution,
+            parsed_tolerances(options.tolerance),
             report=report,
-            maps=map_,
-            marker_noise_mm=marker_noise,
-            taxel_noise_MPa=taxel_noise,
+            maps=options.map,
+            marker_noise_mm=options.marker_noise,
+            taxel_noise_MPa=options.taxel_noise,
         )
     if json_:
         print_json(as_dict(calibration))

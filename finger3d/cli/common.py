@@ -49,6 +49,12 @@ app = App(
 _LONGEST = 4000
 """Most characters of a message, which may quote what a user has typed."""
 
+Flag = Annotated[bool, Parameter(negative=())]
+"""An option without a value and without an opposite."""
+
+Texts = Annotated[list[str], Parameter(negative=())]
+"""An option that may be repeated."""
+
 Set = Annotated[
     list[str] | None,
     Parameter(name="--set", negative=(), help="Override a key, for instance friction.mu=0.5; may be repeated."),
@@ -62,6 +68,10 @@ Json = Annotated[
         help="Write only JSON to standard output, for scripts; all other text goes to standard error.",
     ),
 ]
+
+Out = Annotated[Path, Parameter(help="Folder for the results.")]
+
+Continued = Annotated[Path, Parameter(help="Folder for the results; what was interrupted continues there.")]
 
 Noise = Annotated[float, Parameter(help="Standard deviation of a strain reading; the default is that of Maeno 2004.")]
 
@@ -139,6 +149,14 @@ def check_folder(out: Path) -> None:
             pass
     except OSError as error:
         raise Finger3dError(f"--out {out}: cannot be written: {error.strerror}") from None
+
+
+def numbers(option: str, text: str, wanted: str) -> list[float]:
+    """Return numbers that are separated by commas; `wanted` is what to give instead of a text that is none."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise Finger3dError(f"{option} {text}: must be {wanted}") from None
 
 
 def complain(text: str) -> None:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.cli.common import Json, Out, Set, app, job, load, numbers, print_columns, print_json
+from finger3d.errors import MissingError
 
 
 @app.command
@@ -16,10 +13,8 @@ def compare(
     scene: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the results.")],
-    widths: Annotated[
-        str | None, Parameter(help="Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.")
-    ] = None,
+    out: Out,
+    widths: str | None = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -31,8 +26,12 @@ def compare(
     ----------
     scene
         The scene file (TOML).
+    widths
+        Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.
     """
-    chosen = None if widths is None else [_width(text) for text in widths.split(",")]
+    chosen = (
+        None if widths is None else numbers("--widths", widths, "numbers of mm with commas, for instance 5,20,50,200")
+    )
     loaded = load(scene, set_, out)
     from finger3d.analyses.compare.run import compare as run
     from finger3d.results.summary import read_json
@@ -49,10 +48,3 @@ def compare(
     if not result.outcome.ok:
         failed = sum(not case.ok for case in result.cases)
         raise MissingError(f"{scene}: {failed} of {len(result.cases)} cases gave no numbers: {result.outcome}")
-
-
-def _width(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise Finger3dError(f"--widths: {text.strip()!r} is not a number; give mm with commas: 5,20,50,200") from None

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from finger3d.cli.common import Json, Set, app, job, load, print_columns, print_json
 from finger3d.errors import Finger3dError
@@ -20,11 +16,8 @@ def cost(
     scene: Path,
     /,
     *,
-    of: Annotated[
-        str | None,
-        Parameter(help="Numbers whose errors are meant, separated by commas, or all; default: the normal force."),
-    ] = None,
-    png: Annotated[Path | None, Parameter(help="Draw the errors against the time.")] = None,
+    of: str | None = None,
+    png: Path | None = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -36,6 +29,10 @@ def cost(
     ----------
     scene
         The scene file (TOML).
+    of
+        Numbers whose errors are meant, separated by commas, or all; default: the normal force.
+    png
+        Draw the errors against the time.
     """
     if png is not None and png.suffix.lower() != ".png":
         raise Finger3dError(f"--png {png}: the name must end in .png")
@@ -49,7 +46,8 @@ def cost(
         return
     head, *lines = found.table()
     print_columns(head, lines)
-    print(f"meshes are chosen for the errors of {_names(found.of)}; expected errors of mesh and increments")
+    chosen_for = ", ".join(found.of) if len(found.of) <= _MOST_NAMES else f"all {len(found.of)} numbers"
+    print(f"meshes are chosen for the errors of {chosen_for}; expected errors of mesh and increments")
     for row in found.rows:
         if row.limit:
             print(f"{100 * (row.error or 0.0):g} %: {row.limit}")
@@ -59,7 +57,3 @@ def cost(
             print(f"  {100 * row.error:g} %: " + " ".join(f"--set {key}" for key in row.keys))
     if png is not None:
         print(f"{png} written")
-
-
-def _names(of: Sequence[str]) -> str:
-    return ", ".join(of) if len(of) <= _MOST_NAMES else f"all {len(of)} numbers"

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from finger3d.cli.common import Json, Set, app, check_writable, job, print_json, print_rows
+from finger3d.cli.common import Continued, Json, Set, Texts, app, check_writable, job, print_json, print_rows
 
 
 @app.command
@@ -15,22 +12,9 @@ def identify(
     scene: Path,
     /,
     *,
-    measured: Annotated[
-        Path,
-        Parameter(
-            help="CSV file: step, time_s, depth_mm or a slide, and columns named as in history.csv, such as "
-            "normal_force_N; optionally their standard deviations, such as normal_force_N_std."
-        ),
-    ],
-    free: Annotated[
-        list[str],
-        Parameter(
-            negative=(),
-            help="A free key and its bounds, for instance material.E_MPa=0.05:5; or depth_offset_mm=-1:1, which is "
-            "added to the measured depth; may be repeated.",
-        ),
-    ],
-    out: Annotated[Path, Parameter(help="Folder for the results; an interrupted identification continues there.")],
+    measured: Path,
+    free: Texts,
+    out: Continued,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -43,6 +27,12 @@ def identify(
     ----------
     scene
         The scene file (TOML).
+    measured
+        CSV file: step, time_s, depth_mm or a slide, and columns named as in history.csv, such as
+        normal_force_N; optionally their standard deviations, such as normal_force_N_std.
+    free
+        A free key and its bounds, for instance material.E_MPa=0.05:5; or depth_offset_mm=-1:1, which is added
+        to the measured depth; may be repeated.
     """
     from finger3d.analyses.identify.run import DEVIATIONS
     from finger3d.analyses.identify.run import identify as run

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, job, load, print_json, print_rows
+from finger3d.cli.common import Flag, Json, Out, Set, app, job, load, print_json, print_rows
 from finger3d.errors import Finger3dError, MissingError, Outcome
 
 if TYPE_CHECKING:
@@ -28,20 +29,33 @@ _SIDEWAYS = (
 """Numbers of a path that leaves the press axis; they are printed where they are not 0."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class PressOptions:
+    """What a press does besides.
+
+    Parameters
+    ----------
+    figures
+        Draw the pictures.
+    error
+        Estimate the errors due to the mesh and the increments.
+    least_grip
+        Find the smallest grip that holds, of a scene with two fingers.
+    """
+
+    figures: bool = True
+    error: bool = True
+    least_grip: Flag = False
+
+
 @app.command
 def press(
     scene: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the results.")],
+    out: Out,
     set_: Set = None,
-    figures: Annotated[bool, Parameter(negative="--no-figures", help="Draw the pictures.")] = True,
-    error: Annotated[
-        bool, Parameter(negative="--no-error", help="Estimate the errors due to the mesh and the increments.")
-    ] = True,
-    least_grip: Annotated[
-        bool, Parameter(negative=(), help="Find the smallest grip that holds, of a scene with two fingers.")
-    ] = False,
+    options: Annotated[PressOptions, Parameter(name="*")] = PressOptions(),
     json_: Json = False,
 ) -> None:
     """Solve a scene: geometry, mesh, frictional contact, results.
@@ -59,7 +73,7 @@ def press(
     from finger3d.scene.derived import moduli
 
     with job(json_, lambda report: _kept(out, report)) as report:
-        result = run(loaded, out, report, figures=figures, error=error, least_grip=least_grip)
+        result = run(loaded, out, report, **asdict(options))
     summary = result.summary()
     if json_:
         print_json(summary)

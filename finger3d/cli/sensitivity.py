@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from finger3d.cli.common import Json, Set, app, check_writable, job, print_columns, print_json
+from finger3d.cli.common import Json, Set, Texts, app, check_writable, job, print_columns, print_json
 from finger3d.cli.tolerances import parsed_tolerances
 
 
@@ -16,16 +13,9 @@ def sensitivity(
     scene: Path,
     /,
     *,
-    of: Annotated[str, Parameter(help="Numbers of the press, separated by commas, such as gauge_g36,stick_area_mm2.")],
-    out: Annotated[Path, Parameter(help="Folder for sensitivity.json, sensitivity.csv and sensitivity.png.")],
-    tolerance: Annotated[
-        list[str] | None,
-        Parameter(
-            negative=(),
-            help="Change of a key, for instance friction.mu=0.02; may be repeated. Unless given, that of a careful "
-            "set-up where one is known, else 1 % of the value.",
-        ),
-    ] = None,
+    of: str,
+    out: Path,
+    tolerance: Texts | None = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -37,6 +27,13 @@ def sensitivity(
     ----------
     scene
         The scene file (TOML).
+    of
+        Numbers of the press, separated by commas, such as gauge_g36,stick_area_mm2.
+    out
+        Folder for sensitivity.json, sensitivity.csv and sensitivity.png.
+    tolerance
+        Change of a key, for instance friction.mu=0.02; may be repeated. Unless given, that of a careful set-up
+        where one is known, else 1 % of the value.
     """
     from finger3d.analyses.sensitivity import sensitivity as run
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from finger3d.cli.common import app, check_folder
 from finger3d.errors import Finger3dError
@@ -16,11 +13,9 @@ def show(
     folder: Path,
     /,
     *,
-    png: Annotated[Path | None, Parameter(help="Write a picture of one increment instead of opening a window.")] = None,
-    gif: Annotated[
-        Path | None, Parameter(help="Write an animation of the increments instead of opening a window.")
-    ] = None,
-    step: Annotated[int | None, Parameter(help="Number of the increment in the picture; default: the last.")] = None,
+    png: Path | None = None,
+    gif: Path | None = None,
+    step: int | None = None,
 ) -> None:
     """Show a result in a window with fields, increments and a clip plane; --png and --gif need no display.
 
@@ -30,6 +25,12 @@ def show(
     ----------
     folder
         Results of `finger3d press`; or of `finger3d sweep`, whose charts --png draws.
+    png
+        Write a picture of one increment instead of opening a window.
+    gif
+        Write an animation of the increments instead of opening a window.
+    step
+        Number of the increment in the picture; default: the last.
     """
     if (folder / "sweep.json").is_file():
         _show_sweep(folder, png, gif, step)

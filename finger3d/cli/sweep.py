@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Set, app, check_writable, job, print_columns, print_json, print_rows
+from finger3d.cli.common import (
+    Continued,
+    Json,
+    Set,
+    Texts,
+    app,
+    check_writable,
+    job,
+    print_columns,
+    print_json,
+    print_rows,
+)
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.progress import Progress
 
@@ -18,36 +31,62 @@ if TYPE_CHECKING:
 _MOST_POINTS, _MOST_GAUGES = 10, 3  # in the printed table
 
 
+@dataclass(frozen=True, kw_only=True)
+class SweepOptions:
+    """Which points are pressed, and where.
+
+    Parameters
+    ----------
+    vary
+        A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated.
+    points
+        CSV file with a column for each key and a row for each point, instead of --vary.
+    sample
+        Points within --range, instead of --vary: lhs:200 (Latin hypercube) or random:200.
+    range
+        A key and its bounds, as friction.mu=0.05:1; may be repeated.
+    seed
+        Of the random numbers of --sample.
+    scheduler
+        Address of a Dask scheduler that runs the presses, instead of processes here.
+    workers
+        Number of processes on this machine; default: one for each core, none for a single body.
+    """
+
+    vary: Texts | None = None
+    points: Path | None = None
+    sample: str | None = None
+    range: Texts | None = None
+    seed: int = 0
+    scheduler: str | None = None
+    workers: int | None = None
+
+    def check(self) -> None:
+        """Raise a Finger3dError for options that contradict each other."""
+        if self.workers is not None and self.workers < 1:
+            raise Finger3dError(f"--workers {self.workers}: must be at least 1")
+        if self.workers is not None and self.scheduler is not None:
+            raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
+        if sum(given is not None for given in (self.vary, self.points, self.sample)) != 1:
+            raise Finger3dError(
+                "sweep: give one of --vary, --points and --sample, for instance --vary friction.mu=0.06,0.25,1"
+            )
+        if self.range is not None and self.sample is None:
+            raise Finger3dError("--range: only with --sample, for instance --sample lhs:200")
+        if self.sample in ("grid", "list"):
+            raise Finger3dError(
+                f"--sample {self.sample}: must be lhs:NUMBER or random:NUMBER; --vary and --points list points"
+            )
+
+
 @app.command
 def sweep(
     scene: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the results; an interrupted sweep continues there.")],
-    vary: Annotated[
-        list[str] | None,
-        Parameter(negative=(), help="A key and its values, for instance friction.mu=0.06,0.25,1; may be repeated."),
-    ] = None,
-    points: Annotated[
-        Path | None, Parameter(help="CSV file with a column for each key and a row for each point, instead of --vary.")
-    ] = None,
-    sample: Annotated[
-        str | None,
-        Parameter(help="Points within --range, instead of --vary: lhs:200 (Latin hypercube) or random:200."),
-    ] = None,
-    range_: Annotated[
-        list[str] | None,
-        Parameter(name="--range", negative=(), help="A key and its bounds, as friction.mu=0.05:1; may be repeated."),
-    ] = None,
-    seed: Annotated[int, Parameter(help="Of the random numbers of --sample.")] = 0,
+    out: Continued,
+    options: Annotated[SweepOptions, Parameter(name="*")] = SweepOptions(),
     set_: Set = None,
-    scheduler: Annotated[
-        str | None, Parameter(help="Address of a Dask scheduler that runs the presses, instead of processes here.")
-    ] = None,
-    workers: Annotated[
-        int | None,
-        Parameter(help="Number of processes on this machine; default: one for each core, none for a single body."),
-    ] = None,
     json_: Json = False,
 ) -> None:
     """Press many points in parallel; the same command continues after an interruption.
@@ -62,28 +101,22 @@ def sweep(
     scene
         The scene file (TOML).
     """
-    if workers is not None and workers < 1:
-        raise Finger3dError(f"--workers {workers}: must be at least 1")
-    if workers is not None and scheduler is not None:
-        raise Finger3dError("--workers and --scheduler: give one of them; a cluster has its own workers")
-    if sum(given is not None for given in (vary, points, sample)) != 1:
-        raise Finger3dError(
-            "sweep: give one of --vary, --points and --sample, for instance --vary friction.mu=0.06,0.25,1"
-        )
-    if range_ is not None and sample is None:
-        raise Finger3dError("--range: only with --sample, for instance --sample lhs:200")
-    if sample in ("grid", "list"):
-        raise Finger3dError(f"--sample {sample}: must be lhs:NUMBER or random:NUMBER; --vary and --points list points")
+    options.check()
     from finger3d.analyses.sweep.run import sweep as run
 
     check_writable(out, scene)
-    given = points or (vary if sample is None else range_) or ()
+    given = options.points or (options.vary if options.sample is None else options.range) or ()
+    where, sample = (options.scheduler, options.workers), options.sample or "grid"
     with job(json_, lambda done: _kept(done, out)) as report:
-        store = run(scene, given, out, set_ or (), scheduler, workers, report, sample or "grid", seed).store
+        store = run(scene, given, out, set_ or (), *where, report, sample, options.seed).store
+    points = _points(store)
     if json_:
-        print_json(_as_dict(store, out))
+        kept, bodies = len(store.rows), len(store.sweep.bodies)
+        without = sum(row["outcome"] != "converged" for row in points)
+        counts = {"points": len(store.sweep.points), "kept": kept, "failed": without, "bodies": bodies}
+        print_json({"results": out, **counts, "rows": points})
     else:
-        _print_points(store)
+        _print_points(store, points)
         print_rows(store.sweep.title, _rows(store, out))
     failed = [row for row in (store.rows | store.lost).values() if row["outcome"] != "converged"]
     if failed:
@@ -105,20 +138,7 @@ def _points(store: ResultStore) -> list[dict[str, object]]:
     return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
 
 
-def _as_dict(store: ResultStore, out: Path) -> dict[str, object]:
-    points = _points(store)
-    failed = sum(row["outcome"] != "converged" for row in points)
-    return {
-        "results": out,
-        "points": len(store.sweep.points),
-        "kept": len(store.rows),
-        "failed": failed,
-        "bodies": len(store.sweep.bodies),
-        "rows": points,
-    }
-
-
-def _print_points(store: ResultStore) -> None:
+def _print_points(store: ResultStore, points: Sequence[Mapping[str, object]]) -> None:
     """Print the varied keys and the main numbers of the first points."""
     from finger3d.mechanics.readings.columns import MAIN
     from finger3d.report.build import number
@@ -127,7 +147,6 @@ def _print_points(store: ResultStore) -> None:
     def cell(value: object) -> str:
         return "" if isinstance(value, float) and math.isnan(value) else number(value)
 
-    points = _points(store)
     if not points:
         return
     gauges = [c.key for c in strains_of(store.sweep.given) if c.key in points[0]][:_MOST_GAUGES]

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -28,69 +28,75 @@ def lacks_section(design: Design) -> str:
     return "a design without a constant section"
 
 
-class Design(Protocol):
-    """Shape of a body in mm, a frozen dataclass: y points up, the base lies on y = 0, and its middle is the origin."""
+class Design(ABC):
+    """Shape of a body in mm, a frozen dataclass: y points up, the base lies on y = 0, and its middle is the origin.
 
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[object]]]
+    Attributes
+    ----------
+    name : in scenes and messages
+    height_mm : largest height above the base
+    half_length_mm : largest abs(x)
+    width_mm : twice the largest abs(z)
+    volume_mm3 : of the whole body
+    """
 
-    def __hash__(self) -> int:
-        """Hash of the fields."""
-        ...
+    if TYPE_CHECKING:  # fields, class variables or properties
+        __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[object]]]
 
-    @property
-    def name(self) -> str:
-        """Name in scenes and messages."""
-
-    @property
-    def height_mm(self) -> float:
-        """Largest height above the base."""
-
-    @property
-    def half_length_mm(self) -> float:
-        """Largest abs(x)."""
-
-    @property
-    def width_mm(self) -> float:
-        """Twice the largest abs(z)."""
-
-    @property
-    def volume_mm3(self) -> float:
-        """Volume of the whole body."""
+        @property
+        def name(self) -> str: ...
+        @property
+        def height_mm(self) -> float: ...
+        @property
+        def half_length_mm(self) -> float: ...
+        @property
+        def width_mm(self) -> float: ...
+        @property
+        def volume_mm3(self) -> float: ...
 
     @property
+    @abstractmethod
     def cache_fields(self) -> Mapping[str, object]:
         """Key of the body's meshes in the cache: equal for equal shapes only."""
 
     @property
     def part_labels(self) -> tuple[str, ...]:
         """Labels of the solids beside the main body; empty for a body of one solid."""
+        return ()
 
     def section(self) -> Section | None:
-        """Return the section x >= 0 of a body extruded along z; None if the section is not constant."""
+        """Return the section x >= 0 of a body extruded along z; None if the section is not constant or not known."""
+        return None
 
+    @abstractmethod
     def top(self, x: Float, z: Float) -> Float:
         """Return the height y (n,) of the contact surface at x, z (n,), mm; nan outside the body."""
 
     def landmarks(self) -> Float | None:
         """Return places (k, 2), x and z in mm, where an edge or a tip may touch first; None for a smooth surface."""
+        return None
 
     def mirrors(self) -> tuple[str, ...]:
         """Return the axes, of "x" and "z", normal to planes of symmetry through the origin."""
+        return ()
 
+    @abstractmethod
     def solid(self) -> Solid:
         """Return the build123d solid of the whole body, its faces labelled."""
 
     def solids(self) -> Mapping[str, Solid | Compound]:
         """Return the build123d solids of the parts by their labels, "" the main body; together they are `solid()`."""
+        return {"": self.solid()}
 
     def tessellation(self) -> Tessellation | None:
-        """Return the body's own triangles if it has no CAD; None for a body that is meshed from CAD."""
+        """Return the body's own triangles if it has no CAD; None for a body that is meshed from CAD, or not meshed."""
+        return None
 
 
-class ParametricDesign(ABC):
+class ParametricDesign(Design):
     """Base of the designs in geometries/: frozen dataclasses of dimensions, mirror images of themselves about x and z.
 
-    A subclass states the properties of :class:`Design`, as fields or as properties, and `top` and `solid`.
+    A subclass states the attributes of :class:`Design`, as fields or as properties, and `top` and `solid`.
     """
 
     name: ClassVar[str]
@@ -102,7 +108,6 @@ class ParametricDesign(ABC):
     @property
     def dimensions(self) -> dict[str, float]:
         """The fields, mm."""
-        assert dataclasses.is_dataclass(self)
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @property
@@ -110,38 +115,9 @@ class ParametricDesign(ABC):
         """Name and dimensions; the cache adds a hash of the design's file."""
         return {"design": self.name, "dimensions": {key: repr(value) for key, value in self.dimensions.items()}}
 
-    @property
-    def part_labels(self) -> tuple[str, ...]:
-        """No labels: the body is one solid."""
-        return ()
-
-    def section(self) -> Section | None:
-        """Return None: the section is not constant along z."""
-        return None
-
-    @abstractmethod
-    def top(self, x: Float, z: Float) -> Float:
-        """See :meth:`Design.top`."""
-
-    def landmarks(self) -> Float | None:
-        """Return None: the contact surface is smooth."""
-        return None
-
     def mirrors(self) -> tuple[str, ...]:
         """Return both axes."""
         return ("x", "z")
-
-    @abstractmethod
-    def solid(self) -> Solid:
-        """See :meth:`Design.solid`."""
-
-    def solids(self) -> Mapping[str, Solid | Compound]:
-        """Return the main body only."""
-        return {"": self.solid()}
-
-    def tessellation(self) -> Tessellation | None:
-        """Return None: the body is meshed from CAD."""
-        return None
 
 
 class ExtrudedDesign(ParametricDesign):
@@ -181,46 +157,27 @@ class ExtrudedDesign(ParametricDesign):
 
 
 @dataclasses.dataclass(frozen=True)
-class DesignSummary:
+class DesignSummary(Design):
     """Height and width (mm) of a body whose shape is not known, as in a reduced model."""
 
     name: ClassVar[str] = "reduced"
-    part_labels: ClassVar[tuple[str, ...]] = ()
     half_length_mm: ClassVar[float] = math.nan
     volume_mm3: ClassVar[float] = math.nan
-
     height_mm: float
     width_mm: float
 
     @property
     def cache_fields(self) -> Mapping[str, object]:
-        """See :attr:`Design.cache_fields`; there are no meshes."""
+        """No key: there are no meshes."""
         return {}
 
-    def section(self) -> None:
-        """Return None: the shape is not known."""
-
     def top(self, x: Float, z: Float) -> Float:
-        """Return nan (n,): the shape is not known."""
+        """Return nan (n,)."""
         return np.full(np.broadcast_shapes(np.shape(x), np.shape(z)), np.nan)
 
-    def landmarks(self) -> None:
-        """Return None: the shape is not known."""
-
-    def mirrors(self) -> tuple[str, ...]:
-        """Return no axes: the shape is not known."""
-        return ()
-
     def solid(self) -> Solid:
-        """Raise a Finger3dError: the shape is not known."""
+        """Raise a Finger3dError."""
         raise Finger3dError("a reduced model has no solid; use the scene that it was made of")
-
-    def solids(self) -> Mapping[str, Solid | Compound]:
-        """Raise a Finger3dError: the shape is not known."""
-        return {"": self.solid()}
-
-    def tessellation(self) -> None:
-        """Return None: the shape is not known."""
 
 
 def check_dimensions(design: str, dimensions: Mapping[str, object], may_be_zero: Collection[str] = ()) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface import Triangles, connected
 from finger3d.geometry.surface_checks import mistake
 from finger3d.geometry.tessellate import CadFace, Tessellation
 
@@ -149,19 +149,14 @@ def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _joined(surface: Triangles, kind: Int) -> Int:
     """Return the number (m,) of the patch of each triangle; a patch is of one kind and has no crease."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     a, b, _ = _neighbours(surface)
     joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE_COSINE)
-    links = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(len(kind), len(kind)))
-    value: Int = connected_components(links, directed=False)[1].astype(np.int64)
-    return value
+    return connected(len(kind), a[joined], b[joined])
 
 
 def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
     """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two."""
-    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges = np.sort(surface.edges, axis=1)
     order = np.lexsort(edges.T)
     edges = edges[order]
     owner = np.repeat(np.arange(len(surface.faces)), 3)[order]

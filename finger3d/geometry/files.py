@@ -18,7 +18,7 @@ from finger3d._extras import require
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface import Triangles, connected
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
@@ -166,20 +166,16 @@ def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
     _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
     points, faces = points[first], number.reshape(-1)[faces]
     surface = Triangles(points, _proper(faces))
-    edges = np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
+    unique, count = np.unique(np.sort(surface.edges, axis=1), axis=0, return_counts=True)
     loose = np.unique(unique[count == 1])
     if not len(loose) or not np.isfinite(points).all():
         return surface
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     near = loose[cKDTree(points[loose]).query_pairs(_WELD_DISTANCE * surface.size, output_type="ndarray")]
-    joined = coo_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(points), len(points)))
-    _, number = connected_components(joined, directed=False)
+    number = connected(len(points), *near.T)
     _, first = np.unique(number, return_index=True)
-    return Triangles(points[first], _proper(number[faces].astype(np.int64)))
+    return Triangles(points[first], _proper(number[faces]))
 
 
 def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:

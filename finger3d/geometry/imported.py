@@ -42,7 +42,7 @@ def in_mm(*lengths: float) -> str:
     return " x ".join(f"{length:.4g}" for length in lengths) + " mm"
 
 
-class FileDesign:
+class FileDesign(Design):
     """Base of the bodies that are read from files, whose extent is that of their surface.
 
     Attributes
@@ -80,9 +80,6 @@ class FileDesign:
         base = self.surface.corners[(self.surface.corners[:, :, 1] == 0.0).all(axis=1)].reshape(-1, 3)
         foot = np.ptp(base, axis=0)
         return f"{in_mm(*(self.surface.high - self.surface.low))} (x, y up, z), base {in_mm(foot[0], foot[2])}"
-
-    def section(self) -> None:
-        """Return None: no constant section is known of a file."""
 
     def top(self, x: Float, z: Float) -> Float:
         """Return the height y (n,) of the highest point at x, z (n,), mm; nan outside the body."""
@@ -220,6 +217,8 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
     base: list[Face] = []
     parts: dict[str, list[Solid]] = {}
     if path.suffix.lower() in STEP:
+        from build123d import Axis
+
         from finger3d.geometry.cad import enlarged
 
         read = read_step(path)
@@ -233,7 +232,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
         if scale != 1.0:
             moves.append(lambda shape: enlarged(shape, scale))
         if upside_down and not base:
-            moves.append(_upside_down)
+            moves.append(lambda shape: shape.rotate(Axis.Z, 180.0))
         for move in moves:
             solid, parts = move(solid), {label: [move(s) for s in found] for label, found in parts.items()}
         surface = tessellated(solid)
@@ -290,12 +289,6 @@ def _moved(parts: Mapping[str, list[Solid]], middle: Float) -> dict[str, Compoun
 
     place = Location(tuple(float(-m) for m in middle))
     return {label: Compound([solid.moved(place) for solid in found]) for label, found in parts.items()}
-
-
-def _upside_down(solid: Solid) -> Solid:
-    from build123d import Axis
-
-    return solid.rotate(Axis.Z, 180.0)
 
 
 def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Imported:

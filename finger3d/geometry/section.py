@@ -161,24 +161,18 @@ def with_layer(section: Section, thickness_mm: float) -> Section:
     """Return a section with a layer of constant thickness (mm) under its contact curve, from wall to wall.
 
     Where the contact curve runs down to the base, the layer ends on the base.
-
-    Raises
-    ------
-    ValueError
-        If the layer's inner curve meets neither the walls above the base nor, without walls, the base.
+    See `largest_layer_mm`.
     """
     contact, length, edge = section.contact, section.half_length_mm, section.edge_height_mm
-    if thickness_mm >= largest_layer_mm(section):
-        raise ValueError(f"a layer of {thickness_mm} mm does not fit into the section")
     if isinstance(contact, Flat):
         below = block_section(length, edge - thickness_mm)
-        return replace(section, layer=Layer(below, "skin"))
+        return replace(section, layer=Layer(below))
     radius, centre = contact.radius_mm - thickness_mm, contact.centre_y_mm
     if edge == 0.0:
         length = math.sqrt(radius**2 - centre**2)
     else:
         edge = centre + math.sqrt(radius**2 - length**2)
-    return replace(section, layer=Layer(cylinder_section(radius, length, edge), "skin"))
+    return replace(section, layer=Layer(cylinder_section(radius, length, edge)))
 
 
 def largest_layer_mm(section: Section) -> float:
@@ -192,17 +186,8 @@ def largest_layer_mm(section: Section) -> float:
 
 
 def with_core(section: Section, core: Core) -> Section:
-    """Return a section with a core that stands on its base, below its layer if it has one.
-
-    Raises
-    ------
-    ValueError
-        If the core leaves the section below the layer.
-    """
-    inner = section.inner
-    if core.half_length_mm > inner.half_length_mm or core.height_mm >= largest_core_mm(section, core.half_length_mm):
-        raise ValueError(f"{core} does not fit into the section")
-    inner = replace(inner, core=core)
+    """Return a section with a core that stands on its base, below its layer; see `largest_core_mm`."""
+    inner = replace(section.inner, core=core)
     return replace(section, layer=replace(section.layer, below=inner)) if section.layer else inner
 
 

@@ -57,6 +57,11 @@ class Triangles:
         """Corners (m, 3, 3) of the triangles, mm."""
         return self.points[self.faces]
 
+    @property
+    def edges(self) -> Int:
+        """Ends (3 m, 2) of the edges of every triangle, in its order."""
+        return self.faces[:, _EDGES].reshape(-1, 2)
+
     @cached_property
     def area_vectors(self) -> Float:
         """Normals (m, 3) as long as the area, mm2."""
@@ -208,7 +213,6 @@ class Triangles:
 
         face = np.full(len(places), -1, dtype=np.int64)
         bary = np.zeros((len(places), 3))
-        best = np.full(len(places), np.inf)
         flat = self.corners[:, :, ::2]
         for query, number in tree.pairs(len(places), inside):
             item = facing[number]
@@ -217,7 +221,7 @@ class Triangles:
             y = np.einsum("ij,ij->i", weight, self.corners[item, :, 1]) * (1.0 if lowest else -1.0)
             order = np.lexsort((item, y, query))  # the number breaks ties, so that a result can be repeated
             first = order[np.unique(query[order], return_index=True)[1]]
-            face[query[first]], bary[query[first]], best[query[first]] = item[first], weight[first], y[first]
+            face[query[first]], bary[query[first]] = item[first], weight[first]
         return face, bary
 
     def height(self, x: Float, z: Float, lowest: bool = True) -> Float:
@@ -240,7 +244,6 @@ class Triangles:
         closest = np.zeros_like(points)
         face = np.full(len(points), -1, dtype=np.int64)
         feature = np.zeros(len(points), dtype=np.int64)
-        best = np.full(len(points), np.inf)
 
         def near(query: Int, level: int, node: Int) -> NDArray[np.bool_]:
             return cylinder_distance(points[query], self._bounding_cylinders[level][node]) <= reach[query]
@@ -254,8 +257,7 @@ class Triangles:
             distance = np.linalg.norm(points[query] - p, axis=1)
             order = np.lexsort((item, distance, query))
             first = order[np.unique(query[order], return_index=True)[1]]
-            closest[query[first]], face[query[first]] = p[first], item[first]
-            feature[query[first]], best[query[first]] = which[first], distance[first]
+            closest[query[first]], face[query[first]], feature[query[first]] = p[first], item[first], which[first]
         return closest, face, feature
 
     def _distance_bound(self, points: Float) -> Float:
@@ -293,6 +295,15 @@ class Triangles:
         far = length > 1e-9 * self.size
         normal[far] = out[far] * (sign[far] / length[far])[:, None]
         return sign * length, normal
+
+
+def connected(count: int, a: Int, b: Int) -> Int:
+    """Return the number (count,) of the connected piece of each item, where the items a and b (k,) are linked."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def _normalise(vectors: Float) -> Float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface import Triangles, connected
 
 _FLAT = 1e-9  # thickness over length
 
@@ -21,8 +21,7 @@ def mistake(surface: Triangles, may_be_hollow: bool = False) -> str:
         return f"has {len(faces)} triangles, which enclose nothing"
     if not np.isfinite(points).all():
         return "has a point that is not a number (NaN or infinite)"
-    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    owner = np.repeat(np.arange(len(faces)), 3)
+    edges = surface.edges
     key = np.sort(edges, axis=1) @ [len(points), 1]
     _, number, owners = np.unique(key, return_inverse=True, return_counts=True)
     sides = owners[number]
@@ -42,7 +41,8 @@ def mistake(surface: Triangles, may_be_hollow: bool = False) -> str:
             f"has flipped triangles: neighbours face opposite ways along {int((forward != 1).sum())} edges, the first "
             f"at {_place(points[first])}"
         )
-    piece = _pieces(owner, number, len(faces))
+    a, b = (np.argsort(number, kind="stable") // 3).reshape(-1, 2).T  # every edge has two triangles here
+    piece = connected(len(faces), a, b)
     pieces = int(piece.max()) + 1
     if pieces > 1 and not (may_be_hollow and (_volumes(surface, piece) > 0.0).sum() == 1):
         return f"is in {pieces} pieces (or hollow); give one solid body"
@@ -67,20 +67,9 @@ def _volumes(surface: Triangles, piece: Int) -> Float:
     return np.asarray(np.bincount(piece, np.einsum("ij,ij->i", reach, surface.area_vectors) / 3.0), dtype=float)
 
 
-def _pieces(owner: Int, edge: Int, count: int) -> Int:
-    """Return the number (m,) of the connected piece that each triangle belongs to."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    order = np.argsort(edge, kind="stable")
-    a, b = owner[order[0::2]], owner[order[1::2]]  # every edge has two owners here
-    found: Int = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
-    return found
-
-
 def crossings(surface: Triangles) -> Int:
     """Triangles (k,) that an edge of another triangle, which shares no point with it, passes through."""
-    ends = np.unique(np.sort(surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.unique(np.sort(surface.edges, axis=1), axis=0)
     start, stop = surface.points[ends[:, 0]], surface.points[ends[:, 1]]
     low, high = np.minimum(start, stop), np.maximum(start, stop)
 

@@ -101,14 +101,12 @@ def _triangles(solid: Solid, tolerance_mm: float, angle: float, name: str) -> Tr
     return surface
 
 
-def write_stl(path: Path, surface: Triangles, text: bool) -> None:
-    """Write a closed surface, mm: binary, or as text."""
+def write_stl(path: Path, surface: Triangles) -> None:
+    """Write a closed surface, mm, as binary STL."""
     import trimesh
 
-    mesh = trimesh.Trimesh(surface.points, surface.faces, process=False)
-    data = trimesh.exchange.stl.export_stl_ascii(mesh) if text else trimesh.exchange.stl.export_stl(mesh)
     with atomic(path) as temporary:
-        temporary.write_bytes(data.encode("ascii") if isinstance(data, str) else data)
+        trimesh.Trimesh(surface.points, surface.faces, process=False).export(temporary, file_type="stl")
 
 
 def write_step(path: Path, shape: Shape) -> None:
@@ -215,4 +213,4 @@ class Body:
         """Return a tessellated part without the body."""
         from finger3d.mold.regions import difference
 
-        return Shell(difference(part.surface, [self.surface]), part.tolerance_mm, part.angle)
+        return Shell(difference(part.surface, self.surface), part.tolerance_mm, part.angle)

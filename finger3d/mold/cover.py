@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d.errors import Finger3dError
-from finger3d.mold.options import MoldOptions
+from finger3d.mold.options import LID_MM, MoldOptions
 from finger3d.mold.regions import disc, inside, nearest, widened
 from finger3d.mold.solids import cone, cylinder
 
@@ -40,10 +40,11 @@ class Ports:
     vent_mm: float
     vents: tuple[tuple[float, float], ...]
 
-    def volume_mm3(self, lid_mm: float) -> float:
-        """Return the volume of the pour hole and the vents in a lid of this thickness."""
+    @property
+    def volume_mm3(self) -> float:
+        """Volume of the pour hole and the vents in the lid."""
         a, b = self.pour_mm / 2.0, self.funnel_mm / 2.0
-        return math.pi * lid_mm * ((a * a + a * b + b * b) / 3.0 + len(self.vents) * self.vent_mm**2 / 4.0)
+        return math.pi * LID_MM * ((a * a + a * b + b * b) / 3.0 + len(self.vents) * self.vent_mm**2 / 4.0)
 
 
 def ports(base: CrossSection, options: MoldOptions) -> Ports:
@@ -63,7 +64,7 @@ def ports(base: CrossSection, options: MoldOptions) -> Ports:
     pour = largest = min(6.0, 0.3 * size)
     while True:
         pour_mm = pour if options.pour_mm is None else options.pour_mm
-        vent_mm = min(2.0, 0.1 * size, pour) if options.vent_mm is None else options.vent_mm
+        vent_mm = min(2.0, 0.1 * size, pour)
         vents = _vents(base, vent_mm)
         allowed = widened(base, -pour_mm / 2.0)
         for place in vents:
@@ -71,10 +72,10 @@ def ports(base: CrossSection, options: MoldOptions) -> Ports:
         if vents and not allowed.is_empty():
             break
         pour *= 0.95
-        if pour < min(_LEAST_POUR_MM, largest) or None not in (options.pour_mm, options.vent_mm):
+        if pour < min(_LEAST_POUR_MM, largest):
             raise Finger3dError(
-                f"--pour-mm {pour_mm:.3g} --vent-mm {vent_mm:.3g}: do not fit on the base, {x1 - x0:.4g} x "
-                f"{z1 - z0:.4g} mm, with {options.rim_mm:g} mm between them; must be smaller"
+                f"--pour-mm {pour_mm:.3g}: does not fit on the base, {x1 - x0:.4g} x {z1 - z0:.4g} mm, with vents of "
+                f"{vent_mm:.3g} mm and {options.rim_mm:g} mm between them; must be smaller"
             )
     middle = nearest(allowed, (0.0, 0.0))
     room = min(math.dist(middle, v) - vent_mm / 2.0 - options.rim_mm for v in vents)
@@ -96,7 +97,7 @@ def _vents(base: CrossSection, vent: float) -> tuple[tuple[float, float], ...]:
         for sign, end in ((-1.0, low), (1.0, high)):
             if abs(end - allowed.bounds()[along if sign < 0.0 else 2 + along]) < 1e-6:
                 places.append(_extreme(piece, along, sign))
-        if not any(inside(widened(piece, 1e-3), np.array([p]))[0] for p in places):
+        if not any(inside(widened(piece, 1e-3), p) for p in places):
             places.append(_extreme(piece, along, 1.0 if high + low > 0.0 else -1.0))
     return tuple(sorted(places))
 
@@ -111,10 +112,10 @@ def _extreme(piece: CrossSection, along: int, sign: float) -> tuple[float, float
     return round(x, 9), round(z, 9)
 
 
-def openings(ports: Ports, lid_mm: float) -> list[Solid]:
-    """Return the pour hole and the vents as solids through a lid of this thickness."""
+def openings(ports: Ports) -> list[Solid]:
+    """Return the pour hole and the vents as solids through the lid."""
     x, z = ports.pour
     return [
-        cone((x, -lid_mm, z), ports.funnel_mm, ports.pour_mm, lid_mm, "y"),
-        *(cylinder((vx, -lid_mm, vz), ports.vent_mm, lid_mm, "y") for vx, vz in ports.vents),
+        cone((x, -LID_MM, z), ports.funnel_mm, ports.pour_mm, LID_MM, "y"),
+        *(cylinder((vx, -LID_MM, vz), ports.vent_mm, LID_MM, "y") for vx, vz in ports.vents),
     ]

@@ -1,9 +1,8 @@
-"""Draft and undercuts of a cast body, which decide whether the halves of the mold can be removed from it.
+"""Undercuts of a cast body, which decide whether the halves of the mold can be removed from it.
 
-The draft of a place of the surface is the angle between the surface and the opening direction; walls without draft
-rub along the cast body over their whole length. An undercut is a place where the half cannot move along the opening
-direction without pressing into the body; its depth is the distance by which the half's material protrudes, across
-the opening direction, into the shadow of the body above it.
+An undercut is a place where the half cannot move along the opening direction without pressing into the body; its depth
+is the distance by which the half's material protrudes, across the opening direction, into the shadow of the body above
+it.
 """
 
 from __future__ import annotations
@@ -31,31 +30,18 @@ _NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direc
 _LEAST_UNDERCUT_MM = 0.02  # what a printer resolves, and triangles of a smooth body have
 _LEVELS = 24  # heights of a half at which its undercut is measured
 _DEPTH_TOLERANCE = 1e-3  # of the depth, relative
-_LITTLE_DRAFT = np.radians(1.0)
 
 
 @dataclass(frozen=True)
-class Draft:
-    """How both halves come off the body.
+class Undercut:
+    """Depth of a body's deepest undercut, mm, 0 without one; which half is locked, and near which point."""
 
-    Attributes
-    ----------
-    angle_deg : least angle between the walls and the opening direction; 0 if walls are parallel to it
-    wall_mm2 : area of the walls with less than 1 degree
-    wall_mm : largest length of these walls along the opening direction in one half
-    undercut_mm : depth of the deepest undercut; 0 without one
-    where : which half is locked, and near which point; empty without undercut
-    """
-
-    angle_deg: float
-    wall_mm2: float
-    wall_mm: float
-    undercut_mm: float
+    depth_mm: float
     where: str
 
 
-def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Draft:
-    """Return how the halves come off.
+def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Undercut:
+    """Return the deepest undercut.
 
     Parameters
     ----------
@@ -66,15 +52,15 @@ def check_opening(finger: Body, options: MoldOptions, may_turn: bool) -> Draft:
     Finger3dError
         If the body has an undercut deeper than `options.undercut_mm`, and than a printer resolves.
     """
-    opening = draft(finger, options.split, options.split_mm)
-    if opening.undercut_mm <= max(options.undercut_mm, _LEAST_UNDERCUT_MM):
+    opening = undercut(finger, options.split, options.split_mm)
+    if opening.depth_mm <= max(options.undercut_mm, _LEAST_UNDERCUT_MM):
         return opening
     other = "x" if options.split == "z" else "z"
-    free = (may_turn or other == "z") and draft(finger, other, 0.0).undercut_mm <= _LEAST_UNDERCUT_MM
+    free = (may_turn or other == "z") and undercut(finger, other, 0.0).depth_mm <= _LEAST_UNDERCUT_MM
     advice = f"--split {other} would do" if free else "a mold of two halves cannot be taken off; change the body"
     raise Finger3dError(
         f"--split {options.split} --split-mm {options.split_mm:g}: {opening.where}, an undercut of "
-        f"{opening.undercut_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(opening.undercut_mm)} if the silicone "
+        f"{opening.depth_mm:.2g} mm; {advice}, or --undercut-mm {_rounded_up(opening.depth_mm)} if the silicone "
         "can be stretched over it"
     )
 
@@ -84,30 +70,21 @@ def _rounded_up(depth: float) -> str:
     return f"{np.ceil(depth / step) * step:.3g}"
 
 
-def draft(finger: Body, split: str, at_mm: float) -> Draft:
-    """Return draft and undercuts of a body whose halves open along the axis `split`, from the plane at `at_mm`."""
+def undercut(finger: Body, split: str, at_mm: float) -> Undercut:
+    """Return the deepest undercut of a body whose halves open along the axis `split`, from the plane at `at_mm`."""
     axis = 0 if split == "x" else 2
-    least, area, length, deepest, where = 90.0, 0.0, 0.0, 0.0, ""
+    deepest = Undercut(0.0, "")
     for sign in (1.0, -1.0):
         half = _half(finger.surface, axis, sign, at_mm)
-        walls = ~_cuts(half, axis, at_mm)
-        against = sign * half.normals[walls, axis]
         locked = _locked(finger, axis, sign, at_mm)
         depth = undercut_depth(half, axis, sign) if locked or finger.cad is None else 0.0
-        if depth > max(deepest, 0.0 if finger.cad is not None else _LEAST_UNDERCUT_MM):
-            point = locked or half.corners[walls][int(np.argmin(against))].mean(axis=0)
-            side = f"{'+' if sign > 0 else '-'}{split}"
+        if depth > max(deepest.depth_mm, 0.0 if finger.cad is not None else _LEAST_UNDERCUT_MM):
+            walls = ~_cuts(half, axis, at_mm)
+            point = locked or half.corners[walls][int(np.argmin(sign * half.normals[walls, axis]))].mean(axis=0)
             place = ", ".join(f"{c:.4g}" for c in point)
-            deepest, where = depth, f"the half on the {side} side is locked by the body near ({place}) mm"
-        angles = np.arcsin(np.clip(np.abs(against), 0.0, 1.0))
-        least = min(least, float(np.degrees(angles.min(initial=np.pi / 2.0))))
-        steep = angles < _LITTLE_DRAFT
-        areas = np.linalg.norm(half.area_vectors[walls], axis=1)
-        area += float(areas[steep].sum())
-        if steep.any():
-            ends = half.corners[walls][steep][:, :, axis]
-            length = max(length, float(np.ptp(ends)))
-    return Draft(round(least, 6), area, length, deepest, where)
+            side = f"{'+' if sign > 0 else '-'}{split}"
+            deepest = Undercut(depth, f"the half on the {side} side is locked by the body near ({place}) mm")
+    return deepest
 
 
 def _half(surface: Triangles, axis: int, sign: float, at_mm: float) -> Triangles:
@@ -172,30 +149,25 @@ def _locked(finger: Body, axis: int, sign: float, at_mm: float) -> tuple[float, 
     """
     if finger.cad is None:
         return None
-    from build123d import Axis, Box, Pos
+    from build123d import Box, Pos
 
     low, high = finger.box
-    direction = Axis.X if axis == 0 else Axis.Z
     reach = 4.0 * float(np.linalg.norm(high - low))
     middle = np.zeros(3)
     middle[axis] = at_mm + sign * reach / 2.0
     worst, place = -_NORMAL_TOLERANCE, None
     for piece in (finger.cad & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
         for face in piece.faces():
-            centre = np.array([*face.center()])
-            on_split = bool(face.is_planar) and abs(centre[axis] - at_mm) < _ON_PLANE_MM
-            if _is_base(face) or (on_split and abs(face.normal_at(face.center()).dot(direction.direction)) > 0.5):
+            centre, normal = np.array([*face.center()]), np.array([*face.normal_at(face.center())])
+            on_base = abs(centre[1]) < _ON_PLANE_MM and normal[1] < -0.5  # which the lid covers
+            on_split = abs(centre[axis] - at_mm) < _ON_PLANE_MM and abs(normal[axis]) > 0.5
+            if face.is_planar and (on_base or on_split):
                 continue
             points, normals = _normals(face)
             along = sign * normals[:, axis]
             if along.min() < worst:
                 worst, place = float(along.min()), tuple(float(c) for c in points[int(np.argmin(along))])
     return place
-
-
-def _is_base(face: Face) -> bool:
-    """Return whether a face is the finger's base, which the lid covers."""
-    return bool(face.is_planar) and abs(face.center().Y) < _ON_PLANE_MM and face.normal_at(face.center()).Y < -0.5
 
 
 def _normals(face: Face) -> tuple[Float, Float]:

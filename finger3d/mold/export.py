@@ -57,7 +57,6 @@ def export(
     scene: Source,
     out: str | Path,
     mold: MoldOptions | None = None,
-    text: bool = False,
     tolerance_mm: float | None = None,
     report: Progress | None = None,
     overrides: Sequence[str] = (),
@@ -69,7 +68,6 @@ def export(
     scene : path of a TOML file, a dict with its tables, or a loaded scene
     out : folder for finger.step and finger.stl, and for the parts, sheet and pictures of a mold
     mold : `finger3d.MoldOptions`; None: no mold
-    text : whether the STL file is text instead of binary
     tolerance_mm : largest distance of the triangles from the CAD surface, smaller where the volume asks for it; None:
         0.05 mm, or with a mold the printer's
     report : told about stages
@@ -120,13 +118,13 @@ def export(
         else:
             write_step(out / "finger.step", solid)
             files.append(out / "finger.step")
-        write_stl(out / "finger.stl", body.surface, text)
+        write_stl(out / "finger.stl", body.surface)
         files.append(out / "finger.stl")
         silicone = None
         if assembly is not None:
             name = scene.tables.material.silicone
             named = silicone_named(name) if name else None
-            written, told = write_mold(scene.title, assembly, body, out, text, report, named)
+            written, told = write_mold(scene.title, assembly, body, out, report, named)
             files += written
             remarks += told
             silicone = assembly.silicone_mm3 / 1e3
@@ -161,12 +159,12 @@ def _clear(out: Path) -> None:
 
 
 def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
-    from finger3d.mold.foils import foils
+    from finger3d.mold.foils import SECTION_MM, foils
     from finger3d.mold.parts import mold
 
     embedded = scene.effects.get("embedded_gauge")
-    section = (embedded.thickness_mm, embedded.width_mm) if embedded else None
-    slots = foils(scene.model().gauges, options, section)
+    section = (embedded.thickness_mm, embedded.width_mm) if embedded else SECTION_MM
+    slots = foils(scene.model().gauges, section)
     rigid = [label for label, part in scene.tables.parts.items() if part.rigid]
     if not options.parts and not rigid:
         return mold(shape, slots, options)

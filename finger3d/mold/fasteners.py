@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from finger3d.mold.layout import Layout
-from finger3d.mold.options import SCREWS, MoldOptions, standard_length
+from finger3d.mold.options import PEG_MM, SCREWS, MoldOptions, standard_length
 from finger3d.mold.solids import Axis, Feature, Place, between, cylinder, hexagon, peg
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def half_pegs(layout: Layout, options: MoldOptions) -> Feature:
     away = options.peg_distance_mm
     ends = float(layout.low[0]) - away, float(layout.high[0]) + away
     places = [(x, y, layout.split) for y in layout.rows for x in ends]
-    made, holes = pegs(places, options.peg_mm, options.peg_mm, "z", options.gap_mm)
+    made, holes = pegs(places, PEG_MM, PEG_MM, "z", options.gap_mm)
     return Feature(add={"half_b": made}, cut={"half_a": holes})
 
 
@@ -44,7 +44,7 @@ def lid_pegs(layout: Layout, options: MoldOptions) -> Feature:
     away = options.peg_distance_mm
     ends = ((float(layout.low[i]) - away, float(layout.high[i]) + away) for i in (0, 2))
     places = [(x, 0.0, z) for x, z in itertools.product(*ends)]
-    made, holes = pegs(places, options.peg_mm, options.peg_mm, "y", options.gap_mm)
+    made, holes = pegs(places, PEG_MM, PEG_MM, "y", options.gap_mm)
     return Feature(add={"lid": made}, cut={"half_a": holes, "half_b": holes})
 
 

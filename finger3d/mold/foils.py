@@ -20,6 +20,9 @@ from finger3d.mold.options import MoldOptions
 if TYPE_CHECKING:
     from build123d import Solid
 
+LENGTH_MM, SECTION_MM = 5.0, (0.1, 3.0)
+"""Length of a foil, and its thickness and width, where the scene does not give them."""
+
 COVER_MM = 0.5
 """Least cover of silicone between a foil and the surface of the cavity."""
 
@@ -52,33 +55,21 @@ class FoilSlot:
     width_mm: float
 
 
-def foils(
-    gauges: Sequence[Gauge], options: MoldOptions, section_mm: tuple[float, float] | None
-) -> tuple[FoilSlot, ...]:
+def foils(gauges: Sequence[Gauge], section_mm: tuple[float, float] = SECTION_MM) -> tuple[FoilSlot, ...]:
     """Return the slots of a scene's gauges; gauges that differ in z only are on one strip.
 
     Parameters
     ----------
-    section_mm : thickness and width of every foil, from the scene; None for those of the options
+    section_mm : thickness and width of every foil
     """
-    thickness, width = section_mm or (options.foil_thickness_mm, options.foil_width_mm)
     groups: dict[tuple[float, ...], list[Gauge]] = {}
     for g in gauges:
         key = (g.x_mm, g.y_mm, g.angle % np.pi, g.length_mm)
         groups.setdefault(tuple(round(v, 9) for v in key), []).append(g)
 
     def strip(on: list[Gauge]) -> FoilSlot:
-        g, length = on[0], on[0].length_mm or options.foil_length_mm
-        return FoilSlot(
-            names=tuple(gauge.name for gauge in on),
-            x_mm=g.x_mm,
-            y_mm=g.y_mm,
-            z_mm=tuple(gauge.z_mm for gauge in on),
-            angle=g.angle,
-            length_mm=length,
-            thickness_mm=thickness,
-            width_mm=width,
-        )
+        g, names, z = on[0], tuple(gauge.name for gauge in on), tuple(gauge.z_mm for gauge in on)
+        return FoilSlot(names, g.x_mm, g.y_mm, z, g.angle, g.length_mm or LENGTH_MM, *section_mm)
 
     return tuple(strip(on) for on in groups.values())
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.mold.options import MoldOptions
+from finger3d.mold.options import PEG_MM, WALL_MM, MoldOptions
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,16 @@ def layout_of(low: Float, high: Float, options: MoldOptions) -> Layout:
     ----------
     low, high : corners (3,) of the box around the cavity, mm
     """
-    wall, away = options.around_mm, options.peg_distance_mm
+    away = options.peg_distance_mm
     around = options.peg_hole_mm / 2.0 + options.rim_mm
-    near = options.hole_depth_mm + around
+    near = PEG_MM + options.gap_mm + around
     far = max(float(high[1]) + away, near)
     rows = (near, far) if far - near >= 2.0 * around else (far,)
     return Layout(
         low=low,
         high=high,
-        outer_low=np.array([low[0] - wall, 0.0, low[2] - wall]),
-        outer_high=np.array([high[0] + wall, max(float(high[1]) + wall, far + around), high[2] + wall]),
+        outer_low=np.array([low[0] - WALL_MM, 0.0, low[2] - WALL_MM]),
+        outer_high=np.array([high[0] + WALL_MM, max(float(high[1]) + WALL_MM, far + around), high[2] + WALL_MM]),
         split=options.split_mm * options.scale,
         rows=rows,
     )

@@ -15,30 +15,25 @@ open along z. The lid begins at y = 0.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body, Shell, shell
 from finger3d.mold.cover import Ports
-from finger3d.mold.demould import Draft, check_opening, undercut_depth
+from finger3d.mold.demould import Undercut, check_opening, undercut_depth
 from finger3d.mold.fasteners import Bolts, bolts, half_pegs, lid_pegs, screws
 from finger3d.mold.foils import FoilSlot, check_foils, slot
 from finger3d.mold.layout import Layout, layout_of
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.pours import MAIN, Pour, check_strips, lid_parts, pour_order, pours
-from finger3d.mold.solids import Feature, between, common, one, part
+from finger3d.mold.solids import Feature, between, one, part
 
 if TYPE_CHECKING:
     from build123d import Solid
 
-_OVERLAP_TOLERANCE = 1e-6  # relative volume that booleans leave between faces in contact
-_MESH_OVERLAP_TOLERANCE = 1e-3  # the same where one of two bodies is tessellated
 _ON_BASE_MM = 1e-6
 HALVES = ("half_a", "half_b")
 
@@ -54,7 +49,7 @@ class Mold:
     parts : half_a (z above the split), half_b (below, with the pegs), lids, inserts; without the cavity where the body
         has no CAD, see `shell`
     pours : in their order
-    draft : how the halves come off
+    undercut : the deepest, over which the silicone is stretched
     """
 
     options: MoldOptions
@@ -63,7 +58,7 @@ class Mold:
     parts: dict[str, Solid]
     pours: tuple[Pour, ...]
     foils: tuple[FoilSlot, ...]
-    draft: Draft
+    undercut: Undercut
 
     @property
     def silicone_mm3(self) -> float:
@@ -78,7 +73,7 @@ class Mold:
     @property
     def openings_mm3(self) -> float:
         """Volume of pour holes and vents, of all pours."""
-        return sum(ports.volume_mm3(self.options.lid_mm) for ports in self.ports)
+        return sum(ports.volume_mm3 for ports in self.ports)
 
     @property
     def bolts(self) -> Bolts | None:
@@ -109,7 +104,7 @@ def mold(
     ------
     Finger3dError
         If the split plane misses the body, the body has an undercut, a foil does not fit, a lid has no room
-        for its openings, two parts of the mold would overlap, or for the reasons of `finger3d.mold.pours.pours`.
+        for its openings, or for the reasons of `finger3d.mold.pours.pours`.
     """
     if options.split == "x" and gauges:
         raise Finger3dError(
@@ -139,7 +134,7 @@ def mold(
     layout = layout_of(*body.box, options)
     slots = {foil: slot(foil, layout, options) for foil in gauges}
     check_strips(planned, slots)
-    draft = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
+    undercut = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
     cavity = [] if body.cad is None else [body.cad, *fillings]
     features = [
         screws(layout, options),
@@ -149,12 +144,10 @@ def mold(
     ]
     parts = halves(layout, features)
     for pour in planned:
-        parts |= lid_parts(pour, layout, features, options)
+        parts |= lid_parts(pour, layout, features)
     for name, solid in parts.items():
         solid.label = name
-    assembled = Mold(options, body, layout, parts, planned, tuple(gauges), draft)
-    check_parts(assembled)
-    return assembled
+    return Mold(options, body, layout, parts, planned, tuple(gauges), undercut)
 
 
 def _silicones(
@@ -220,36 +213,3 @@ def check_split(finger: Body, options: MoldOptions) -> None:
             f"--split-mm {options.split_mm:g}: the split plane misses the finger; must be between {low[axis]:.6g} and "
             f"{high[axis]:.6g} mm along {options.split}"
         )
-
-
-def overlaps(mold: Mold) -> dict[str, float]:
-    """Return the common volume (mm3) of each pair of parts in the assembled position, the cast bodies included.
-
-    Parts of different pours are never in the mold together.
-    """
-    boxes = {}
-    for name, solid in mold.parts.items():
-        box = solid.bounding_box()
-        boxes[name] = np.array([*box.min]), np.array([*box.max])
-    shared: dict[str, float] = {}
-    for pour in mold.pours:
-        names = [*HALVES, *pour.others]
-        for a, b in itertools.combinations(names, 2):
-            apart = (boxes[a][0] > boxes[b][1]).any() or (boxes[b][0] > boxes[a][1]).any()
-            if f"{a}, {b}" not in shared:
-                shared[f"{a}, {b}"] = 0.0 if apart else common(mold.parts[a], mold.parts[b])
-        for name in names:
-            if pour.cast[0].cad is None and name in HALVES:
-                continue  # cut from each other by a boolean of triangles
-            volume = sum(body.shared(mold.parts[name]) for body in pour.cast)
-            shared[f"{name}, sensor"] = max(volume, shared.get(f"{name}, sensor", 0.0))
-    return shared
-
-
-def check_parts(mold: Mold) -> None:
-    """Raise a Finger3dError if two parts overlap, or a part and what is cast."""
-    tolerance = _OVERLAP_TOLERANCE if mold.body.cad is not None else _MESH_OVERLAP_TOLERANCE
-    bad = {pair: v for pair, v in overlaps(mold).items() if v > tolerance * mold.silicone_mm3}
-    if bad:
-        pair = max(bad, key=lambda p: bad[p])
-        raise Finger3dError(f"mold: {pair} would overlap by {bad[pair]:.3g} mm3; choose other sizes of wall or pegs")

@@ -26,7 +26,7 @@ from finger3d.mold.demould import undercut_depth
 from finger3d.mold.fasteners import pegs
 from finger3d.mold.foils import FoilSlot
 from finger3d.mold.layout import Layout
-from finger3d.mold.options import MoldOptions
+from finger3d.mold.options import LID_MM, PEG_MM, MoldOptions
 from finger3d.mold.regions import base_region, nearest
 from finger3d.mold.solids import Feature, between, common, cylinder, one, part
 
@@ -185,27 +185,26 @@ def _ports(cast: Body, body: Body, pushed: bool, options: MoldOptions) -> Ports 
     return None if pushed and not wide else ports(base, options)
 
 
-def lid_parts(pour: Pour, layout: Layout, features: Sequence[Feature], options: MoldOptions) -> dict[str, Solid]:
+def lid_parts(pour: Pour, layout: Layout, features: Sequence[Feature]) -> dict[str, Solid]:
     """Return the lid of a pour, and the inserts that stand on it."""
-    channels = _channels(pour, layout, options) if pour.ports is None else []
-    holes = openings(pour.ports, options.lid_mm) if pour.ports is not None else channels
+    channels = _channels(pour, layout) if pour.ports is None else []
+    holes = openings(pour.ports) if pour.ports is not None else channels
     # Where the silicone has a base, channels in the lid alone reach it, and the inserts stay whole.
     through = channels if pour.cast[-1].surface.low[1] > _TOUCHING * layout.high[1] else []
     inserts = {insert_name(n): one(solid - through, n) if through else solid for n, solid in pour.inserts.items()}
     low, high = layout.outer_low, layout.outer_high
-    plate = between([low[0], -options.lid_mm, low[2]], [high[0], 0.0, high[2]])
+    plate = between([low[0], -LID_MM, low[2]], [high[0], 0.0, high[2]])
     own = Feature(add={"lid": pour.pushed}, cut={"lid": holes})
     return {pour.lid: part("lid", plate, [*features, own], pour.lid), **inserts}
 
 
-def _channels(pour: Pour, layout: Layout, options: MoldOptions) -> list[Solid]:
+def _channels(pour: Pour, layout: Layout) -> list[Solid]:
     """Return channels along both ends of what is pushed in, through which surplus silicone and air leave."""
     boxes = [solid.bounding_box() for solid in pour.inside]
     low, high = np.min([[*box.min] for box in boxes], axis=0), np.max([[*box.max] for box in boxes], axis=0)
     wide = min(2.0, 0.1 * float(min(high[0] - low[0], high[2] - low[2])))
-    wide = wide if options.vent_mm is None else options.vent_mm
     return [
-        cylinder((x, -options.lid_mm, layout.split), wide, float(high[1]) + options.lid_mm, "y")
+        cylinder((x, -LID_MM, layout.split), wide, float(high[1]) + LID_MM, "y")
         for x in (float(low[0]) + _CHANNEL_INSET * wide, float(high[0]) - _CHANNEL_INSET * wide)
     ]
 
@@ -213,7 +212,7 @@ def _channels(pour: Pour, layout: Layout, options: MoldOptions) -> list[Solid]:
 def _on_pegs(label: str, insert: Body, body: Body, options: MoldOptions) -> tuple[list[Solid], Solid]:
     """Return two pegs of the lid, one thinner, and the insert that sits on them."""
     (x0, _, z0), (x1, high, z1) = insert.box
-    d = min(options.peg_mm, 0.25 * float(x1 - x0), 0.25 * float(z1 - z0))
+    d = min(PEG_MM, 0.25 * float(x1 - x0), 0.25 * float(z1 - z0))
     deep, thinnest = min(d, 0.5 * float(high)), options.machine.thinnest_mm
     around = d / 2.0 + options.gap_mm + thinnest
     foot = base_region(insert.surface).offset(-around)

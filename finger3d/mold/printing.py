@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
-from finger3d.geometry.surface_checks import mistake
 from finger3d.mold.body import Shell
 from finger3d.mold.regions import manifold
 
@@ -17,42 +15,11 @@ _OPPOSED = -0.9  # cosine between the normals of the two sides of a wall; sharp 
 _RAYS = 1500  # of a part
 _NEAR_MM = 1e-4  # distance from a surface at which a ray starts
 _BEND = 1e-3  # of a ray, so that it does not run along a face or hit an edge exactly
+_LAYER_MM = 0.5  # height of the layers in which islands are looked for
 _LEAST_OVERLAP = 1e-6  # of an island's area that must lie on the layer below
 
 
-@dataclass(frozen=True)
-class PrintCheck:
-    """Result of the printability checks of a part.
-
-    Attributes
-    ----------
-    defect : why the surface is not one closed body with triangles facing outward; empty if it is
-    wall_mm : least thickness found between two opposed faces; infinite without such
-    thinnest : (3,) where it was found, mm
-    islands : (n, 3) middles of regions of a layer with nothing below, mm
-    """
-
-    defect: str
-    wall_mm: float
-    thinnest: Float
-    islands: Float
-
-
-def check_print(part: Triangles, layer_mm: float) -> PrintCheck:
-    """Check a part as it lies on the bed, z up, its lowest point on z = 0.
-
-    Parameters
-    ----------
-    layer_mm : distance of the layers that are looked at
-    """
-    defect = mistake(part)
-    if defect:
-        return PrintCheck(defect, 0.0, np.full(3, np.nan), np.empty((0, 3)))
-    wall, where = thickness(part)
-    return PrintCheck("", wall, where, islands(part, layer_mm))
-
-
-def thickness(part: Triangles, rays: int = _RAYS) -> tuple[float, Float]:
+def thickness(part: Triangles) -> tuple[float, Float]:
     """Return the least thickness (mm) of the walls of a closed body and where it is (3,), by rays inward.
 
     Rays start in every triangle, in larger ones more often, and only hits on a face that looks the other way count.
@@ -60,8 +27,8 @@ def thickness(part: Triangles, rays: int = _RAYS) -> tuple[float, Float]:
     """
     body = manifold(part)
     area = np.linalg.norm(part.area_vectors, axis=1)
-    order = np.argsort(-area)[:rays]
-    number = np.maximum(1, np.round(rays * area[order] / area.sum()).astype(int))
+    order = np.argsort(-area)[:_RAYS]
+    number = np.maximum(1, np.round(_RAYS * area[order] / area.sum()).astype(int))
     random = np.random.default_rng(0)
     owner = np.repeat(order, number)
     weights = random.dirichlet((1.0, 1.0, 1.0), len(owner))
@@ -80,10 +47,13 @@ def thickness(part: Triangles, rays: int = _RAYS) -> tuple[float, Float]:
     return least, where
 
 
-def islands(part: Triangles, layer_mm: float) -> Float:
-    """Return the middles (n, 3), mm, of the pieces of a layer of which nothing lies on the layer below."""
+def islands(part: Triangles) -> Float:
+    """Return the middles (n, 3), mm, of the pieces of a layer of which nothing lies on the layer below.
+
+    The part lies on the bed: z up, its lowest point on z = 0.
+    """
     body, middles = manifold(part), []
-    heights = np.arange(0.5 * layer_mm, float(part.high[2]), layer_mm)
+    heights = np.arange(0.5 * _LAYER_MM, float(part.high[2]), _LAYER_MM)
     below = body.slice(float(heights[0]))
     for height in heights[1:]:
         layer = body.slice(float(height))

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 
@@ -70,22 +68,21 @@ def disc(middle: Sequence[float], diameter: float) -> CrossSection:
     return CrossSection.circle(diameter / 2.0, CIRCLE_SEGMENTS).translate((middle[0], middle[1]))
 
 
-def inside(region: CrossSection, points: Float) -> NDArray[np.bool_]:
-    """Return the mask (n,) of the points (n, 2) that lie in a region, by the even-odd rule."""
-    hit = np.zeros(len(points), dtype=bool)
+def inside(region: CrossSection, point: Sequence[float]) -> bool:
+    """Return whether a point lies in a region, by the even-odd rule."""
+    x, y = point
+    crossed = 0
     for polygon in region.to_polygons():
-        a, b = polygon, np.roll(polygon, -1, axis=0)
-        x, y = points[:, None, 0], points[:, None, 1]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            crossing = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
-        hit ^= (((a[:, 1] > y) != (b[:, 1] > y)) & (x < crossing)).sum(axis=1) % 2 == 1
-    return hit
+        ends = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
+        a, b = ends[(ends[:, 0, 1] > y) != (ends[:, 1, 1] > y)].transpose(1, 0, 2)
+        crossed += int((x < a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])).sum())
+    return crossed % 2 == 1
 
 
 def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]:
     """Return the point of a region that is nearest to a point."""
     target = np.asarray(point, dtype=float)
-    if inside(region, target[None])[0]:
+    if inside(region, point):
         return float(target[0]), float(target[1])
     best, distance = target, np.inf
     for polygon in region.to_polygons():
@@ -99,12 +96,9 @@ def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]
     return float(best[0]), float(best[1])
 
 
-def difference(body: Triangles, tools: Sequence[Triangles]) -> Triangles:
-    """Return a body without the tools."""
-    left = manifold(body)
-    for tool in tools:
-        left -= manifold(tool)
-    return triangles(left)
+def difference(body: Triangles, tool: Triangles) -> Triangles:
+    """Return a body without another."""
+    return triangles(manifold(body) - manifold(tool))
 
 
 def common(a: Triangles, b: Triangles) -> float:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from textwrap import wrap
 
 import numpy as np
 
 from finger3d.materials.silicones import Silicone
-from finger3d.mold import casting
 from finger3d.mold.body import Shell
+from finger3d.mold.casting import DEGAS_MIN, MIX_MIN, silicone_lines
 from finger3d.mold.foils import SLOT_GAP_MM
+from finger3d.mold.options import PEG_MM
 from finger3d.mold.parts import Mold
 from finger3d.mold.pours import Pour, insert_name
 
@@ -94,47 +96,30 @@ def sheet(title: str, mold: Mold, printed: Mapping[str, Shell], silicone: Silico
     """
     o = mold.options
     cavity, openings = mold.silicone_mm3 / 1e3, mold.openings_mm3 / 1e3
-    mixed_ml = SPARE * (cavity + openings)
-    ports = mold.ports[-1] if mold.ports else None
-    hole = None if ports is None else casting.PourHole(ports.pour_mm, ports.funnel_mm, o.lid_mm)
-    inserts = ", ".join(mold.pours[-1].inserts)
-    lines = [
-        f"Mold of {title}",
-        "",
-        "Sizes are mm.",
-        "",
-        "SILICONE",
-        f"  cavity              {cavity:.2f} ml" + (f", without what is inserted: {inserts}" * bool(inserts)),
-        f"  openings            {openings:.2f} ml",
-        f"  mix about           {mixed_ml:.1f} ml ({100 * (SPARE - 1):.0f} % more than both)",
-        f"  shrinkage allowed   {100 * o.shrinkage:g} % of every length: the cavity is the sensor times {o.scale:.6g}",
-        *casting.silicone_lines(silicone, mixed_ml, hole, o.shrinkage),
-        "",
-        "PARTS",
-        *(f"  {NAMES.get(n, n.replace('_', ' ')):<17} {sizes(p):<20} mold_{n}.stl" for n, p in printed.items()),
-        f"  {'all':<17} {'':<20} mold.3mf",
-        "",
-        "PRINT",
-        "  The files lie as they should be printed: outer faces down, pegs up, no support needed.",
-        f"  Pegs of {o.peg_mm:g} mm have {o.gap_mm:g} mm of room all around; one of each pattern is thinner, so",
-        "  that no part fits the wrong way round.",
-        "",
-        *casting.surface_lines(o.split),
-        *casting.inhibition_lines(),
-        *_gauge_lines(mold),
-        *casting.mixing_lines(),
-        "POUR",
-        *_numbered(
-            [
-                *prepare_lines(mold),
-                *close_lines(mold),
-                *(line for pour in mold.pours for line in pour_lines(mold, pour)),
-                *open_lines(mold),
-            ]
-        ),
-        "",
-    ]  # fmt: skip
-    return "\n".join(lines)
+    mixed_ml, inserts = SPARE * (cavity + openings), ", ".join(mold.pours[-1].inserts)
+    steps = [*prepare_lines(mold), *close_lines(mold), *(line for p in mold.pours for line in pour_lines(mold, p))]
+    parts = [f"  {NAMES.get(n, n.replace('_', ' ')):<17} {sizes(p):<20} mold_{n}.stl" for n, p in printed.items()]
+    template = resources.files("finger3d.mold").joinpath("sheet_template.txt").read_text(encoding="utf-8")
+    return template.format(
+        title=title,
+        cavity_ml=cavity,
+        without=f", without what is inserted: {inserts}" if inserts else "",
+        openings_ml=openings,
+        mixed_ml=mixed_ml,
+        spare=100 * (SPARE - 1),
+        shrinkage=100 * o.shrinkage,
+        scale=o.scale,
+        silicone="\n".join(silicone_lines(silicone, mixed_ml, mold.ports[-1] if mold.ports else None, o.shrinkage)),
+        parts="\n".join(parts),
+        peg_mm=PEG_MM,
+        gap_mm=o.gap_mm,
+        split=o.split,
+        along="x" if o.split == "z" else "z",
+        gauges="\n".join(_gauge_lines(mold)),
+        mix_min=MIX_MIN,
+        degas_min=DEGAS_MIN,
+        steps="\n".join(_numbered([*steps, *open_lines(mold)])),
+    )
 
 
 def _numbered(steps: Sequence[str]) -> list[str]:
@@ -147,11 +132,10 @@ def _numbered(steps: Sequence[str]) -> list[str]:
 
 def _gauge_lines(mold: Mold) -> list[str]:
     if not mold.foils:
-        return ["GAUGES", "  The scene has none.", ""]
+        return ["  The scene has none."]
     low, high = mold.layout.outer_low[2], mold.layout.outer_high[2]
     scale, gap = mold.options.scale, 2.0 * SLOT_GAP_MM
     lines = [
-        "GAUGES",
         f"  A strip carries each foil through both walls: {high - low:.4g} mm in the mold, 20 mm at either end.",
         "  Places are those in the mold, x and y as in the scene; z from half B's outer face to the foil's middle.",
     ]
@@ -163,7 +147,7 @@ def _gauge_lines(mold: Mold) -> list[str]:
                 f"foil {foil.length_mm:g} x {foil.width_mm:g} x {foil.thickness_mm:g}, z {z * scale - low:.4g}; "
                 f"slot {foil.length_mm + gap:.4g} x {foil.thickness_mm + gap:.4g}"
             )
-    return [*lines, ""]
+    return lines
 
 
 def sizes(part: Shell) -> str:

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
-from finger3d.contact.zones import Zone, border_shares
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.plotting.gauges import Mark, draw_marks
+from finger3d.contact.zones import border_shares
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
+from finger3d.plotting.gauges import draw_marks
 from finger3d.plotting.panels import (
-    Marks,
     edges_of,
     highest_of,
     interfaces_of,
@@ -38,63 +36,17 @@ from finger3d.plotting.solid import (
     OBJECT,
     OBJECT_TINT,
     REST,
+    DeformedFinger,
     Rendered,
     Skin,
     draw_solid,
     rendering_solids,
+    seen_box,
     skin_of,
 )
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True, kw_only=True)
-class DeformedFinger:
-    """A finger at one step of a press.
-
-    Attributes
-    ----------
-    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
-    displacement : (n, d) mm
-    pressure, shear : (c,) and (c, 3) MPa, at the contact points; the shear is the friction on the finger
-    status : (c,) status of these points
-    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces
-    thing : (t, 3, 3) corners of the object's triangles, mm; None without it
-    title : of the picture
-    marks : gauges, from `finger3d.plotting.gauges.marks_of`
-    zones : of contact and of stick, by which their borders are drawn between the points; None: midway
-    """
-
-    mesh: Mesh
-    displacement: Float
-    pressure: Float
-    shear: Float
-    status: Int
-    nodes: Int
-    faces: Int
-    thing: Float | None
-    title: str = ""
-    marks: Sequence[Mark] = ()
-    zones: tuple[Zone, Zone] | None = None
-
-    @property
-    def moved(self) -> Float:
-        """Positions (n, d) of the nodes, mm."""
-        return self.mesh.points + self.displacement
-
-    @property
-    def skin(self) -> Skin:
-        """Surfaces, lines and arrows of a solid."""
-        return skin_of(
-            self.mesh, self.displacement, self.pressure, self.shear, self.status, self.nodes, self.faces, self.thing,
-            self.zones,
-        )  # fmt: skip
-
-    @property
-    def lines(self) -> Marks:
-        """Labels of the gauges and their lines (3, d), mm."""
-        return [(mark.label, mark.of(self.moved)) for mark in self.marks]
 
 
 def draw_fingers(
@@ -127,7 +79,7 @@ def drawing_fingers(
     if fingers[0].mesh.dim == 2:
         yield lambda: (_sections(fingers, highest), "matplotlib")
         return
-    skins = [finger.skin for finger in fingers]
+    skins = [skin_of(finger) for finger in fingers]
     pictures = []
     for skin in skins:
         by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
@@ -205,8 +157,7 @@ def _solids(
     """Draw a solid from its two pictures at each step; where they are not rendered, by matplotlib."""
     images, extent = rendered or (None, None)
     skins, arrows = [skin for skin, _, _ in pictures[::2]], pictures[-1][-1]
-    seen = np.concatenate([flat(skin.points) for skin in skins])
-    low, span = seen.min(axis=0), np.ptp(seen, axis=0)
+    low, span = seen_box(skins)
     aspect = float(span[1] / span[0]) if images is None else images[0].shape[0] / images[0].shape[1]
     figures = []
     for k, (finger, skin) in enumerate(zip(fingers, skins, strict=True)):

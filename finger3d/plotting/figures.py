@@ -101,11 +101,11 @@ def contact_figure(
         end = np.flatnonzero(_on_contact_face(table) & (np.abs(z - half_width_mm) <= _ON_LINE * half_width_mm))
         if len(end):
             lines.append((f"at the end, z = {half_width_mm:g} mm", end[np.argsort(x[end], kind="stable")]))
-    fn, fx, fz = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
-    coefficient = np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)
+    tractions = (_column(table, name) for name in ("pressure_MPa", "shear_x_MPa", "shear_z_MPa"))
+    columns = [x, *tractions, np.broadcast_to(np.asarray(mu, dtype=np.float64), x.shape)]
     made = sheet(len(lines), 1, (WIDEST, 4.4), (0.95, 0.15, 1.25, 0.35))
     for axes, (where, on) in zip(made.axes, lines, strict=True):
-        _contact_line(axes, x[on], fn[on], fx[on], fz[on], status[on], coefficient[on])
+        _contact_line(axes, [column[on] for column in columns], status[on])
         axes.set_title(where, fontsize=10, loc="left")
         axes.set_ylabel("traction on the finger (MPa)")
         axes.set_xlabel("x at rest (mm)")
@@ -241,10 +241,11 @@ def zones(x: Float, status: Int) -> list[tuple[float, float, int]]:
     return [(float(a), float(b), int(status[i])) for a, b, i in zip(ends[:-1], ends[1:], first, strict=True)]
 
 
-def _contact_line(axes: Axes, x: Float, fn: Float, fx: Float, fz: Float, status: Int, mu: Float) -> None:
-    """Draw the tractions at the points of a line z = const, all arrays (n,), ascending in x."""
+def _contact_line(axes: Axes, columns: Sequence[Float], status: Int) -> None:
+    """Draw x, pressure, friction along x and z, mu, and status (n,) at the points of a line z = const."""
     from matplotlib.lines import Line2D
 
+    x, fn, fx, fz, mu = columns
     for start, end, state in zones(x, status):
         if state in _SHADES:
             axes.axvspan(start, end, color=_SHADES[state], lw=0)

@@ -84,21 +84,16 @@ def head(figure: Figure, title: str, size: float = 12.0, above: float = 0.08) ->
 
 
 def finish(axes: Axes, x: str = "", y: str = "", **legend: Any) -> None:
-    """Name the axes, apply the style, and draw a legend without a frame if its options are given."""
+    """Name the axes, draw a light grid below the data, and a legend without a frame if its options are given."""
     if x:
         axes.set_xlabel(x)
     if y:
         axes.set_ylabel(y)
-    style(axes)
-    if legend:
-        axes.legend(frameon=False, **legend)
-
-
-def style(axes: Axes) -> None:
-    """Remove the upper and the right spine, and draw a light grid below the data."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(True, color="#e4e4e4", lw=0.6)
     axes.set_axisbelow(True)
+    if legend:
+        axes.legend(frameon=False, **legend)
 
 
 def save(figure: Figure, path: str | Path, dpi: int = DPI) -> None:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
-from finger3d.plotting.layout import blank, save
-from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render, viewer_axes
+from finger3d.plotting.layout import DPI, blank, save
+from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render, shaded, viewer_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,16 +41,14 @@ _LYING = np.array([0.1, 1.0, 0.7])  # the same for parts as they lie, from above
 _POURING_AXES = np.diag([1.0, -1.0, -1.0])  # orientation while pouring: dome down, lid on top
 _SEPARATION = 0.45  # distance between the parts, relative to their largest extent
 _WINDOW_OVER_PARTS = 1.08  # size of the window over that of the parts
-_WIDTH, _TITLE_HEIGHT = 10.0, 0.5  # of the figure and of its title, in inches
-_DPI = 130  # pixels per inch
-_STEP_WIDTH, _STEP_DPI = 6.0, 110  # the same for a step of casting
-_LABEL_FACTOR = 1.6  # width of the figure over that of the parts; the rest holds the labels
-_PIXELS = round(_WIDTH * _DPI / _LABEL_FACTOR)  # width of the rendered image
+_WIDTH, _TITLE_HEIGHT = 6.2, 0.5  # of the parts and of a title, in inches
+_LABEL_FACTOR = 1.6  # width of a figure with labels over that of the parts
+_PIXELS = round(_WIDTH * DPI)  # width of the rendered image
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """Parts of an exploded view and its camera.
+    """Parts of a picture and its camera.
 
     Attributes
     ----------
@@ -62,13 +60,17 @@ class Scenery:
     half : (2,) array, mm
         Half the width and half the height of the picture.
     opaque : whether no part is drawn transparent
+    title : of the picture
+    labels : remark on each part, shown below its name; a part without a remark has no label
     """
 
-    parts: dict[str, Triangles]
+    parts: Mapping[str, Triangles]
     axes: Float
     middle: Float
     half: Float
     opaque: bool = False
+    title: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     def opacity(self, name: str) -> float:
         """Return the opacity of a part."""
@@ -89,29 +91,22 @@ def colour(name: str) -> str:
     return COLOURS.get(name, COLOURS.get(kind(name), "#a8a8a8"))
 
 
-def separations(parts: Mapping[str, Triangles]) -> dict[str, Float]:
-    """Return the shift (3,), mm, of each part that takes an assembled mold apart, in the axes of the mold.
+def taken_apart(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
+    """Return the parts of an assembled mold apart, in the axes of the mold.
 
     Halves move along z, lids one above the other along -y, and inserts to below the last lid.
     """
-    size = max(float((part.high - part.low).max()) for part in parts.values())
-    halves = [parts[name] for name in ("half_a", "half_b") if name in parts]
+    size = max(float((part.high - part.low).max()) for part in assembled.values())
+    halves = [assembled[name] for name in ("half_a", "half_b") if name in assembled]
     thick = float(max(half.high[2] for half in halves) - min(half.low[2] for half in halves)) if halves else 0.0
-    apart, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
-    lids = [name for name in parts if kind(name) == "lid"]
-    shifts = dict.fromkeys(parts, np.zeros(3))
-    for name in parts:
-        if kind(name) in ("half_a", "half_b"):
-            shifts[name] = np.array([0.0, 0.0, apart if name == "half_a" else -apart])
-        elif kind(name) in ("lid", "insert"):
-            shifts[name] = np.array([0.0, -above * (lids.index(name) + 1.0 if name in lids else len(lids) - 0.5), 0.0])
-    return shifts
-
-
-def taken_apart(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
-    """Return the parts of an assembled mold apart."""
-    shifts = separations(assembled)
-    return {name: Triangles(part.points + shifts[name], part.faces) for name, part in assembled.items()}
+    away, above = max(_SEPARATION * size, 0.8 * thick), 0.9 * _SEPARATION * size
+    shifts = {"half_a": [0.0, 0.0, away], "half_b": [0.0, 0.0, -away]}
+    lids = [name for name in assembled if kind(name) == "lid"]
+    shifts |= {name: [0.0, -above * number, 0.0] for number, name in enumerate(lids, 1)}
+    shifts |= {name: [0.0, -above * (len(lids) - 0.5), 0.0] for name in assembled if kind(name) == "insert"}
+    return {
+        name: Triangles(part.points + shifts.get(name, [0.0, 0.0, 0.0]), part.faces) for name, part in assembled.items()
+    }
 
 
 def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
@@ -119,68 +114,60 @@ def standing(assembled: Mapping[str, Triangles]) -> dict[str, Triangles]:
     return {name: Triangles(part.points @ _POURING_AXES.T, part.faces) for name, part in assembled.items()}
 
 
-def scenery(parts: Mapping[str, Triangles], towards: Float = _VIEW, opaque: bool = False) -> Scenery:
-    """Return parts as they are with a camera that shows them all.
+def scenery(parts: Mapping[str, Triangles], title: str = "", labels: Mapping[str, str] | None = None) -> Scenery:
+    """Return parts as they are, y up, with a camera that shows them all; see `Scenery`."""
+    return _seen(parts, _VIEW, title=title, labels=labels or {})
 
-    Parameters
-    ----------
-    towards : (3,) direction to the viewer
-    opaque : whether no part is drawn transparent
-    """
+
+def scenery_on_the_bed(parts: Mapping[str, Triangles]) -> Scenery:
+    """Return opaque parts as they lie on the bed of a printer, z up, seen from above."""
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    y_up = {name: Triangles(part.points @ turn.T, part.faces) for name, part in parts.items()}
+    return _seen(y_up, _LYING, opaque=True)
+
+
+def _seen(parts: Mapping[str, Triangles], towards: Float, **more: Any) -> Scenery:
+    """Return parts with a camera in the direction (3,) `towards` the viewer."""
     axes = viewer_axes(towards)
     seen = np.vstack([part.points for part in parts.values()]) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    return Scenery(dict(parts), axes, 0.5 * (low + high) @ axes, _WINDOW_OVER_PARTS * 0.5 * (high - low)[:2], opaque)
+    return Scenery(parts, axes, 0.5 * (low + high) @ axes, _WINDOW_OVER_PARTS * 0.5 * (high - low)[:2], **more)
 
 
-def picture(path: Path, assembled: Mapping[str, Triangles], title: str, sizes: Mapping[str, str]) -> str:
-    """Write the exploded view of a mold, in the orientation in which it is poured.
-
-    Parameters
-    ----------
-    path : PNG file to write
-    assembled : surfaces of half_a, half_b, lids, inserts, sensor and, if the scene has gauges, strips, in the axes of
-        the mold
-    title : title of the picture
-    sizes : remark on each part, shown below its name; a part without a remark has no label
-
-    Returns
-    -------
-    str
-        The renderer, ``pyvista`` or ``matplotlib``.
+def write_pictures(views: Mapping[Path, Scenery]) -> None:
+    """Write a PNG file of each view, all in one run of the renderer.
 
     Raises
     ------
     MissingError
         If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
     """
-    view = scenery(standing(taken_apart(assembled)))
-    images = rendered([view])
-    image = None if images is None else images[0]
-    width, height = view.half
-    high = _WIDTH * height / (_LABEL_FACTOR * width) + _TITLE_HEIGHT
-    figure = blank(_WIDTH, high)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - _TITLE_HEIGHT / high))
-    show(axes, view, image)
-    for name, part in view.parts.items():
-        if name in sizes:
-            _label(axes, view, name, part, sizes[name])
-    axes.set_xlim(-_LABEL_FACTOR * width, _LABEL_FACTOR * width)
-    figure.text(0.5, 1.0 - 0.5 * _TITLE_HEIGHT / high, title, fontsize=11, ha="center", va="center")
-    save(figure, path, _DPI)
-    return "matplotlib" if image is None else "pyvista"
+    images = rendered([*views.values()])
+    for i, (path, view) in enumerate(views.items()):
+        width, height = view.half
+        factor = _LABEL_FACTOR if view.labels else 1.0
+        above = _TITLE_HEIGHT if view.title else 0.0
+        high = float(_WIDTH * height / width) + above
+        figure = blank(factor * _WIDTH, high)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - above / high))
+        show(axes, view, None if images is None else images[i])
+        for name in view.labels:
+            _label(axes, view, name)
+        axes.set_xlim(-factor * width, factor * width)
+        figure.text(0.5, 1.0 - 0.5 * above / high, view.title, fontsize=11, ha="center", va="center")
+        save(figure, path)
 
 
-def _label(axes: Axes, view: Scenery, name: str, part: Triangles, remark: str) -> None:
+def _label(axes: Axes, view: Scenery, name: str) -> None:
     """Write the name of a part and a remark next to the part: half B at its left, the other parts at their right."""
-    seen = view.flat(part.points)
+    seen = view.flat(view.parts[name].points)
     left = name == "half_b"
     low = name == "strips"  # their front end is not hidden by other parts
     at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
     shift = (-14, -4) if left else (30, -40) if low else (14, -4)
     line = {"arrowstyle": "-", "color": "#777777", "lw": 0.8}
     axes.annotate(
-        f"{LABELS.get(name, name.replace('_', ' '))}\n{remark}".strip(),
+        f"{LABELS.get(name, name.replace('_', ' '))}\n{view.labels[name]}".strip(),
         (float(at[0]), float(at[1])),
         shift,
         textcoords="offset points",
@@ -209,14 +196,10 @@ def draw(axes: Axes, view: Scenery) -> None:
     from matplotlib.colors import to_rgb
 
     order = sorted(view.parts, key=lambda n: float((view.parts[n].points @ view.axes[2]).mean()))
-    light = np.array([0.2, 0.9, 0.5]) / np.linalg.norm([0.2, 0.9, 0.5])
     for layer, name in enumerate(order):
-        part = view.parts[name]
-        seen = part.normals @ view.axes[2] > 0.0
-        corners, normals = part.corners[seen], part.normals[seen]
+        corners, fill = shaded(view.parts[name].corners, to_rgb(colour(name)), view.axes[2])
         far = np.argsort(corners.mean(axis=1) @ view.axes[2], kind="stable")
-        shade = 0.6 + 0.4 * np.clip(normals @ light, 0.0, 1.0)
-        fill = np.clip(np.array(to_rgb(colour(name))) * shade[:, None], 0.0, 1.0)[far]
+        fill = fill[far]
         alpha = view.opacity(name) if view.opacity(name) < 1.0 else None
         # Edges in the colour of the face close fine seams; a transparent face would show them.
         edge = fill if alpha is None else "none"
@@ -237,38 +220,3 @@ def rendered(views: Sequence[Scenery]) -> list[Image] | None:
         )
         drawings.append(Drawing(Camera(view.axes, view.middle, float(height), window), parts))
     return render(drawings)
-
-
-@dataclass(frozen=True)
-class StepPicture:
-    """Picture of a step.
-
-    Attributes
-    ----------
-    path : PNG file
-    parts : surfaces, mm, by the names of parts, y up, or z up as they lie
-    lying : whether the parts lie as they are printed
-    """
-
-    path: Path
-    parts: Mapping[str, Triangles]
-    lying: bool = False
-
-
-def step_pictures(pictures: Sequence[StepPicture]) -> str:
-    """Write the pictures of all steps, in one run of the renderer; returns the renderer."""
-    views = [scenery(_y_up(p), _LYING, opaque=True) if p.lying else scenery(p.parts) for p in pictures]
-    images = rendered(views)
-    for i, (one, view) in enumerate(zip(pictures, views, strict=True)):
-        width, height = view.half
-        figure = blank(_STEP_WIDTH, float(_STEP_WIDTH * height / width))
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        show(axes, view, None if images is None else images[i])
-        save(figure, one.path, _STEP_DPI)
-    return "matplotlib" if images is None else "pyvista"
-
-
-def _y_up(picture: StepPicture) -> dict[str, Triangles]:
-    """Return parts that lie (z up) with y up, as the camera stands."""
-    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    return {name: Triangles(part.points @ turn.T, part.faces) for name, part in picture.parts.items()}

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from finger3d._extras import available, require
 from finger3d._machine import child_environment
@@ -33,6 +33,7 @@ WINDOW = (1600, 1200)
 """Width and height of the window that PyVista renders, in pixels."""
 
 _VIEW = np.array([-0.45, 1.05, 1.0])  # direction towards the viewer: in front, above, slightly left
+_LIGHT = np.array([-0.2, 0.9, 0.5])  # direction to it
 _MARGIN = 1.04  # height of the window over that of its contents
 _WHITE = 250  # least grey level of the background, of 255
 
@@ -52,6 +53,20 @@ AXES = viewer_axes(_VIEW)
 def flat(points: Float) -> Float:
     """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm."""
     return points @ AXES[:2].T
+
+
+def shaded(faces: Float, colours: ArrayLike, towards: Float) -> tuple[Float, Float]:
+    """Return the polygons, of (m, k, 3), that face the viewer in a direction (3,), and their shaded RGB colours.
+
+    The light is above the viewer. matplotlib draws these where PyVista does not render.
+    """
+    third = faces.shape[1] // 3
+    normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    seen = normal @ towards > 0.0
+    brightness = 0.62 + 0.38 * np.clip(normal[seen] @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
+    every = np.broadcast_to(colours, (len(faces), 3))
+    return faces[seen], np.clip(every[seen] * brightness[:, None], 0.0, 1.0)
 
 
 def half_height(size: Float) -> float:
@@ -78,20 +93,14 @@ def framed(
     extent : tuple of four floats, mm
         Left, right, lower and upper edge of the cropped images in the picture plane of `flat`.
     """
-    kept, (top, left) = _cropped(images)
+    inked = np.min(images, axis=(0, 3)) < _WHITE
+    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
+    top, left = int(rows[0]), int(columns[0])
+    kept = images[:, top : rows[-1] + 1, left : columns[-1] + 1]
     middle, size = frame
     pixel = 2.0 * half_height(size) / images.shape[1]
     x, y = flat(middle) + pixel * np.array([left - 0.5 * images.shape[2], 0.5 * images.shape[1] - top])
     return kept, (x, x + pixel * kept.shape[2], y - pixel * kept.shape[1], y)
-
-
-def _cropped(images: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """Return images (s, h, w, 3) without their common white margins, and the first row and column kept."""
-    stack = images[..., :3]
-    inked = np.min(stack, axis=(0, 3)) < _WHITE
-    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
-    kept = stack[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return kept, (int(rows[0]), int(columns[0]))
 
 
 Image = NDArray[np.uint8]

@@ -20,9 +20,10 @@ from finger3d.errors import MissingError
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.io import atomic
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.plotting.deformed import DeformedFinger, draw_fingers
+from finger3d.plotting.deformed import draw_fingers
 from finger3d.plotting.gauges import Mark, marks_of
 from finger3d.plotting.renderer import WINDOW
+from finger3d.plotting.solid import DeformedFinger
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import gauges_of, press_summary
 

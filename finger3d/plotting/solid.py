@@ -15,6 +15,7 @@ from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders
 from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
+from finger3d.plotting.gauges import Mark
 from finger3d.plotting.renderer import (
     AXES,
     WINDOW,
@@ -28,6 +29,7 @@ from finger3d.plotting.renderer import (
     framed,
     half_height,
     rendering,
+    shaded,
     unshared,
 )
 
@@ -51,6 +53,46 @@ _ARROW_COUNT = 100.0  # approximate number of arrows
 _SIX = np.array([[0, 3, 5], [1, 4, 3], [2, 5, 4], [3, 4, 6], [4, 5, 6], [5, 3, 6]])
 _RING = np.array([0, 3, 1, 4, 2, 5])
 _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeformedFinger:
+    """A finger at one step of a press.
+
+    Attributes
+    ----------
+    mesh : undeformed mesh of the whole finger (unfolded, if symmetry was used), mm
+    displacement : (n, d) mm
+    pressure, shear : (c,) and (c, 3) MPa, at the contact points; the shear is the friction on the finger
+    status : (c,) status of these points
+    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces
+    thing : (t, 3, 3) corners of the object's triangles, mm; None without it
+    title : of the picture
+    marks : gauges, from `finger3d.plotting.gauges.marks_of`
+    zones : of contact and of stick, by which their borders are drawn between the points; None: midway
+    """
+
+    mesh: Mesh
+    displacement: Float
+    pressure: Float
+    shear: Float
+    status: Int
+    nodes: Int
+    faces: Int
+    thing: Float | None
+    title: str = ""
+    marks: Sequence[Mark] = ()
+    zones: tuple[Zone, Zone] | None = None
+
+    @property
+    def moved(self) -> Float:
+        """Positions (n, d) of the nodes, mm."""
+        return self.mesh.points + self.displacement
+
+    @property
+    def lines(self) -> list[tuple[str, Float]]:
+        """Labels of the gauges and their lines (3, d), mm."""
+        return [(mark.label, mark.of(self.moved)) for mark in self.marks]
 
 
 @dataclass(frozen=True)
@@ -102,63 +144,31 @@ class Skin:
         return min(_ARROW_LENGTH * self.size, _ARROW_SPACINGS * float(apart) or np.inf)
 
     @property
-    def frame(self) -> tuple[Float, Float]:
-        """Centre (3,) of the picture, and its width and height (2,), mm."""
-        seen = flat(self.points)
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        deep = self.points.mean(axis=0) @ AXES[2]
-        return np.append(0.5 * (low + high), deep) @ AXES, high - low
-
-    @property
     def points(self) -> Float:
         """All points of the finger's surfaces and lines, shape (p, 3), mm."""
         parts = (self.body, self.contact, self.rest)
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
-def skin_of(
-    mesh: Mesh,
-    u: Float,
-    pressure: Float,
-    shear: Float,
-    status: Int,
-    nodes: Int,
-    faces: Int,
-    thing: Float | None = None,
-    zones: tuple[Zone, Zone] | None = None,
-) -> Skin:
-    """Return the skin of a deformed solid.
-
-    Parameters
-    ----------
-    mesh : undeformed mesh of the whole finger, mm
-    u : (n, 3) array, mm
-        Displacement.
-    pressure : (c,) array, MPa
-    shear : (c, 3) array, MPa
-        Friction on the finger.
-    status : (c,) array
-        Contact status.
-    nodes, faces : (c,) arrays
-        Nodes of the contact points, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces.
-    thing : (t, 3, 3) array, mm
-        Corners of the object's triangles, or None.
-    zones : of contact and of stick, which say where the status changes between two contact points; None: midway
-    """
-    moved = mesh.points + u
-    touched = [FREE_FACES[k] for k in np.union1d(faces, CONTACT) if len(mesh.facets.get(FREE_FACES[k], ()))]
+def skin_of(finger: DeformedFinger) -> Skin:
+    """Return the skin of a deformed solid."""
+    mesh, moved, shear, status = finger.mesh, finger.moved, finger.shear, finger.status
+    touched = [FREE_FACES[k] for k in np.union1d(finger.faces, CONTACT) if len(mesh.facets.get(FREE_FACES[k], ()))]
     others = [f for label, f in mesh.facets.items() if label not in touched and len(f)]
     parts = []
     for label in touched:
-        own = faces == FREE_FACES.index(label)
+        own = finger.faces == FREE_FACES.index(label)
         point = np.full(len(moved), -1)
-        point[nodes[own]] = np.flatnonzero(own)
-        parts.append(_coloured(mesh.facets[label], moved, point, pressure, status, zones))
+        point[finger.nodes[own]] = np.flatnonzero(own)
+        parts.append(_coloured(mesh.facets[label], moved, point, finger.pressure, status, finger.zones))
     contact, values, states = (np.concatenate([part[k] for part in parts]) for k in range(3))
     body = np.concatenate([_six_nodes(f, moved) for f in others]) if others else np.zeros((0, 6, 3))
     rims = [_rim(mesh.facets[label]) for label in touched]
-    between = [_rim(part) for f in mesh.facets.values() for part in _by_part(mesh, f)] if mesh.part is not None else []
-    chosen, arrow, largest = _arrows(moved[nodes], shear, status)
+    between = []
+    for f in mesh.facets.values() if mesh.part is not None else ():
+        part = part_of_facets(mesh, f)
+        between += [_rim(f[part == number]) for number in np.unique(part)]
+    chosen, arrow, largest = _arrows(moved[finger.nodes], shear, status)
     return Skin(
         body=body,
         contact=contact,
@@ -167,8 +177,8 @@ def skin_of(
         lines=body[:, _SIDES].reshape(-1, 3, 3),
         features=np.concatenate([_edge_points(edges, moved) for edges in (*rims, *map(_rim, others), *between)]),
         rest=_edge_points(rims[0], mesh.points),
-        thing=np.zeros((0, 3, 3)) if thing is None else thing,
-        arrow_at=moved[nodes[chosen]],
+        thing=np.zeros((0, 3, 3)) if finger.thing is None else finger.thing,
+        arrow_at=moved[finger.nodes[chosen]],
         arrow=arrow,
         arrow_status=status[chosen],
         largest_shear=largest,
@@ -228,12 +238,6 @@ def _rim(facets: Int) -> Int:
     return rim
 
 
-def _by_part(mesh: Mesh, facets: Int) -> list[Int]:
-    """Return the facets of each part."""
-    part = part_of_facets(mesh, facets)
-    return [facets[part == number] for number in np.unique(part)]
-
-
 def _edge_points(edges: Int, points: Float) -> Float:
     """Return end, middle and end of edges, shape (k, 3, 3)."""
     ends = points[edges[:, :2]]
@@ -284,8 +288,8 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.colors import to_rgb
 
-    body = _shaded(skin.body[:, _RING], np.tile(to_rgb(BODY), (len(skin.body), 1)))
-    contact = _shaded(skin.contact, colours.mean(axis=1))
+    body = shaded(skin.body[:, _RING], to_rgb(BODY), AXES[2])
+    contact = shaded(skin.contact, colours.mean(axis=1), AXES[2])
     depth = np.concatenate([faces.mean(axis=1) @ AXES[2] for faces, _ in (body, contact)])
     polygons = [*flat(body[0]), *flat(contact[0])]
     fill = np.concatenate([body[1], contact[1]])
@@ -297,7 +301,7 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
         PolyCollection([polygons[i] for i in order], facecolors=fill[order], edgecolors=edge[order], lw=0.25, zorder=2)
     )
     if len(skin.thing):
-        seen, tint = _shaded(skin.thing, np.tile(to_rgb(OBJECT_TINT), (len(skin.thing), 1)))
+        seen, tint = shaded(skin.thing, to_rgb(OBJECT_TINT), AXES[2])
         axes.add_collection(PolyCollection(list(flat(seen)), facecolors=tint, alpha=OBJECT_OPACITY, lw=0.0, zorder=3))
     if arrows and len(skin.arrow) and len(contact[0]):
         from scipy.spatial import cKDTree
@@ -318,17 +322,6 @@ def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
                 zorder=4,
             )
     axes.autoscale_view()
-
-
-def _shaded(faces: Float, colours: Float) -> tuple[Float, Float]:
-    """Return the faces that point towards the viewer and their shaded colours; the light is above the viewer."""
-    third = faces.shape[1] // 3
-    normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    seen = normal @ AXES[2] > 0.0
-    light = np.array([-0.2, 0.9, 0.5])
-    brightness = 0.62 + 0.38 * np.clip(normal[seen] @ (light / np.linalg.norm(light)), 0.0, 1.0)
-    return faces[seen], np.clip(colours[seen] * brightness[:, None], 0.0, 1.0)
 
 
 # --- PyVista ------------------------------------------------------------------------------------------------------
@@ -356,27 +349,26 @@ def rendering_solids(
     ------
     function that waits for the pictures, and returns them; None if PyVista does not render
     """
-    middle, size = frame = _common_frame([skin for skin, _, _ in pictures])
+    skins = [skin for skin, _, _ in pictures]
+    low, size = seen_box(skins)
+    middle = np.append(low + 0.5 * size, skins[0].points.mean(axis=0) @ AXES[2]) @ AXES
     camera = Camera(AXES, middle, half_height(size), window)
 
     def rendered() -> Rendered | None:
         found = images()
         if found is None:
             return None
-        cropped, extent = framed(np.array(found), frame)
+        cropped, extent = framed(np.array(found), (middle, size))
         return list(cropped), extent
 
     with rendering([Drawing(camera, _parts(*picture)) for picture in pictures]) as images:
         yield rendered
 
 
-def _common_frame(skins: Sequence[Skin]) -> tuple[Float, Float]:
-    """Return the centre (3,) of a picture that holds all skins, and its width and height (2,), mm."""
+def seen_box(skins: Sequence[Skin]) -> tuple[Float, Float]:
+    """Return the lower left corner (2,) of the box around all skins in the picture plane, and its size (2,), mm."""
     seen = np.concatenate([flat(skin.points) for skin in skins])
-    first = skins[0].frame[0]
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    shift = 0.5 * (low + high) - flat(first)
-    return first + shift @ AXES[:2], high - low
+    return seen.min(axis=0), np.ptp(seen, axis=0)
 
 
 def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylines | Arrows, ...]:

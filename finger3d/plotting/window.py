@@ -17,7 +17,7 @@ from finger3d.plotting.gauges import COLOUR, marks_of
 from finger3d.plotting.panels import palette
 from finger3d.plotting.renderer import unshared
 from finger3d.plotting.show import finger_of, found, mesh_of
-from finger3d.plotting.solid import BODY, OBJECT_OPACITY, OBJECT_TINT
+from finger3d.plotting.solid import BODY, OBJECT_OPACITY, OBJECT_TINT, skin_of
 from finger3d.results.states import States, captions
 from finger3d.results.vtu import grid
 
@@ -127,7 +127,7 @@ class Window:
             parts = np.pad(parts, [(0, 0), (0, 0), (0, 1)])
         else:  # on the corners, as the finger is shown
             mesh = replace(mesh, facets={label: f[:, :3] for label, f in mesh.facets.items()})
-            skin = finger_of(self.states, self.step, mesh).skin
+            skin = skin_of(finger_of(self.states, self.step, mesh))
             parts, status = skin.contact, skin.status
         points, cells = unshared(parts)
         return (

@@ -85,27 +85,12 @@ class PageSection:
     folded: bool = False
 
 
-def write_page(
-    folder: str | Path,
-    title: str,
-    headline: Sequence[HeadlineRow] = (),
-    sections: Sequence[PageSection] = (),
-    figures: Sequence[Figure] = (),
-    view: View3D | None = None,
-    charts: Sequence[Chart] = (),
-    *,
-    command: str = "",
-    outcome: str = "converged",
-    good: bool = True,
-    notes: Sequence[str] = (),
-    versions: Mapping[str, str] | None = None,
-    file: str = "report.html",
-) -> Path:
-    """Write a page atomically; versions and citations follow the sections.
+@dataclass(frozen=True)
+class Page:
+    """Page of a result; versions and citations follow the sections.
 
-    Parameters
+    Attributes
     ----------
-    folder : folder of the page and of the figures
     title : title of the page
     headline : main results
     sections : sections of the page, in order
@@ -117,49 +102,63 @@ def write_page(
     good : whether the command succeeded
     notes : warnings and advice, shown below the headline
     versions : package -> version used for the results; default: the installed versions
-    file : name of the file
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    Finger3dError
-        If the page cannot be written.
     """
-    folder = Path(folder)
-    body = [
-        f'<header><p class="kicker">finger3d {escape(command)}</p><h1>{escape(title)}</h1>'
-        f'<p class="{"good" if good else "bad"}">{escape(outcome)}</p></header>'
-    ]
-    if headline:
-        body.append(f'<dl class="headline">{"".join(map(_card, headline))}</dl>')
-    if notes:
-        body.append(f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in notes)}</ul>')
-    if view is not None:
-        body.append(view.html())
-    body += [_figures(folder, figures), _grid(chart.html() for chart in charts)]
-    found = installed() if versions is None else versions
-    closing = [
-        PageSection("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
-        PageSection("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
-    ]
-    body += [_section(folder, s) for s in (*sections, *closing)]
-    scripts = [view.script()] if view is not None else []
-    if charts:
-        from finger3d.report.chart import script
 
-        scripts.append(script(charts))
-    before, after = _document(title, "\n".join(body))
-    target = folder / file
-    with atomic(target) as temporary, temporary.open("wb") as stream:
-        stream.write(before.encode())
-        if scripts:
-            stream.write(b"<script>" + _plotly() + b"</script>\n")
-        stream.write("".join([*scripts, after]).encode())
-    return target
+    title: str
+    headline: Sequence[HeadlineRow] = ()
+    sections: Sequence[PageSection] = ()
+    figures: Sequence[Figure] = ()
+    view: View3D | None = None
+    charts: Sequence[Chart] = ()
+    command: str = ""
+    outcome: str = "converged"
+    good: bool = True
+    notes: Sequence[str] = ()
+    versions: Mapping[str, str] | None = None
+
+    def write(self, folder: str | Path, file: str = "report.html") -> Path:
+        """Write the page atomically into the folder that has its figures, and return its path.
+
+        Raises
+        ------
+        Finger3dError
+            If the page cannot be written.
+        """
+        target = Path(folder) / file
+        before, after = _document(self.title, self._body(target.parent))
+        scripts = [self.view.script()] if self.view is not None else []
+        if self.charts:
+            from finger3d.report.chart import script
+
+            scripts.append(script(self.charts))
+        with atomic(target) as temporary, temporary.open("wb") as stream:
+            stream.write(before.encode())
+            if scripts:
+                # "</script" would end the element
+                plotly = asset("plotly/plotly-gl3d.min.js").encode().replace(b"</script", b"<\\/script")
+                stream.write(b"<script>" + plotly + b"</script>\n")
+            stream.write("".join([*scripts, after]).encode())
+        return target
+
+    def _body(self, folder: Path) -> str:
+        """Return the HTML of all that is seen."""
+        body = [
+            f'<header><p class="kicker">finger3d {escape(self.command)}</p><h1>{escape(self.title)}</h1>'
+            f'<p class="{"good" if self.good else "bad"}">{escape(self.outcome)}</p></header>'
+        ]
+        if self.headline:
+            body.append(f'<dl class="headline">{"".join(map(_card, self.headline))}</dl>')
+        if self.notes:
+            body.append(f'<ul class="notes">{"".join(f"<li>{escape(note)}</li>" for note in self.notes)}</ul>')
+        if self.view is not None:
+            body.append(self.view.html())
+        body += [_figures(folder, self.figures), _grid(chart.html() for chart in self.charts)]
+        found = installed() if self.versions is None else self.versions
+        closing = [
+            PageSection("Versions", [", ".join(f"{k} {v}" for k, v in found.items())]),
+            PageSection("How to cite", [f"{CITE}, version {found.get('finger3d', 'unknown')}.", f"{PAPER}."]),
+        ]
+        return "\n".join([*body, *(_section(folder, section) for section in (*self.sections, *closing))])
 
 
 def number(value: object, error: float | None = None) -> str:
@@ -167,11 +166,6 @@ def number(value: object, error: float | None = None) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return with_error(value, error)
-
-
-def _plotly() -> bytes:
-    """Return plotly.js, its edition of lines and 3D, with "</script" escaped, which would end the script element."""
-    return asset("plotly/plotly-gl3d.min.js").encode().replace(b"</script", b"<\\/script")
 
 
 def _card(row: HeadlineRow) -> str:

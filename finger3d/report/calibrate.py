@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -50,8 +50,7 @@ def calibrate_page(folder: str | Path) -> Path:
     given = " ".join(f"--strain {name}={r['curve'][best]:.5g}" for name, r in readings.items())
     failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
     note = data["about"].get("mesh", {}).get("note")
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: {', '.join(readings)} against friction",
         headline,
         [
@@ -70,3 +69,4 @@ def calibrate_page(folder: str | Path) -> Path:
         notes=[*failed, *([note] if note else [])],
         versions=data["about"].get("versions"),
     )
+    return page.write(folder)

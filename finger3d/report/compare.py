@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Figure, HeadlineRow, PageSection, Table, number, write_page
+from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Table, number
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -35,7 +35,7 @@ def compare_page(folder: str | Path) -> Path:
             c["model"],
             c["width_mm"],
             c["size_mm"],
-            *(_with_error(c["numbers"].get(k), c["errors"].get(k)) for k in keys),
+            *(number(c["numbers"][k], c["errors"].get(k)) if k in c["numbers"] else "" for k in keys),
             c["seconds"],
             c["outcome"],
         )
@@ -46,8 +46,7 @@ def compare_page(folder: str | Path) -> Path:
         "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
         "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
     )
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
@@ -61,6 +60,7 @@ def compare_page(folder: str | Path) -> Path:
         good=data["outcome"] == "converged",
         versions=data["versions"],
     )
+    return page.write(folder)
 
 
 _BARS = (
@@ -69,7 +69,3 @@ _BARS = (
     "sections of one width have the same edge lengths; on swept meshes the difference of their forces is therefore "
     "more accurate than either force. The verdict calls a deviation significant if it exceeds two error bars."
 )
-
-
-def _with_error(value: float | None, error: float | None) -> str:
-    return "" if value is None else number(value, error)

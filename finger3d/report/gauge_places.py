@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -47,8 +47,7 @@ def gauge_places_page(folder: str | Path) -> Path:
     )
     spread = Table(("mu", "sd of mu"), list(zip(data["mu"], data["mu_sd"], strict=True)))
     best = folder / "best.toml"
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: places of {len(gauges)} gauge{'s' if len(gauges) > 1 else ''}",
         headline,
         [
@@ -60,3 +59,4 @@ def gauge_places_page(folder: str | Path) -> Path:
         [Figure("map.png", "Mean standard deviation of mu with a gauge at each place, in its best direction")],
         command="optimise",
     )
+    return page.write(folder)

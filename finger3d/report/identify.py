@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
 from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
@@ -41,8 +41,7 @@ def identify_page(folder: str | Path) -> Path:
     )
     told = f"Standard deviations are {data['deviations']}."
     scene = folder / "identified.toml"
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: values from {Path(data['measured']).name}",
         headline,
         [
@@ -55,3 +54,4 @@ def identify_page(folder: str | Path) -> Path:
         command="identify",
         notes=list(data["notes"]),
     )
+    return page.write(folder)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from finger3d.report.build import Code, Figure, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
 from finger3d.results.summary import read_json, read_rows, title_of
 
 _MOST_ROWS = 10  # of the table of the best designs
@@ -51,8 +51,7 @@ def optimise_page(folder: str | Path) -> Path:
     failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
     explanation = [_SENSITIVITY] if objective == "sensitivity" else []
     best_scene = folder / "best.toml"
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(search['scene'])}: design for {objective}",
         headline,
         [
@@ -71,6 +70,7 @@ def optimise_page(folder: str | Path) -> Path:
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )
+    return page.write(folder)
 
 
 def _increment_error(steps: Sequence[int] | None, error: float | None) -> list[HeadlineRow]:

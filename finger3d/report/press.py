@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NotRequired, TypedDict
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
 from finger3d.mechanics.readings.columns import AREAS, MAIN, MEASURED
 from finger3d.mechanics.readings.quantities import OF_INCREMENT, Kind, Quantity, named
-from finger3d.report.build import Figure, HeadlineRow, PageSection, Part, Table, write_page
+from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Part, Table
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
@@ -41,32 +40,6 @@ _OF_GRIP = (
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
 
-class MeshSummary(TypedDict):
-    """The ``mesh`` of summary.json."""
-
-    finger: NotRequired[str]
-    points: int
-    cells: int
-    dofs: int
-    contact_points: int
-    formulation: str
-    symmetry: Sequence[str]
-    min_dihedral_deg: float | None
-    volume_mm3: float
-    cad_volume_mm3: float | None
-    hash: str
-    from_cache: bool
-
-
-class CostSummary(TypedDict):
-    """The ``cost`` of summary.json."""
-
-    seconds: Mapping[str, float]
-    factorizations: int
-    solver: NotRequired[str]
-    peak_memory_MB: float | None
-
-
 def press_page(folder: str | Path) -> Path:
     """Write report.html of a press from the files in its folder.
 
@@ -87,7 +60,11 @@ def press_page(folder: str | Path) -> Path:
     last = f" after increment {steps.index(good[-1]) + 1}, {good[-1].depth_mm:.4g} mm deep" if good else ""
     sections = [
         PageSection("Scene", how_modelled(summary, folder)),
-        *([_two_fingers(summary)] if "fingers" in summary else []),
+        *(
+            [PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])]
+            if "fingers" in summary
+            else []
+        ),
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
@@ -95,8 +72,7 @@ def press_page(folder: str | Path) -> Path:
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
-    return write_page(
-        folder,
+    page = Page(
         title_of(summary["scene"]),
         headline(good[-1], bars.totals(), bars.modulus) if good else (),
         sections,
@@ -108,11 +84,7 @@ def press_page(folder: str | Path) -> Path:
         notes=[*summary["warnings"], *summary["advice"], *([_remark(bars)] if bars.discretisation else [])],
         versions=summary["versions"],
     )
-
-
-def _two_fingers(summary: TreeView) -> PageSection:
-    """Return whether the object is held, its pose, and how near each finger is to slipping."""
-    return PageSection("Two fingers", [_OF_GRIP, Table(("", ""), [*grip_rows(summary)])])
+    return page.write(folder)
 
 
 def _remark(bars: ErrorBars) -> str:
@@ -280,7 +252,7 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     )
 
 
-def _mesh(mesh: MeshSummary) -> Table:
+def _mesh(mesh: TreeView) -> Table:
     rows: list[tuple[str, object]] = [
         ("finger", mesh.get("finger", "unknown")),
         ("nodes, cells", f"{mesh['points']}, {mesh['cells']}"),
@@ -302,7 +274,7 @@ def _digits(value: float | None) -> str:
     return "none" if value is None else f"{value:.6g}"
 
 
-def _cost(cost: CostSummary) -> Table:
+def _cost(cost: TreeView) -> Table:
     seconds = cost["seconds"]
     rows: list[tuple[str, object]] = [(stage, f"{s:.2f} s") for stage, s in seconds.items()]
     rows += [

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from finger3d.mechanics.readings.columns import Column
-from finger3d.report.build import Code, HeadlineRow, PageSection, Table, write_page
+from finger3d.report.build import Code, HeadlineRow, Page, PageSection, Table
 from finger3d.report.chart import Chart, Line
 from finger3d.results.summary import read_json, read_rows, strains_of, title_of
 
@@ -43,8 +43,7 @@ def sweep_page(folder: str | Path) -> Path:
     more = [f"The first {_MOST_ROWS} of {len(rows)} points; all are in results.csv."] if len(rows) > _MOST_ROWS else []
     is_list = data.get("list", False)
     varied = [(key, _values(values, is_list)) for key, values in data["vary"].items()]
-    return write_page(
-        folder,
+    page = Page(
         f"{title_of(data['scene'])}: sweep over {', '.join(data['vary'])}",
         headline,
         [
@@ -58,6 +57,7 @@ def sweep_page(folder: str | Path) -> Path:
         good=len(rows) == data["points"] and not failed,
         notes=[f"point {row['point']}: {row['outcome']}" for row in failed[:_MOST_FAILURES]],
     )
+    return page.write(folder)
 
 
 def _values(texts: Sequence[str], is_list: bool) -> str:

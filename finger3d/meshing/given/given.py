@@ -30,7 +30,6 @@ from finger3d.meshing.report import MeshReport, mesh_report
 if TYPE_CHECKING:
     from build123d import Solid
 
-    from finger3d.geometry.tessellate import Tessellation
 
 NEEDED = ("contact", "base")
 """Facets that a file must name."""
@@ -80,21 +79,9 @@ class GivenMesh(FileDesign):
         """Volume of the curved cells."""
         return curved_volume(self.mesh)
 
-    def mirrors(self) -> tuple[str, ...]:
-        """Return no axes: the mesh is used whole."""
-        return ()
-
     def solid(self) -> Solid:
         """Raise a Finger3dError: there is no CAD."""
         raise Finger3dError(f"{self.name}: a mesh of tetrahedra has no CAD solid; give the finger as a STEP file")
-
-    def solids(self) -> Mapping[str, Solid]:
-        """Raise a Finger3dError: there is no CAD."""
-        return {"": self.solid()}
-
-    def tessellation(self) -> Tessellation | None:
-        """Return None: the body is not meshed."""
-        return None
 
     @cached_property
     def size_mm(self) -> float:

@@ -1,7 +1,8 @@
-"""The local page: its figures, in a browser its sliders, and its server, which answers at a secret address only."""
+"""The local page with sliders, and the body behind it."""
 
 from __future__ import annotations
 
+import math
 import threading
 import urllib.error
 import urllib.request
@@ -12,10 +13,11 @@ import numpy as np
 import pytest
 from dash import Dash, html
 
-from finger3d.app.live_body import LiveBody, LivePress, LiveReading
+import finger3d
+from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.app.live_body import MU_STEP, STEPS, LiveBody, LivePress, LiveReading
 from finger3d.app.page import (
     HOST,
-    LocalServer,
     local_server,
     numbers_of,
     page,
@@ -24,9 +26,116 @@ from finger3d.app.page import (
     traction_figure,
 )
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.scene.scene import parse
-from tests.test_app_live_body import GAUGE, SCENE
+from tests.models import marched
+
+# --- the condensed finger behind the local page: it answers what a press of the scene answers ------------------------
+
+
+SCENE = {
+    "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 2.0},
+    "material": {"E_MPa": 1.0, "nu": 0.45},
+    "friction": {"mu": 0.3},
+    "press": {"depth_mm": 0.6, "steps": STEPS},
+    "model": {"domain": "plane-strain"},
+    "mesh": {"size_mm": 0.25, "base_size_mm": 1.0, "mesher": "swept"},
+}
+GAUGE = {"name": "g", "x_mm": 1.0, "y_mm": 4.0, "angle_deg": 20.0}
+
+
+@pytest.fixture(scope="module")
+def body() -> LiveBody:
+    return LiveBody.of(parse(SCENE))
+
+
+def pressed(mu: float, **gauge: float) -> tuple[float, float]:
+    """Force and strain of a press of the scene."""
+    scene = parse(SCENE | {"friction": {"mu": mu}, "gauge": ({**GAUGE, **gauge},)})
+    step = marched(build(scene.model()))[-1]
+    return float(step.state.force[:, 0].sum()), step.gauges["g"]
+
+
+def test_force_and_strain_are_those_of_the_scene(body: LiveBody) -> None:
+    gauge = Gauge("g", 1.0, 4.0, angle=math.radians(20.0))
+    for mu in (0.1, 0.3):
+        force, strain = pressed(mu)
+        assert body.press(mu, 0.6).numbers["normal_force_N"] == pytest.approx(force, rel=1e-3)  # flat: normals are -y
+        assert body.read(gauge, mu, 0.6, 1e-3).strain == pytest.approx(strain, rel=1e-9)
+
+
+def test_the_standard_deviation_of_mu_is_that_of_a_calibration(body: LiveBody) -> None:
+    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), 0.15, 0.6, 1e-3)
+    low, high = (pressed(0.15 + step)[1] for step in (-MU_STEP, MU_STEP))
+    assert found.slope == pytest.approx((high - low) / (2.0 * MU_STEP), rel=0.01)  # almost straight
+    moved = [
+        [
+            pressed(0.15, **{key: GAUGE[key] + sign * TOLERANCES[f"gauge_{key}"][0]})[1] - found.strain
+            for sign in (1.0, -1.0)
+        ]
+        for key in ("x_mm", "y_mm", "angle_deg")
+    ]
+    spread = [math.hypot(0.5 * (up - down), (up + down) / math.sqrt(2.0)) for up, down in moved]  # to second order
+    assert found.strain_sd == pytest.approx(math.hypot(1e-3, *spread), rel=1e-3)  # with the error of the curve
+    assert found.mu_sd == pytest.approx(found.strain_sd / abs(found.slope))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.005])
+def test_a_reading_at_small_friction_needs_no_negative_one(mu: float, body: LiveBody) -> None:
+    found = body.read(Gauge("g", 1.0, 4.0, angle=math.radians(20.0)), mu, 0.6, 1e-3)
+    assert found.strain == pytest.approx(pressed(mu)[1], rel=1e-9)
+    assert 0.0 < found.mu_sd < math.inf
+
+
+def test_traction_obeys_coulomb_along_the_middle_line(body: LiveBody) -> None:
+    press = body.press(0.05, 0.4)
+    assert (np.diff(press.x_mm) > 0.0).all()
+    slips, sticks = press.status == "slip", press.status == "stick"
+    assert sticks.any()
+    assert slips.any()
+    # symmetric: pushed outwards on both sides, so that the friction on the finger points to the middle
+    outward = np.sign(press.x_mm[slips])
+    np.testing.assert_allclose(press.shear_x_MPa[slips], -outward * 0.05 * press.pressure_MPa[slips], rtol=1e-8)
+    assert (np.abs(press.shear_x_MPa[sticks]) <= 0.05 * press.pressure_MPa[sticks] * (1.0 + 1e-8)).all()
+
+
+@pytest.mark.parametrize("steps", [7, "auto"])
+def test_the_page_opens_with_the_numbers_of_the_press(steps: int | str) -> None:
+    scene = parse(SCENE | {"press": {"depth_mm": 0.6, "steps": steps}, "gauge": (GAUGE,)})
+    own = finger3d.press(scene.with_effects(()), error=False)  # the page is in small strain
+    body = LiveBody.of(scene)
+    assert body.steps == len(own.steps)
+    assert body.largest_depth_mm == own.last.depth_mm
+    assert body.press(0.3, body.largest_depth_mm).numbers["normal_force_N"] == own.last.normal_force_N
+    (gauge,) = body.problem.model.gauges
+    assert body.read(gauge, 0.3, 0.6, 1e-3).strain == pytest.approx(own.last.gauges["g"], rel=1e-9)
+
+
+def test_a_gauge_outside_the_finger_is_refused(body: LiveBody) -> None:
+    with pytest.raises(Finger3dError):
+        body.read(Gauge("g", 4.9, 4.9), 0.3, 0.6, 1e-3)
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (2.0, 0.0), (5.0, 0.0), (-5.0, 2.0), (5.0, 4.0), (3.0, 4.0)])
+def test_a_gauge_on_the_border_is_read(x: float, y: float) -> None:
+    block = {"geometry": "block", "half_length_mm": 5.0, "height_mm": 4.0, "width_mm": 2.0}
+    body = LiveBody.of(parse(SCENE | {"finger": block, "mesh": {**SCENE["mesh"], "size_mm": 0.5}}))
+    at, inside = (body.read(Gauge("g", x * s, y, angle=0.3), 0.3, 0.6, 1e-3) for s in (1.0, 1.0 - 1e-4))
+    assert abs(at.strain - inside.strain) < at.strain_sd
+    assert at.strain_sd == pytest.approx(inside.strain_sd, rel=0.5)  # 100 times that of the noise in some places
+
+
+@pytest.mark.parametrize("effect", ["large_deformation", "viscosity"])
+def test_effects_whose_compliance_changes_are_refused_by_name(effect: str) -> None:
+    settings = {"prony": ((0.3, 0.5),)} if effect == "viscosity" else {}
+    press = {"depth_mm": 0.6, "duration_s": 1.0}
+    with pytest.raises(Finger3dError, match=effect):
+        LiveBody.of(parse(SCENE | {"press": press, "effects": {effect: settings}}))
+
+
+# --- the local page: its figures, in a browser its sliders, and its server, which answers at a secret address only ---
+
 
 PRESS = LivePress(
     {"normal_force_N": 2.0, "friction_sum_N": 0.5, "contact_half_length_mm": 1.5, "stick_half_length_mm": 0.5},
@@ -94,14 +203,14 @@ def page_at(prefix: str) -> Dash:
 
 
 @contextmanager
-def served(page: Dash) -> Iterator[LocalServer]:
-    server = local_server(page)
-    thread = threading.Thread(target=server.serve)
+def served(page: Dash) -> Iterator[str]:
+    url, server = local_server(page)
+    thread = threading.Thread(target=server.serve_forever)
     thread.start()
     try:
-        yield server
+        yield url
     finally:
-        server.stop()
+        server.shutdown()
         thread.join()
 
 
@@ -116,7 +225,7 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
         tab.on("pageerror", lambda error: complaints.append(str(error)))
         asked: list[str] = []
         tab.on("request", lambda request: asked.append(request.url))
-        tab.goto(running.url)
+        tab.goto(running)
         expect(tab.locator("#numbers")).to_contain_text("N", timeout=60_000)
         before = tab.locator("#numbers").inner_text()
         handle = tab.locator("#mu").get_by_role("slider").or_(tab.locator("[role=slider]")).first
@@ -127,7 +236,7 @@ def test_a_moved_slider_changes_numbers_and_figures_in_a_browser() -> None:
         expect(tab.locator("#traction .main-svg").first).to_be_visible()
         browser.close()
     assert complaints == []
-    assert all(url.startswith((running.url, "data:", "blob:")) for url in asked)
+    assert all(url.startswith((running, "data:", "blob:")) for url in asked)
 
 
 @pytest.mark.browser
@@ -137,7 +246,7 @@ def test_what_the_page_shows_belongs_together() -> None:
     with served(page(LiveBody.of(parse(SCENE)), 0.3)) as running, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         tab = browser.new_page()
-        tab.goto(running.url)
+        tab.goto(running)
         numbers, reading = tab.locator("#numbers"), tab.locator("#reading")
         expect(numbers).to_contain_text("mu = 0.3, 0.6 mm deep", timeout=60_000)
         for name, typed, value, said in (
@@ -164,9 +273,9 @@ def test_what_the_page_shows_belongs_together() -> None:
 
 
 @pytest.fixture
-def running() -> Iterator[LocalServer]:
-    with served(page_at("/secret/")) as server:
-        yield server
+def running() -> Iterator[str]:
+    with served(page_at("/secret/")) as url:
+        yield url
 
 
 def status(url: str, **headers: str) -> int:
@@ -178,26 +287,26 @@ def status(url: str, **headers: str) -> int:
         return error.code
 
 
-def test_only_the_secret_address_is_answered(running: LocalServer) -> None:
-    base = running.url.removesuffix("secret/")
+def test_only_the_secret_address_is_answered(running: str) -> None:
+    base = running.removesuffix("secret/")
     assert base.startswith(f"http://{HOST}:")
-    assert status(running.url) == 200
+    assert status(running) == 200
     for path in ("", "guess/", "_dash-layout", "guess/_dash-layout", "%C3%BC/", "%ff/", "?token=%C3%BC"):
         assert status(base + path) == 404, path
-    assert status(running.url + "_dash-layout", Cookie="token=\xfc") == 200
+    assert status(running + "_dash-layout", Cookie="token=\xfc") == 200
 
 
-def test_a_name_that_another_site_had_resolved_to_this_machine_is_refused(running: LocalServer) -> None:
-    assert status(running.url, Host="evil.example:8000") == 403
+def test_a_name_that_another_site_had_resolved_to_this_machine_is_refused(running: str) -> None:
+    assert status(running, Host="evil.example:8000") == 403
 
 
-def test_two_pages_are_open_at_once(running: LocalServer) -> None:
+def test_two_pages_are_open_at_once(running: str) -> None:
     with served(page_at("/other/")) as other:
-        assert (status(running.url), status(other.url), status(running.url)) == (200, 200, 200)
+        assert (status(running), status(other), status(running)) == (200, 200, 200)
 
 
-def test_a_port_that_is_taken_is_refused_by_number(running: LocalServer) -> None:
-    port = int(running.url.split(":")[2].split("/")[0])
+def test_a_port_that_is_taken_is_refused_by_number(running: str) -> None:
+    port = int(running.split(":")[2].split("/")[0])
     with pytest.raises(Finger3dError, match=str(port)):
         local_server(page_at("/secret/"), port)
 

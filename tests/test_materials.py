@@ -1,12 +1,16 @@
-"""Young's modulus of a silicone from its sources and from Shore hardness."""
+"""Silicones: moduli of sources and of hardnesses, elastic constants of a table, and the printed table."""
 
 from __future__ import annotations
 
 import math
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from finger3d.errors import Finger3dError
+from finger3d.materials.elastic import NU, ElasticConstants, elastic_constants
 from finger3d.materials.modulus import (
     BATCH,
     NEO_HOOKEAN,
@@ -19,7 +23,10 @@ from finger3d.materials.modulus import (
     of_shore,
     youngs_modulus,
 )
-from finger3d.materials.silicones import Silicone, silicone_named, silicones
+from finger3d.materials.reference import reference
+from finger3d.materials.silicones import Mix, Silicone, silicone_named, silicones, sources
+
+# --- young's modulus of a silicone from its sources and from Shore hardness ------------------------------------------
 
 
 def test_the_formula_of_gent_is_that_of_a_rigid_punch() -> None:
@@ -137,3 +144,111 @@ def test_without_a_measurement_the_hardness_decides() -> None:
 def test_the_modulus_lies_between_its_bounds(name: str, low: float, high: float) -> None:
     """Bounds: the slope of the tensile test, and the neo-Hookean modulus of the data sheet."""
     assert low < youngs_modulus(silicone_named(name)).E_MPa < high
+
+
+# --- the table of silicones ------------------------------------------------------------------------------------------
+
+
+def test_the_silicones_that_people_cast_fingers_of_are_there() -> None:
+    assert len(silicones()) >= 12
+    assert {
+        "Ecoflex 00-10", "Ecoflex 00-30", "Ecoflex 00-50", "Dragon Skin 10", "Dragon Skin 20", "Dragon Skin 30",
+        "Mold Star 15", "Mold Star 16", "Mold Star 30", "Smooth-Sil 935", "Smooth-Sil 936", "Smooth-Sil 940",
+        "Smooth-Sil 950", "Smooth-Sil 960", "Elastosil M4601", "Sylgard 184",
+    } <= set(silicones())  # fmt: skip
+
+
+def test_every_number_is_possible_and_every_silicone_has_its_sources() -> None:
+    used = set()
+    for one in silicones().values():
+        assert one.scale in ("A", "00")
+        assert 5.0 <= one.shore <= 90.0
+        assert one.density_g_ml is None or 0.95 < one.density_g_ml < 1.35
+        assert one.viscosity_Pa_s is None or 1.0 <= one.viscosity_Pa_s <= 100.0
+        assert one.shrinkage is None or 0.0 < one.shrinkage <= 0.01
+        assert one.pot_life_min is None or one.cure_h is None or one.pot_life_min < 60.0 * one.cure_h
+        assert one.sources
+        assert set(one.sources) <= set(sources())
+        used |= set(one.sources)
+    assert used == set(sources())
+
+
+def test_a_family_is_stiffer_where_it_is_harder() -> None:
+    rows = {name: one.modulus_100_psi for name, one in silicones().items() if one.modulus_100_psi}
+    for family in ("Ecoflex", "Dragon Skin"):
+        moduli = [value for name, value in rows.items() if name.startswith(family)]
+        assert len(moduli) == 4
+        assert moduli == sorted(moduli)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Dragon Skin 20", "dragon skin 20", "DragonSkin20", "dragon-skin 20", " Dragon  Skin 20A", "DRAGON SKIN 20 fast"],
+)
+def test_case_spaces_and_speed_do_not_matter(name: str) -> None:
+    assert silicone_named(name).name == "Dragon Skin 20"
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(Finger3dError, match='"Ecoflex 00-30"'):
+        silicone_named("Eco-flx 0030")
+    with pytest.raises(Finger3dError, match="Ecoflex 00-10, .* Sylgard 184; .*shore_A"):
+        silicone_named("butter")
+
+
+def test_the_proportion_of_the_components() -> None:
+    mix = silicone_named("Smooth-Sil 950").mix
+    assert mix == Mix(100.0, 10.0, "weight")
+    assert mix.share_a == pytest.approx(10.0 / 11.0)
+    assert str(mix) == "100 A : 10 B by weight"
+
+
+def test_psi_are_converted() -> None:
+    assert silicone_named("Dragon Skin 30").modulus_100_MPa == pytest.approx(0.593, abs=5e-4)
+    assert silicone_named("Sylgard 184").modulus_100_MPa is None
+
+
+# --- elastic constants from the keys of a table ----------------------------------------------------------------------
+
+
+def test_a_modulus_that_is_given_is_exact() -> None:
+    found = elastic_constants({"E_MPa": 2, "nu": 0.3, "shore_A": None})
+    assert found == ElasticConstants(2.0, 0.3, None, "given")
+    assert str(found) == "2 MPa, given"
+
+
+def test_a_silicone_brings_modulus_spread_and_origin() -> None:
+    found = elastic_constants({"silicone": "ecoflex 00-30"})
+    wanted = youngs_modulus(silicone_named("Ecoflex 00-30"))
+    assert (found.E_MPa, found.spread, found.origin, found.nu) == (wanted.E_MPa, wanted.spread, wanted.origin, NU)
+    assert str(found).startswith(f"{wanted.E_MPa:.3g} MPa +- 28 %, Ecoflex 00-30, ")
+    assert elastic_constants({"silicone": "ecoflex 00-30", "nu": 0.5}).nu == 0.5
+
+
+def test_a_hardness_is_converted() -> None:
+    found = elastic_constants({"shore_00": 30.0})
+    assert (found.E_MPa, found.spread) == (modulus_of_shore_00(30.0), SPREAD_00)
+    assert "1.7 times softer" in elastic_constants({"shore_A": 30}).origin
+
+
+def test_no_number_and_no_silicone() -> None:
+    with pytest.raises(TypeError):
+        elastic_constants({"E_MPa": "1", "nu": 0.3})
+    with pytest.raises(Finger3dError, match="Dragon Skin 10"):
+        elastic_constants({"silicone": "dragn skin 10"})
+
+
+# --- the table of silicones in docs/materials.md ---------------------------------------------------------------------
+
+
+def test_the_page_has_the_table(root: Path) -> None:
+    assert runpy.run_path(str(root / "docs" / "_quoted.py"))["parts"]("docs/materials.md")[1] == reference()
+
+
+def test_a_row_for_every_silicone_and_a_number_for_every_source() -> None:
+    lines = reference().splitlines()
+    rows = [line for line in lines if line.startswith("|")][2:]
+    assert [row.split(" | ")[0].removeprefix("| ") for row in rows] == list(silicones())
+    assert [line.split(". ")[0] for line in lines if line[:1].isdigit()] == [str(i + 1) for i in range(len(sources()))]
+    row = next(r for r in rows if r.startswith("| Dragon Skin 20 "))
+    assert "| 0.423 | 25 % | 49 |" in row
