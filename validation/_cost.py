@@ -40,8 +40,6 @@ from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
 
-Float = NDArray[np.float64]
-
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
 SECTION, SOLID, HALF = "section", "solid", "half cylinder"

@@ -25,7 +25,6 @@ _FLOOR = 1e-5
 def draw(figure: Any, lines: Sequence[Line]) -> None:
     """Draw six panels from the lines of the study's table."""
     figure.set_size_inches(15.0, 8.8)
-    figure.set_layout_engine("constrained")
     panels = figure.subplots(2, 3).ravel()
     runs = [line for line in lines if line["kind"] == "run"]
     for axes, panel in zip(panels, (_elements, _numbers, _grading, _memory, _condensation, _large), strict=True):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -19,8 +20,6 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
-
-Float = NDArray[np.float64]
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
 DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_line

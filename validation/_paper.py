@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.recovery.recover import displacement
@@ -26,8 +27,6 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, contact_table
 
 from ._rows import Measure, Row
-
-Float = NDArray[np.float64]
 
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 NUS = (0.3, 0.45, 0.49)

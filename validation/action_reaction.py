@@ -12,13 +12,14 @@ force of the increment; where friction turns during an increment it leaves an er
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -31,7 +32,6 @@ from finger3d.mechanics.results.history import StepResult
 from ._common import rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
 _ROUND = "round-off; 2e-13 or less measured"
 SIZES = {"plane-strain": 2.0, "solid": 8.0}
@@ -124,9 +124,8 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
 
 
-def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> list[Row]:
+def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> Iterator[Row]:
     """Rows of the work's balance, with friction also of its rate."""
-    rows = []
     for mu, counts, slide in ((0.25, (20, 40, 80), 15.0), (0.0, (5, 10, 20, 40), 0.0)):
         found = [balance(problem, along(problem, n, mu, slide)[-1]).work for n in counts]
         steps = 1.0 / np.array(counts)
@@ -136,17 +135,16 @@ def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[t
         if mu == 0.0:
             worst = float(np.abs(found).max())
             what = f"work less stored and lost, over the work, {kind}, {counts[0]} to {counts[-1]} increments, largest"
-            rows.append(Row(what, _ALWAYS, 0.0, worst, 1e-10, "round-off", measure="absolute"))
+            yield Row(what, _ALWAYS, 0.0, worst, 1e-10, "round-off", measure="absolute")
             continue
         what = f"work over stored and lost, {kind}, {counts[-1]} increments a leg"
-        rows.append(
-            Row(what, _ALWAYS, 1.0, 1.0 / (1.0 - found[-1]), 1e-3, "second order; 0.03 % or less measured with so many")
+        yield Row(
+            what, _ALWAYS, 1.0, 1.0 / (1.0 - found[-1]), 1e-3, "second order; 0.03 % or less measured with so many"
         )
         why = "points change state within an increment; more than the first order is seen"
         got = rate(steps[-3:], found[-3:])
         source = "friction under the mean normal force"
-        rows.append(Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least"))
-    return rows
+        yield Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least")
 
 
 def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None:

@@ -167,38 +167,32 @@ def _estimated(found: list[Judged], pressed: int) -> Row:
     )  # fmt: skip
 
 
-def _rows(found: list[Judged], what: str) -> list[Row]:
+def _rows(found: list[Judged], what: str) -> Iterator[Row]:
     """Return the shares of one kind of number; none where nothing is reported."""
     said, silent = ([j for j in found if j.estimate.significant == significant] for significant in (True, False))
-    out = []
     if said:
         text = f"{what}, {len(said)} reported of {len(found)}"
         within, covered = (float(np.mean([getattr(j, key) for j in said])) for key in ("within", "covered"))
-        out += [
-            Row(
-                f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within, 0.0,
-                "a bound", measure="at least",
-            ),
-            Row(
-                f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered, 0.0, "a bound",
-                measure="at least",
-            ),
-        ]  # fmt: skip
+        yield Row(
+                  f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within, 0.0,
+                  "a bound", measure="at least",
+              )  # fmt: skip
+        yield Row(
+                  f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered, 0.0, "a bound",
+                  measure="at least",
+              )  # fmt: skip
     if silent:
         covered = float(np.mean([j.covered for j in silent]))
-        out.append(
-            Row(
-                f"share of changes not reported whose interval holds: {what}, {len(silent)} of {len(found)}",
-                "nothing is claimed of them",
-                COVERED,
-                covered,
-                0.0,
-                "that of reported changes",
-                "statement",
-                "at least",
-            )  # fmt: skip
+        yield Row(
+            f"share of changes not reported whose interval holds: {what}, {len(silent)} of {len(found)}",
+            "nothing is claimed of them",
+            COVERED,
+            covered,
+            0.0,
+            "that of reported changes",
+            "statement",
+            "at least",
         )
-    return out
 
 
 def _draw(figure: Any, found: list[Judged]) -> None:

@@ -17,8 +17,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -30,7 +30,6 @@ from ._common import body, contact_axis, convergence, graded, halved, quarter_bl
 from ._layer import line, point
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force
 _LAYER = "Gladwell 1980; REFERENCES.md, 1.7"
 _ONE = (

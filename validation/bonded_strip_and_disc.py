@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
 
@@ -22,7 +22,6 @@ from ._common import box, convergence, held_at, mapped, nodes_of, solve
 from ._corner import clamped_free, extrapolated, observed
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 _WILLIAMS = "2e of the rim, Williams 1952; REFERENCES.md, 5.3"
 _BOND = "Gent and Lindley 1959; REFERENCES.md, 5.5"
 WANTED = {("strip", 0.5): 2.6695, ("strip", 0.49): 2.448, ("disc", 0.5): 2.955, ("disc", 0.49): 2.6337}

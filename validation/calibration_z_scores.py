@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
@@ -32,7 +32,6 @@ from finger3d.sensor import Calibration, estimate
 from ._paper import columns
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 Steps = int | Literal["auto"]
 
 NOISE, RANGE = 1.5e-4, (0.05, 1.2)
@@ -188,7 +187,6 @@ def _compared(nu: float, size: float) -> Row:
 
 def _draw(figure: Any, found: list[Reading]) -> None:
     figure.set_size_inches(12.0, 4.8)
-    figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2)
     cases = list(dict.fromkeys((r.steps, r.mesh) for r in found))
     for k, (steps, mesh) in enumerate(cases):

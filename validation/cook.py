@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
 
@@ -24,7 +24,6 @@ from ._common import box, convergence, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 CORNER = np.pi / 2 + np.arctan2(16.0, 48.0)
 _COOK = "Cook 1974; REFERENCES.md, 5.4"
 _WILLIAMS = "2e of the corner, Williams 1952; REFERENCES.md, 5.3"

@@ -164,13 +164,13 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
         rows += _truth_rows(body, truths[body], quick)
         if body not in LARGE.values():
             rows += _rate_rows(body, series, runs)
-            rows += _solver_rows(body, series, runs) + _locking_rows(body, series, errors)
+            rows += [*_solver_rows(body, series, runs), *_locking_rows(body, series, errors)]
         if not quick:
             rows += _slower_row(body, series, runs) if body not in LARGE.values() else _large_row(body, series, runs)
             rows += _default_rows(body, runs, errors, truths[body], steps[body])
         lines += [_run_line(c, runs[c], errors[c]) for c in runs if c.body == body]
     advices = [(b, a) for b, series in made.items() for a in _advices(series, runs, errors, truths[b], rates)]
-    rows += _float_rows(floats) + list(_extrapolation_rows(made, runs, errors, truths, rates))
+    rows += [*_float_rows(floats), *_extrapolation_rows(made, runs, errors, truths, rates)]
     holes = sum(a.case is None for _, a in advices)
     if not quick:
         rows.append(
@@ -240,9 +240,8 @@ def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row
     ]  # fmt: skip
 
 
-def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
+def _rate_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
     """Of the force in the mesh."""
-    rows: list[Row] = []
     wanted = 2.0 * clamped_free(math.pi / 2, 0.3 if body == HALF else 0.49, body == HALF)
     if body != HALF:
         # in a solid the layers across the width are few and whole, so neighbouring levels are no family
@@ -252,16 +251,12 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
         except ValueError:  # no rate fits
             rate = math.nan
         why = "three meshes, and a contact that grows from point to point"
-        rows.append(
-            Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
-                measure="absolute")
-        )  # fmt: skip
-    return rows
+        yield Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
+                  measure="absolute")  # fmt: skip
 
 
-def _solver_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
+def _solver_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
     """SuperLU and one factorisation an iteration, in plain increments, give what PARDISO and the condensation give."""
-    rows = []
     for name, way, limit, keys in (
         ("SuperLU", "condensed", 1e-9, QUANTITIES),
         ("one factorisation an iteration", "plain increments", 1e-6, ("force", "friction_sum", "gauge_strain")),
@@ -271,11 +266,8 @@ def _solver_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
             own = runs[replace(case, solver="pardiso", way=way)]
             worst = max(worst, *(abs(value(runs[case], k) / value(own, k) - 1.0) for k in keys))
         why = "round-off of two factorisations" if limit == 1e-9 else "a step may stop at a residual of 1e-8"
-        rows.append(
-            Row(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", 0.0, worst,
-                limit, why, measure="absolute")
-        )  # fmt: skip
-    return rows
+        yield Row(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", 0.0, worst,
+                  limit, why, measure="absolute")  # fmt: skip
 
 
 def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -320,35 +312,27 @@ def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, 
 def _default_rows(
     body: str, runs: Runs, errors: Mapping[Case, Mapping[str, float]], truths: Mapping[str, Truth],
     steps: Mapping[str, Mapping[int, float]],
-) -> list[Row]:  # fmt: skip
+) -> Iterator[Row]:  # fmt: skip
     """Whether the defaults keep what they claim, mesh and increments together."""
     case = default(body)
-    rows = []
     for q, claim in CLAIM[body].items():
         limit = claim * case.size / truths[q].value if q in LENGTHS else claim
         got = errors[case][q] + steps[q][10]
         unit = f"{claim:g} edge length{'s' if claim > 1.0 else ''}" if q in LENGTHS else f"{100 * claim:g} %"
-        rows.append(
-            Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
-                "truth above", abs(limit), got, truths[q].uncertainty,
-                f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")
-        )  # fmt: skip
-    return rows
+        yield Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
+                  "truth above", abs(limit), got, truths[q].uncertainty,
+                  f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")  # fmt: skip
 
 
-def _float_rows(floats: Runs) -> list[Row]:
+def _float_rows(floats: Runs) -> Iterator[Row]:
     """A compliance kept in single precision: what it changes, and how near to the limit of a step it stops."""
-    rows = []
     for case, found in floats.items():
         here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
-        rows += [
-            Row(f"largest change of force, friction sum and strain, {here}", "double precision", 0.0, found["change"],
-                1e-5, "its last digit is 6e-8", "sensitivity", "absolute"),
-            Row(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
-                found["residual"], 0.0, "less than a digit below that, which is too close", "sensitivity",
-                "at least"),
-        ]  # fmt: skip
-    return rows
+        yield Row(f"largest change of force, friction sum and strain, {here}", "double precision", 0.0, found["change"],
+                  1e-5, "its last digit is 6e-8", "sensitivity", "absolute")  # fmt: skip
+        yield Row(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
+                  found["residual"], 0.0, "less than a digit below that, which is too close", "sensitivity",
+                  "at least")  # fmt: skip
 
 
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:

@@ -10,14 +10,16 @@ judges the same fingers by their shear strain, in plane strain.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.geometry.registry import designs
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, Float, Profile, columns, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, columns, fig9, line, said, strains, under
 from ._rows import Result, Row
 from .geometry_search import CHOSEN, EDGES, RADII
 
@@ -105,9 +107,8 @@ def _sound(plane: str, found: dict[Any, Judged]) -> dict[Any, Judged]:
     return {k[1:]: f for k, f in found.items() if k[0] == plane and f.height >= _HEIGHT and f.reach <= reach + 1.0}
 
 
-def _statements(plane: str, over: str, found: dict[Any, Judged], x: Float) -> list[Row]:
+def _statements(plane: str, over: str, found: dict[Any, Judged], x: Float) -> Iterator[Row]:
     where, own = f"{DOMAINS[plane]}, {over}", found[(plane, *CHOSEN)]
-    rows = []
     for among, here in (
         ("", {k[1:]: f for k, f in found.items() if k[0] == plane}),
         (" of those as high that touch no farther", _sound(plane, found)),
@@ -117,21 +118,18 @@ def _statements(plane: str, over: str, found: dict[Any, Judged], x: Float) -> li
         text = (
             f"R = 100, H = 36.6 is the most sensitive, {where}: over the best{among}, R = {best[0]:g}, H = {best[1]:g}"
         )
-        rows.append(said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least"))
+        yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
     value, at, angle = own.best(x, over)
     i, j = int(np.argmin(abs(ANGLES - GAUGE[1]))), int(np.argmin(abs(x - GAUGE[0])))
     text = (
         f"x = 36 mm, 30 degrees is the most sensitive gauge, {where}: over that at x = {at:.0f} mm, {angle:.0f} degrees"
     )
     share = own.value[over][i, j] / value
-    rows.append(said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least"))
+    yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
     error, step = own.error[over].ravel()[own.value[over].argmax()], np.diff(MUS).min()
     text = f"error of the strain by the increments at the best gauge, {where}, over the least change from mu to mu"
-    rows.append(
-        Row(text, "half as many increments", 0.3, float(error / (abs(value) * step)), 0.0,
-            "the least change may be small", "statement", "at most")
-    )  # fmt: skip
-    return rows
+    yield Row(text, "half as many increments", 0.3, float(error / (abs(value) * step)), 0.0,
+              "the least change may be small", "statement", "at most")  # fmt: skip
 
 
 def _draw(figure: Any, radii: Any, edges: Any, found: dict[Any, Judged], x: Float) -> None:

@@ -14,6 +14,7 @@ described; this one is of a common kind.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -65,7 +66,7 @@ def strains(problem: Problem, mus: tuple[float, ...]) -> np.ndarray:
 
 def run(quick: bool) -> Result:
     """Quick: two lengths, coarse meshes, no mesh in space."""
-    rows = _plane_rows(quick) + ([] if quick else _space_rows())
+    rows = [*_plane_rows(quick), *(() if quick else _space_rows())]
     mus = MUS[3:6] if quick else MUS
     lengths = (1.0, 4.0) if quick else LENGTHS
     sizes: dict[Domain, float] = {"plane-strain": 4.0, "solid": 5.0} if quick else {"plane-strain": 1.0, "solid": 2.5}
@@ -87,88 +88,66 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: _draw(figure, found, np.array(mus)))
 
 
-def _plane_rows(quick: bool) -> list[Row]:
-    rows = []
+def _plane_rows(quick: bool) -> Iterator[Row]:
     foil = Foils(3000.0, 0.02, 0.15)  # 3 of 20 mm, on 1 mm
     for length in (1.0, 4.0, 10.0):
         want = wing(length, 9.0, 1.0, NU)
-        rows.append(
-            Row(
-                f"read over free, {length:g} mm, plane strain without end", WING, want,
-                alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
-            )
-        )  # fmt: skip
+        yield Row(
+                  f"read over free, {length:g} mm, plane strain without end", WING, want,
+                  alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
+              )  # fmt: skip
     fine = [by_mesh(4.0, foil, 1.0, NU, 2, n) for n in ((4, 8) if quick else (8, 16))]
-    rows.append(
-        Row(
-            "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
-            2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
-        )
-    )  # fmt: skip
+    yield Row(
+              "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
+              2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
+          )  # fmt: skip
     for below in DEPTHS[1:] if quick else DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, NU, 2, n, 4.0 * below) for n in ((4, 8) if quick else (8, 16))]
-        rows.append(
-            Row(
-                f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
-                "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
-                "left out by the effect", "sensitivity",
-            )
-        )  # fmt: skip
-    return rows
+        yield Row(
+                  f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
+                  "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
+                  "left out by the effect", "sensitivity",
+              )  # fmt: skip
 
 
-def _space_rows() -> list[Row]:
-    rows = []
+def _space_rows() -> Iterator[Row]:
     foil = Foils(3000.0, 0.02, 3.0)
     for length in (1.0, 4.0, 10.0):
         meshes = [by_mesh(length, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
-        rows.append(
-            Row(
-                f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
-                2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
-            )
-        )  # fmt: skip
+        yield Row(
+                  f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
+                  2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
+              )  # fmt: skip
     endless = [by_mesh(4.0, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
     for below in DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, 0.3, 3, n, 4.0 * below) for n in (2, 4)]
-        rows.append(
-            Row(
-                f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
-                "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
-                "left out by the effect", "sensitivity",
-            )
-        )  # fmt: skip
-    return rows
+        yield Row(
+                  f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
+                  "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
+                  "left out by the effect", "sensitivity",
+              )  # fmt: skip
 
 
-def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> list[Row]:
+def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> Iterator[Row]:
     """The paper against gauges of 4 mm: size of the slope at mu = 0.5, and its sign."""
-    rows = []
     at = mus.index(0.5)
     for domain, name in (("plane-strain", "plane strain"), ("solid", "solid")):
         slopes = np.gradient(found[domain, 4.0], np.array(mus), axis=0)[at]
         for slope, what in zip(slopes, ("free strain", "as a foil of 4 mm reads it"), strict=True):
-            rows.append(
-                Row(
-                    f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER, 0.0,
-                    float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement", "absolute",
-                )
-            )  # fmt: skip
-            rows.append(
-                Row(
-                    f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER, 0.0,
-                    float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement", "absolute",
-                )
-            )  # fmt: skip
+            yield Row(
+                      f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER, 0.0,
+                      float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement", "absolute",
+                  )  # fmt: skip
+            yield Row(
+                      f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER, 0.0,
+                      float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement", "absolute",
+                  )  # fmt: skip
         strain = found[domain, 4.0][:, 1]
         rising = np.maximum(np.diff(strain), 0.0).sum() / np.abs(np.diff(strain)).sum()
-        rows.append(
-            Row(
-                f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
-                0.0, float(rising), 0.05, "round-off and increments", "statement", "absolute",
-            )
-        )  # fmt: skip
-    return rows
+        yield Row(
+                  f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
+                  0.0, float(rising), 0.05, "round-off and increments", "statement", "absolute",
+              )  # fmt: skip
 
 
 def _steps_row(domain: str, value: np.ndarray, half: np.ndarray, mus: tuple[float, ...], steps: int) -> Row:

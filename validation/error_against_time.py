@@ -131,7 +131,6 @@ def _rows(lines: list[Line], floors: Mapping[str, float]) -> list[Row]:
 
 def _draw(figure: Any, lines: list[Line], floors: Mapping[str, float]) -> None:
     figure.set_size_inches(7.0, 4.4)
-    figure.set_layout_engine("constrained")
     axes = figure.subplots()
     for (name, label), mark in zip(NUMBERS.items(), ("o-", "s-", "^-"), strict=True):
         some = [(line[3], 100.0 * line[6]) for line in lines if (line[0], line[4]) == ("finger3d", name)]

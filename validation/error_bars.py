@@ -265,19 +265,17 @@ def run(quick: bool, seed: int | None = None) -> Result:
     return Result(tuple(rows), columns(COLUMNS, every), lambda figure: _draw(figure, meshes, steps))
 
 
-def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str]) -> list[Row]:
+def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str]) -> Iterator[Row]:
     """The share of every number in each kind of mesh, by the name of the scene; a pool of all would hide one.
 
     Zones of stick are a statement: most of these meshes have fewer than 700 unknowns, where they are of few points.
     """
-    rows = []
     for group in dict.fromkeys(meshes.values()):
         for kind in KINDS:
             here = [j for j in found if j.kind == kind and meshes[j.scene] == group]
             if len(here) >= LEAST:
                 row = _share(here, f"{kind}, by mesh, {group}, {len(here)} cases")
-                rows.append(replace(row, kind="statement") if "stick" in kind else row)
-    return rows
+                yield replace(row, kind="statement") if "stick" in kind else row
 
 
 def _share(here: list[Judged], text: str, slack: float = 1e-9) -> Row:
@@ -303,15 +301,13 @@ def _rows(kind: str, found: list[Judged], what: str, slack: float = 1e-9) -> lis
     ]  # fmt: skip
 
 
-def _narrow(found: list[Judged], text: str) -> list[Row]:
+def _narrow(found: list[Judged], text: str) -> Iterator[Row]:
     """Whether the bars of the meshes are as narrow as was aimed at, by the kind of number."""
-    rows = []
     for kind in KINDS:
         if here := [j for j in found if j.kind == kind]:
             median = float(np.median([j.estimate / j.error for j in here if j.error > 1e-6 * abs(j.value)] or [1.0]))
             what = f"estimate over true error, median: {kind}, {text}"
-            rows.append(Row(what, "goal of this project", NARROW, median, 0.0, "the goal", "statement", "at most"))
-    return rows
+            yield Row(what, "goal of this project", NARROW, median, 0.0, "the goal", "statement", "at most")
 
 
 def _met(kind: str, steps: list[Judged]) -> Row:

@@ -7,7 +7,7 @@ they do not depend on the mesh.  No symmetry is used, so that zero net friction 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -36,9 +36,8 @@ def run(quick: bool) -> Result:
         for frame, profile in zip(frames, found[plane, nu], strict=True):
             table = zip(profile.x, profile.p, profile.q, profile.status, strict=True)
             lines += [(plane, nu, frame.target.depth_mm, *map(float, row)) for row in table if row[1] > 0.0]
-    rows = _reference(size) + [
-        row for case in JUDGED for row in statements(", ".join((case[0], f"nu = {case[1]:g}")), found[case])
-    ]
+    rows = [*_reference(size)]
+    rows += [row for case in JUDGED for row in statements(f"{case[0]}, nu = {case[1]:g}", found[case])]
     table = columns("plane nu depth_mm x_mm p_MPa q_MPa status", lines)
     return Result(tuple(rows), table, lambda figure: _draw(figure, found))
 
@@ -48,20 +47,18 @@ def _whole(model: Model) -> Any:
     return build(replace(model, symmetry=()))
 
 
-def _reference(size: float) -> list[Row]:
+def _reference(size: float) -> Iterator[Row]:
     problem = half_cylinder(0.3, STRESS, size)
     frames = under(problem, 0.25, 10)
-    rows = []
     for depth, (force, a, c) in KNOWN.items():
         frame = min(frames, key=lambda f: abs(f.target.depth_mm - depth))
         profile = Profile.of(problem, frame)
         here = f"at {depth:g} mm, plane stress, nu = .3, mu = .25"
-        rows.append(Row(f"P, N per mm, {here}", REFERENCE, force, profile.force, 0.005, "mesh; 0.01 % measured"))
+        yield Row(f"P, N per mm, {here}", REFERENCE, force, profile.force, 0.005, "mesh; 0.01 % measured")
         for name, want, got in (("a", a, profile.a), ("c", c, profile.c)):
             reason = "one point spacing here, 0.013 mm in the reference"
             tolerance = 2.0 * profile.edge_error() + 0.013
-            rows.append(Row(f"{name}, mm, {here}", REFERENCE, want, got, tolerance, reason, measure="absolute"))
-    return rows
+            yield Row(f"{name}, mm, {here}", REFERENCE, want, got, tolerance, reason, measure="absolute")
 
 
 def roundness(profile: Profile) -> float:

@@ -10,6 +10,7 @@ assumed here are in the table.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -42,18 +43,16 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), table, lambda figure: _draw(figure, x, shown))
 
 
-def statements(here: str, early: np.ndarray, last: np.ndarray) -> list[Row]:
+def statements(here: str, early: np.ndarray, last: np.ndarray) -> Iterator[Row]:
     """What Sec. II-B says of the strains (3, n) at a fifth of the depth and at full depth."""
     change = np.abs(last - early).max(axis=1)
     shape = np.abs(_normalised(last) - _normalised(early)).max(axis=1)
     reason = "a quarter would still be noticed"
-    rows = []
     for k in (0, 1):
         what = f"{NAMES[k]} changes little with depth: largest change over that of gamma_xy, {here}"
-        rows.append(said(what, "Fig. 5", 0.25, change[k] / change[2], reason, 0.0, "at most"))
+        yield said(what, "Fig. 5", 0.25, change[k] / change[2], reason, 0.0, "at most")
         what = f"{NAMES[k]} keeps its shape: largest change of the normalised profile over that of gamma_xy, {here}"
-        rows.append(said(what, "Fig. 5", 0.25, shape[k] / shape[2], reason, 0.0, "at most"))
-    return rows
+        yield said(what, "Fig. 5", 0.25, shape[k] / shape[2], reason, 0.0, "at most")
 
 
 def _normalised(strain: np.ndarray) -> np.ndarray:

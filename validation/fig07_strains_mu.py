@@ -8,6 +8,7 @@ line's depth is not told; half and twice it are in the table and in the counts.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -82,17 +83,15 @@ def statements(here: str, x: np.ndarray, values: np.ndarray, a: float) -> list[R
     ]  # fmt: skip
 
 
-def _on_all_lines(found: dict[Any, np.ndarray]) -> list[Row]:
+def _on_all_lines(found: dict[Any, np.ndarray]) -> Iterator[Row]:
     """In how many combinations of line and Poisson's ratio the shear changes more than eps_x at x = 0."""
     bodies = dict.fromkeys(key[:3] for key in found)
     change = {body: np.ptp([found[(*body, mu)] for mu in MUS], axis=0) for body in bodies}
     more = {body: c[2].max() > c[0][c.shape[1] // 2] for body, c in change.items()}
-    rows = []
     for plane in (STRESS, STRAIN):
         judged = [wins for (_, own, _), wins in more.items() if own == plane]
         what = f"gamma_xy changes more than eps_x at x = 0: of {len(judged)} combinations of line and nu, {plane}"
-        rows.append(said(what, "Fig. 7", len(judged), sum(judged), "in all of them", 0.0, "at least"))
-    return rows
+        yield said(what, "Fig. 7", len(judged), sum(judged), "in all of them", 0.0, "at least")
 
 
 def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.analyses.pressed_body import presses
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -35,7 +36,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
-from ._paper import STRAIN, STRESS, Float, columns, said
+from ._paper import STRAIN, STRESS, columns, said
 from ._rows import Result, Row
 
 NOISE, ERROR = 1.5e-4, 0.1
@@ -164,33 +165,29 @@ def _read(model: Model, mus: Float) -> dict[str, Float]:
     return {name: np.array([press.frame.gauges[name] for press in found]) for name in found[0].frame.gauges}
 
 
-def _compatible(curves: list[Curve]) -> list[Row]:
+def _compatible(curves: list[Curve]) -> Iterator[Row]:
     """How many of the gauges in each model are compatible with each reading of the figure."""
-    rows = []
     for model in dict.fromkeys(c.model for c in curves):
         own = [c for c in curves if c.model == model and c.kind == FREE]
         for reading, count in (("slope", sum(c.by_slope for c in own)), ("vertex", sum(c.by_vertex for c in own))):
             what = f"compatible with the figure read by its {reading}: of {len(own)} gauges, free strain, {model}"
-            rows.append(said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least"))
+            yield said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least")
         foils = [c for c in curves if c.model == model and c.kind == READ]
         if foils:
             what = f"compatible with the figure, either reading: of {len(foils)} foils, {model}"
             count = sum(c.by_slope or c.by_vertex for c in foils)
-            rows.append(said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least"))
-    return rows
+            yield said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least")
 
 
-def _claims(curves: list[Curve]) -> list[Row]:
+def _claims(curves: list[Curve]) -> Iterator[Row]:
     """What Sec. IV says, of the gauge as the other studies have it."""
-    rows = []
     for c in curves:
         if (c.nu, c.leaning, (c.y, c.z)) == (NUS[-1], "30", PLACE):
             here = f"{c.kind}, {c.model}"
-            rows.append(said(f"error of mu at .5 from a noise of 1.5e-4 by the change between neighbours, {here}",
-                             "Sec. IV", ERROR, c.error, "the paper's number", 0.0, "at most"))  # fmt: skip
-            rows.append(said(f"a second-order equation describes the strain: largest distance over the range, {here}",
-                             "Fig. 14", 0.05, c.bend, "the width of a drawn line", 0.0, "at most"))  # fmt: skip
-    return rows
+            yield said(f"error of mu at .5 from a noise of 1.5e-4 by the change between neighbours, {here}",
+                       "Sec. IV", ERROR, c.error, "the paper's number", 0.0, "at most")  # fmt: skip
+            yield said(f"a second-order equation describes the strain: largest distance over the range, {here}",
+                       "Fig. 14", 0.05, c.bend, "the width of a drawn line", 0.0, "at most")  # fmt: skip
 
 
 def _draw(figure: Any, curves: list[Curve]) -> None:

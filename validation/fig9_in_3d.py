@@ -110,7 +110,7 @@ def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict
             at[SOLID] / at[STRAIN], "half of the signal", 0.0, "at least",
         ),
     ]  # fmt: skip
-    return rows + statements("20 mm wide", nu, np.array(MUS), gauge[SOLID, nu])
+    return [*rows, *statements("20 mm wide", nu, np.array(MUS), gauge[SOLID, nu])]
 
 
 def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middle: dict) -> None:

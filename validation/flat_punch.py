@@ -13,14 +13,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 HEIGHT = 200.0  # a = 1 mm, E = 1 MPa
 AWAY = 0.9
 _SOURCE = "Johnson 1985, sec. 2.8; REFERENCES.md, 1.5"

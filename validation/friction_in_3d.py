@@ -12,13 +12,13 @@ and increments, which computing removes; mu is known to lie between 0.05 and 1, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
@@ -35,7 +35,6 @@ from finger3d.sensor import Calibration
 from ._paper import columns
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]
 
 NOISE, LIMIT = 1.5e-4, 0.1
@@ -148,29 +147,26 @@ def _sd(joint: Calibration) -> Float:
     return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + 12.0 / (MUS[-1] - MUS[0]) ** 2))
 
 
-def _rows(spread: Spread) -> list[Row]:
-    rows = []
+def _rows(spread: Spread) -> Iterator[Row]:
     for (domain, measure, name, read), sd in spread.items():
         at = float(np.interp(0.5, MUS, sd))
         what = f"standard deviation of mu = 0.5: {NAMES[domain]}, {measure}, {name}, {read}"
-        rows.append(Row(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, 0.0, "the paper's claim", "statement", "at most"))
+        yield Row(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, 0.0, "the paper's claim", "statement", "at most")
         share = float(np.mean(sd <= LIMIT))
         what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
-        rows.append(Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least"))
+        yield Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least")
     for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
         mean = [float(sd.mean()) for key, sd in spread.items()
                 if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
         what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
-        rows.append(Row(what, "more readings tell more", 1.05, worst, 0.0, "placed with the error of the mesh, judged "
-                        "without", "sensitivity", "at most"))  # fmt: skip
-    return rows
+        yield Row(what, "more readings tell more", 1.05, worst, 0.0, "placed with the error of the mesh, judged "
+                  "without", "sensitivity", "at most")  # fmt: skip
 
 
 def _draw(figure: Any, spread: Spread) -> None:
     cases = list(dict.fromkeys((key[0], key[1]) for key in spread))
     figure.set_size_inches(5.2 * len(cases), 5.0)
-    figure.set_layout_engine("constrained")
     panels = np.atleast_1d(figure.subplots(1, len(cases), sharey=True))
     colours = {PAPER: "#b2182b", MARKERS: "#1b7837"}
     blues = dict(zip((n for n in dict.fromkeys(key[2] for key in spread) if "best" in n),

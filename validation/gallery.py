@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -32,7 +32,6 @@ from finger3d.scene import load
 from . import _layer
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 SCENES = Path(__file__).resolve().parents[1] / "geometries"
 LAYER = "bonded layer; REFERENCES.md, 1.1 and 1.7"
 HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1 and 1.3"

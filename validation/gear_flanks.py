@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
@@ -27,7 +27,6 @@ from finger3d.objects import MeshObject
 
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 TEETH, DEPTH = 24, 1.0
 PITCH = 360.0 / TEETH
 

@@ -13,16 +13,18 @@ of volume, for which CalculiX takes nu = 0.475.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 
-from ._paper import Float, columns
+from ._paper import columns
 from ._rows import Result, Row
 
 SOURCE = "Helmut et al. 2024; REFERENCES.md, 9.1"
@@ -133,37 +135,32 @@ def _covariance(slopes: Float) -> Float:
     return np.linalg.inv(scaled.T @ scaled)
 
 
-def _rows(models: list[Model], best: Model) -> list[Row]:
+def _rows(models: list[Model], best: Model) -> Iterator[Row]:
     """What fits, what the forces tell, and the prediction."""
     fitting = [m for m in models if m.misfit <= FITS]
     told = f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}, E = {best.E:.3f} MPa"
-    rows = [
-        Row(
-            f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS, best.misfit,
-            0.0, "a block for a gel with a rounded rim; force and zero without published errors", "validation",
-            "at most",
-        ),
-        Row(
-            "models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models), 0.0,
-            "if the forces told nothing but modulus and zero", "statement", "at least",
-        ),
-    ]  # fmt: skip
+    yield Row(
+              f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS, best.misfit,
+              0.0, "a block for a gel with a rounded rim; force and zero without published errors", "validation",
+              "at most",
+          )  # fmt: skip
+    yield Row(
+              "models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models), 0.0,
+              "if the forces told nothing but modulus and zero", "statement", "at least",
+          )  # fmt: skip
     for name, values in {"friction coefficient": [m.mu for m in fitting], "Young's modulus": [m.E for m in fitting],
                          "Poisson's ratio": [m.nu for m in fitting]}.items():  # fmt: skip
         ratio = max(values, default=np.nan) / min(values, default=np.nan)
-        rows.append(Row(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
-                        1.1, ratio, 0.0, "10 %", "statement", "at most"))  # fmt: skip
+        yield Row(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
+                  1.1, ratio, 0.0, "10 %", "statement", "at most")  # fmt: skip
     # of all models: which of them fit is known only with the fourth force
     band = [m.predicted + sign * 2.0 * m.predicted_sd for m in models for sign in (-1.0, 1.0)]
     outside = max(min(band) - FORCES[3], FORCES[3] - max(band), 0.0)
-    rows.append(
-        Row(
-            f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
-            f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
-            "two standard deviations about every model", "validation", "absolute",
-        )
-    )  # fmt: skip
-    return rows
+    yield Row(
+              f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
+              f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
+              "two standard deviations about every model", "validation", "absolute",
+          )  # fmt: skip
 
 
 def _checks(best: Model, finer: Model, size: float) -> list[Row]:

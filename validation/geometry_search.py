@@ -10,6 +10,7 @@ choice is also judged among those that are at least as high and touch no farther
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,7 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), table, lambda figure: _draw(figure, nus, radii, edges, found))
 
 
-def _statements(nu: float, found: dict[Any, tuple[float, float]], sound: dict[Any, bool]) -> list[Row]:
-    rows = []
+def _statements(nu: float, found: dict[Any, tuple[float, float]], sound: dict[Any, bool]) -> Iterator[Row]:
     for among, chosen in (("", found), (" of those as high that touch no farther", sound)):
         here = {k[1:]: found[k] for k, kept in chosen.items() if k[0] == nu and kept}
         for k, what in ((0, "smallest change from mu to mu"), (1, "change from mu = .06 to 1")):
@@ -63,8 +63,7 @@ def _statements(nu: float, found: dict[Any, tuple[float, float]], sound: dict[An
             against = f"over that of the best{among}, R = {best[0]:g}, H = {best[1]:g}, nu = {nu:g}"
             text = f"R = 100, H = 36.6 is the most sensitive: its {what} {against}"
             share = found[(nu, *CHOSEN)][k] / here[best][k]
-            rows.append(said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least"))
-    return rows
+            yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
 
 
 def _draw(figure: Any, nus: Any, radii: Any, edges: Any, found: dict[Any, tuple[float, float]]) -> None:

@@ -176,7 +176,6 @@ def _draw(figure: Any, found: list[Mesh]) -> None:
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
     figure.set_size_inches(5.4 * across, 4.2 * down)
-    figure.set_layout_engine("constrained")
     panels = np.ravel(figure.subplots(down, across, squeeze=False))
     titles = {GOAL: "normal force", GAUGE: "strain of the gauge"}
     for axes, (domain, goal) in zip(panels, pairs, strict=True):

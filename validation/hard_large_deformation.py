@@ -272,9 +272,9 @@ def run(quick: bool) -> Result:
         "balls": list(balls(1 if quick else len(BALLS))),
     }
     table = _table(found)
-    rows = _settling([f for *_, f in found["coarse"]]) + _penetration(found)
+    rows = (*_settling([f for *_, f in found["coarse"]]), *_penetration(found))
     counts = [Settled(f.converged, f.increments, f.residual) for scenes in found.values() for *_, f in scenes]
-    return Result(tuple(rows), table, lambda figure: _draw(figure, table), settled(counts))
+    return Result(rows, table, lambda figure: _draw(figure, table), settled(counts))
 
 
 def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
@@ -305,30 +305,28 @@ def _cured(found: Found) -> bool:
     return "try" in found.says and "mm" in found.says and "\n" not in found.says
 
 
-def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> list[Row]:
+def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> Iterator[Row]:
     """How deep the object is between the contact points, over the depth."""
-    rows = []
     for mesh in ("coarse", "default"):
         for kind, solid in (("sections", False), ("solids", True)):
             here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
             if here:
-                rows.append(Row(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
-                                max(f.penetration for f in here), 0.0, "largest at sharp edges of finger and object",
-                                "statement", "at most"))  # fmt: skip
+                yield Row(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
+                          max(f.penetration for f in here), 0.0, "largest at sharp edges of finger and object",
+                          "statement", "at most")  # fmt: skip
     what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
     for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
         smooth = [
             f for _, model, f in some if not f.at_sharp_edge and (model.domain == "solid") == (kind != "sections")
         ]
         if smooth:
-            rows.append(_bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
-                               GOAL))  # fmt: skip
+            yield _bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
+                         GOAL)  # fmt: skip
     ended = [f for *_, f in found["default"] if not f.settled]
     here = f"{len(found['default'])} presses on default meshes"
-    rows.append(_bound(f"{here}: share that ends early", 0.02, len(ended) / len(found["default"]),
-                       "the finer, the sooner sharp edges fold", GOAL))  # fmt: skip
-    rows.append(_bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none"))
-    return rows
+    yield _bound(f"{here}: share that ends early", 0.02, len(ended) / len(found["default"]),
+                 "the finer, the sooner sharp edges fold", GOAL)  # fmt: skip
+    yield _bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none")
 
 
 def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[Any]]:

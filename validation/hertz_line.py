@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -33,7 +33,6 @@ from ._common import convergence, rate
 from ._layer import line
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
 _HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.2"
 _ONE = "second order in the point spacing; 0.08 % or less measured on the full meshes, and coarse ones must pass too"

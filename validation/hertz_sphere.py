@@ -16,8 +16,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -29,7 +29,6 @@ from ._common import body, contact_axis, convergence, graded, quarter_block, rat
 from ._layer import point
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 RADIUS = 1000.0  # a = 1
 HEIGHT = 10.0
 PLACES = np.linspace(0.7, 1.0, 12)

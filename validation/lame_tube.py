@@ -16,14 +16,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 _LAME = "Lame 1852; REFERENCES.md, 5.6"
 KINDS = ("displacement, L2", "gradient, L2", "u(a)")
 SOURCES = ("Ciarlet and Raviart 1972", "Ciarlet and Raviart 1972", "twice the energy's norm")

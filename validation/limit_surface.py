@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
@@ -34,8 +33,6 @@ from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 
 from ._rows import Result, Row
-
-Float = NDArray[np.float64]
 
 RADIUS, E, NU, MU = 100.0, 1.0, 0.45, 0.25
 DEPTH, WAY = 2.0, 30.0  # mm; WAY is about the mean way of the plane over the contact

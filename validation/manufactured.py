@@ -12,15 +12,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 PI = np.pi
 NUS = (0.3, 0.49, 0.4999, 0.5)
 _SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013; REFERENCES.md, 5.2"

@@ -171,7 +171,6 @@ def _rows(found: list[Meshed]) -> Iterator[Row]:
 
 def _draw(figure: Any, found: list[Meshed]) -> None:
     figure.set_size_inches(12.0, 3.6)
-    figure.set_layout_engine("constrained")
     names = list(dict.fromkeys(m.body for m in found))
     shown = (("seconds", 1.0, "time, s"), ("min_dihedral_deg", 1.0, "least dihedral angle, degrees"),
              ("force_error", 100.0, "error of force, %"), ("gauge_error", 100.0, "error of gauge, %"))  # fmt: skip

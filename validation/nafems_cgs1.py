@@ -17,15 +17,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 R, SIDE, FORCE = 50.0, 200.0, 35e3
 NU = 0.3
 MODULUS = 1.0 / ((1.0 - NU**2) / 210e3 + (1.0 - NU**2) / 70e3)

@@ -13,6 +13,7 @@ strain more than friction does, so its calibration must be made on the object's 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -105,7 +106,7 @@ def _is_monotonic(curve: np.ndarray) -> bool:
     return bool((change > -1e-6 * np.ptp(curve)).all())
 
 
-def _solid_rows(sizes: tuple[float, ...], steps: int) -> list[Row]:
+def _solid_rows(sizes: tuple[float, ...], steps: int) -> Iterator[Row]:
     """In 3D: what a bar of radius 100 mm does to the strain, over all that mu does to it on a plane."""
     found = []
     for size in sizes:
@@ -115,14 +116,11 @@ def _solid_rows(sizes: tuple[float, ...], steps: int) -> list[Row]:
     shape, friction = found[-1]
     what = "3D: strain on a bar of radius 100 mm less that on a plane, over the range of mu 0 to 1 on the plane"
     why = "more than 1: the gauge tells the shape, not mu"
-    rows = [Row(what, "no reference", 1.0, abs(shape) / friction, 0.0, why, "sensitivity", "at least")]
+    yield Row(what, "no reference", 1.0, abs(shape) / friction, 0.0, why, "sensitivity", "at least")
     if len(found) > 1:
         what = "3D: strain on a bar of radius 100 mm less that on a plane, 1e-3"
-        rows.append(
-            Row(what, f"the same at {sizes[0]:g} mm", 1e3 * found[0][0], 1e3 * shape, 0.25,
-                "sign and size; the gauge lies 4 mm under the surface", "sensitivity")
-        )  # fmt: skip
-    return rows
+        yield Row(what, f"the same at {sizes[0]:g} mm", 1e3 * found[0][0], 1e3 * shape, 0.25,
+                  "sign and size; the gauge lies 4 mm under the surface", "sensitivity")  # fmt: skip
 
 
 def _measured(

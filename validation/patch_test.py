@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Elasticity, Isotropic
@@ -26,7 +25,6 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from ._common import body, body_load, cube, held_at, shuffled, solve
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 _PATCH = "Irons and Razzaque 1972; REFERENCES.md, 5.1"
 _CONTACT = "Crisfield 2000; REFERENCES.md, 5.1"
 _ROUND = "round-off of some thousand unknowns"

@@ -12,7 +12,7 @@ the way, also at coefficients of friction so large that forces jump, and the wor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -91,17 +91,15 @@ def _errors(exact: dict[str, float], numbers: dict[str, float]) -> dict[str, flo
     return {name: abs(numbers[name] - exact[name]) / abs(scale[name]) for name in exact}
 
 
-def _rates(errors: dict[Any, dict[str, float]], name: str, mu: float, counts: Sequence[int]) -> list[Row]:
+def _rates(errors: dict[Any, dict[str, float]], name: str, mu: float, counts: Sequence[int]) -> Iterator[Row]:
     """Rates at which the worst error falls from the fewest to the most increments."""
-    rows = []
     for kind, order in ORDER.items():
         few, most = (max(errors[name, mu, kind, count].values()) for count in (counts[0], counts[-1]))
         rate = float(np.log(few / max(most, 1e-15)) / np.log(counts[-1] / counts[0]))
         what = f"rate at which {kind} increments near the path, {name}, mu = {mu:g}"
         # in the half cylinder points slip one way and then the other within an increment
         sort = "statement" if kind == OWN and name == HALF else "verification"
-        rows.append(Row(what, f"order {order:g}", order, rate, 0.4, "points close one by one", sort, "at least"))
-    return rows
+        yield Row(what, f"order {order:g}", order, rate, 0.4, "points close one by one", sort, "at least")
 
 
 def _automatic(problem: Problem, exact: dict[str, float]) -> list[tuple[Any, ...]]:

@@ -12,11 +12,12 @@ extrapolated with that rate, as the root mean square over 5 depths.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -29,7 +30,6 @@ from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 STEPS = 5
 _WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
 _HALF = "the corners of the base leave an error of order h^1.2; 0.2 % or less measured"
@@ -92,18 +92,14 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
 
 
-def _mirrors(size: float) -> list[Row]:
+def _mirrors(size: float) -> Iterator[Row]:
     """Whole and both halves against the quarter, which is the mirror image of nothing."""
     quarter = press(size, 0.49, symmetry=("x", "z"))[-1]
-    rows = []
     for name, planes in (("half by x", ("x",)), ("half by z", ("z",)), ("whole", ())):
         other = press(size, 0.49, symmetry=planes)[-1]
         away = max(abs(other[k] / quarter[k] - 1.0) for k in ("normal_force_N", "friction_sum_N", "dissipation_mJ"))
         what = f"{name} against quarter: force, friction sum, dissipation, largest relative difference"
-        rows.append(
-            Row(what, "mirror image", 0.0, away, 1e-9, "the same, up to convergence of contact", measure="absolute")
-        )
-    return rows
+        yield Row(what, "mirror image", 0.0, away, 1e-9, "the same, up to convergence of contact", measure="absolute")
 
 
 def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> None:

@@ -17,6 +17,7 @@ its dissipation are those of Spence in few increments, too.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -121,51 +122,40 @@ def _extrapolated(at: dict[Any, np.ndarray], finest: int, mu: float, count: int)
     return 2.0 * far - near
 
 
-def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], finest: int, most: int) -> list[Row]:
+def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], finest: int, most: int) -> Iterator[Row]:
     value = _extrapolated(at, finest, 0.25, most)
     force, outward, lost = INTEGRALS[nu]
     here = f"nu = {nu:g}, mu = .25"
-    rows = [
-        Row(f"P/P_Hertz(a), {here}", SPENCE, force, value[0], 0.01, ONE),
-        Row(f"int_0^a q/P, {here}", SPENCE, outward, value[1], 0.03, THREE),
-        Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE, lost, value[4], 0.03, THREE),
-    ]  # fmt: skip
+    yield Row(f"P/P_Hertz(a), {here}", SPENCE, force, value[0], 0.01, ONE)
+    yield Row(f"int_0^a q/P, {here}", SPENCE, outward, value[1], 0.03, THREE)
+    yield Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE, lost, value[4], 0.03, THREE)  # fmt: skip
     if most == 200:  # fewer increments are not yet on the line ~ 1/N
         few, many = (_extrapolated(plain, finest, 0.25, n)[2] for n in (50, most))
         in_steps = many + (many - few) * 50 / (most - 50)
-        rows.append(
-            Row(
-                f"dissipation by end forces, {here}, plain increments, extrapolated in 1/N from 50 and 200",
-                SPENCE,
-                lost,
-                in_steps,
-                0.03,
-                THREE,
-            )
+        yield Row(
+            f"dissipation by end forces, {here}, plain increments, extrapolated in 1/N from 50 and 200",
+            SPENCE,
+            lost,
+            in_steps,
+            0.03,
+            THREE,
         )
     stuck = [at[HEIGHTS[1], n, STUCK, 400][0] for n in (finest // 4, finest // 2, finest) if most == 200]
     if stuck:
         what = f"P/P_Hertz(a), full stick, nu = {nu:g}"
         closed = "Spence 1968, full stick; REFERENCES.md, 2.3"
-        rows.append(
-            Row(f"{what}, extrapolated in the spacing", closed, FULL_STICK[nu], 2.0 * stuck[2] - stuck[1], 0.01, ONE)
-        )
+        yield Row(f"{what}, extrapolated in the spacing", closed, FULL_STICK[nu], 2.0 * stuck[2] - stuck[1], 0.01, ONE)
     if stuck and nu == 0.0:
         rate = float(np.log((stuck[0] - FULL_STICK[nu]) / (stuck[2] - FULL_STICK[nu])) / np.log(4.0))
         why = "mean of two halvings; the increments leave an error of their own"
-        rows.append(
-            Row(f"rate of its error with the mesh, {what}", "order of a: 1", 1.0, rate, 0.1, why, measure="at least")
-        )
+        yield Row(f"rate of its error with the mesh, {what}", "order of a: 1", 1.0, rate, 0.1, why, measure="at least")
     for (case_nu, mu), want in C_OVER_A.items():
         key = (HEIGHTS[1], finest, mu, most)
         if case_nu == nu and key in at:
-            rows.append(
-                Row(
-                    f"c/a, nu = {nu:g}, mu = {mu:g}", SPENCE, want, at[key][3], 0.5 / finest,
-                    f"half a point spacing, a/{finest}", measure="absolute",
-                )
-            )  # fmt: skip
-    return rows
+            yield Row(
+                      f"c/a, nu = {nu:g}, mu = {mu:g}", SPENCE, want, at[key][3], 0.5 / finest,
+                      f"half a point spacing, a/{finest}", measure="absolute",
+                  )  # fmt: skip
 
 
 def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], finest: int, most: int) -> list[Row]:
@@ -183,30 +173,22 @@ def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], fin
     ]
 
 
-def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int, counts: list[int]) -> list[Row]:
-    rows = []
+def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int, counts: list[int]) -> Iterator[Row]:
     for count in counts:
         want_c, want_d = STEPS[count]
         got = _extrapolated(at, finest, 0.25, count)[2]
-        rows.append(
-            Row(f"dissipation/(A P^2) by end forces, N = {count} plain increments", STEPPED, want_d, got, 0.03, THREE)
-        )
-        rows.append(
-            Row(
-                f"c/a, N = {count} plain increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
-                "one point spacing, since this is no mean over increments", measure="absolute",
-            )
-        )  # fmt: skip
+        yield Row(f"dissipation/(A P^2) by end forces, N = {count} plain increments", STEPPED, want_d, got, 0.03, THREE)
+        yield Row(
+                  f"c/a, N = {count} plain increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
+                  "one point spacing, since this is no mean over increments", measure="absolute",
+              )  # fmt: skip
     errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS[0.3][2] for n in (1, 10)]
-    rows.append(
-        Row(
-            "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
-            "1/N; REFERENCES.md, 2.4",
-            1.0,
-            float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
-        )
-    )  # fmt: skip
-    return rows
+    yield Row(
+              "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
+              "1/N; REFERENCES.md, 2.4",
+              1.0,
+              float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
+          )  # fmt: skip
 
 
 def _curve_row(profile: Profile) -> Row:

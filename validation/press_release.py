@@ -12,6 +12,7 @@ The dissipation during release converges slowly with the mesh (see the table), b
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -99,26 +100,21 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
 
 
-def _cycle_rows(nu: float, table: list[tuple[Any, ...]], counts: tuple[int, ...], found: list[Profile]) -> list[Row]:
+def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: list[Profile]) -> Iterator[Row]:
     at = {r[3]: r for r in table if r[1] == nu and r[2] == 20}
     here = f"cylinder, nu = {nu:g}, 20 points to a"
     few, many = counts[-2], counts[-1]
     rate = float(np.log(abs((at[counts[0]][7] - 1.0) / (at[many][7] - 1.0))) / np.log(many / counts[0]))
     extrapolated = at[many][7] + (at[many][7] - at[few][7]) * few**2 / (many**2 - few**2)
     released = found[2 * many - 1]
-    rows = [
-        Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured"),
-        Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off"),
-        Row(f"force after release, N, {here}", REST, 0.0, released.force, 1e-12, "round-off", measure="absolute"),
-    ]
+    yield Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured")
+    yield Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off")
+    yield Row(f"force after release, N, {here}", REST, 0.0, released.force, 1e-12, "round-off", measure="absolute")
     if many == 400:
         what = f"work over work lost, {here}, extrapolated in 1/N^2 from {few} and {many}"
-        rows.append(Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N"))
+        yield Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N")
         what = f"rate at which the excess of the work falls with N, {here}"
-        rows.append(
-            Row(what, "second order in 1/N", 2.0, rate, 0.5, "points change state one by one", measure="at least")
-        )
-    return rows
+        yield Row(what, "second order in 1/N", 2.0, rate, 0.5, "points change state one by one", measure="at least")
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:

@@ -11,6 +11,7 @@ apart.  The block is 50 a high; its compliance is removed by dividing by the fri
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -72,72 +73,58 @@ def run(quick: bool) -> Result:
                     max(t.iterations for t in steps),
                 ]
             )
-        rows += _ring_rows(nu, found, rings, many) + _tet_rows(nu, found, rings, meshes)
+        rows += [*_ring_rows(nu, found, rings, many), *_tet_rows(nu, found, rings, meshes)]
     table = [(*k, *v) for k, v in found.items()]
     columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
     return Result(tuple(rows), columns, lambda figure: _draw(figure, found, rings))
 
 
-def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -> list[Row]:
+def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -> Iterator[Row]:
     force, sum_, lost = INTEGRALS[nu]
     value = found["rings", nu, 0.25, rings, many]
     here = f"rings, nu = {nu:g}, mu = .25"
-    rows = [
-        Row(f"P/P_Hertz(depth), {here}", SPENCE, force, value[0], 0.01, ONE),
-        Row(f"T/P, {here}", SPENCE, sum_, value[1], 0.03, THREE),
-        Row(
-            f"P/P_Hertz(depth), full stick, rings, nu = {nu:g}", "Spence 1968, full stick; REFERENCES.md, 2.3",
-            FULL_STICK[nu], found["rings", nu, 1e6, rings, many][0], 0.01, ONE,
-        ),
-    ]  # fmt: skip
+    yield Row(f"P/P_Hertz(depth), {here}", SPENCE, force, value[0], 0.01, ONE)
+    yield Row(f"T/P, {here}", SPENCE, sum_, value[1], 0.03, THREE)
+    yield Row(
+              f"P/P_Hertz(depth), full stick, rings, nu = {nu:g}", "Spence 1968, full stick; REFERENCES.md, 2.3",
+              FULL_STICK[nu], found["rings", nu, 1e6, rings, many][0], 0.01, ONE,
+          )  # fmt: skip
     if many == 200:
         in_steps = value[2] + (value[2] - found["rings", nu, 0.25, rings, 50][2]) * 50 / (200 - 50)
         rounding = 0.5 * 10.0 ** np.floor(np.log10(lost) - (1 if nu else 2)) / lost
-        rows.append(
-            Row(
-                f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200", SPENCE, lost, in_steps, 0.03 + rounding,
-                LOST,
-            )
-        )  # fmt: skip
+        yield Row(
+                  f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200", SPENCE, lost, in_steps, 0.03 + rounding,
+                  LOST,
+              )  # fmt: skip
     for (case, mu), want in C_OVER_A.items():
         key = ("rings", nu, mu, rings, many)
         if case == nu and key in found:
             got = found[key][3]
-            rows.append(
-                Row(
-                    f"c/a, rings, nu = {nu:g}, mu = {mu:g}", SPENCE, want, got, 1.0 / rings, f"one ring, a/{rings}",
-                    measure="absolute",
-                )
-            )  # fmt: skip
-    return rows
+            yield Row(
+                      f"c/a, rings, nu = {nu:g}, mu = {mu:g}", SPENCE, want, got, 1.0 / rings, f"one ring, a/{rings}",
+                      measure="absolute",
+                  )  # fmt: skip
 
 
-def _tet_rows(nu: float, found: dict[Any, np.ndarray], rings: int, meshes: tuple[int, ...]) -> list[Row]:
+def _tet_rows(nu: float, found: dict[Any, np.ndarray], rings: int, meshes: tuple[int, ...]) -> Iterator[Row]:
     force, sum_, _ = INTEGRALS[nu]
     value = found["tets", nu, 0.25, meshes[-1], 40]
     here = f"3D, nu = {nu:g}, mu = .25, {meshes[-1]} points to a"
-    rows = [
-        Row(f"P/P_frictionless(depth), {here}", SPENCE, force, value[0], 0.01, ONE),
-        Row(f"T/P, {here}", SPENCE, sum_, value[1], 0.03, THREE),
-    ]
+    yield Row(f"P/P_frictionless(depth), {here}", SPENCE, force, value[0], 0.01, ONE)
+    yield Row(f"T/P, {here}", SPENCE, sum_, value[1], 0.03, THREE)
     exact = found["rings", nu, 0.25, rings, 40][2]
     if len(meshes) > 2:
         first, last = (found["tets", nu, 0.25, n, 40][2] - exact for n in (meshes[0], meshes[-1]))
         rate = np.log(first / last) / np.log(meshes[-1] / meshes[0])
-        rows.append(
-            Row(
-                f"rate at which the excess of D falls with the mesh, 3D, nu = {nu:g}",
-                "first order in the spacing, against rings", 1.0, float(rate), 0.3,
-                "few points lie along the edge of the stick zone", measure="at least",
-            )
-        )  # fmt: skip
-        rows.append(
-            Row(
-                f"c/a, {here}", SPENCE, C_OVER_A[nu, 0.25], value[3], 1.0 / meshes[-1],
-                f"one point spacing, a/{meshes[-1]}", measure="absolute",
-            )
-        )  # fmt: skip
-    return rows
+        yield Row(
+                  f"rate at which the excess of D falls with the mesh, 3D, nu = {nu:g}",
+                  "first order in the spacing, against rings", 1.0, float(rate), 0.3,
+                  "few points lie along the edge of the stick zone", measure="at least",
+              )  # fmt: skip
+        yield Row(
+                  f"c/a, {here}", SPENCE, C_OVER_A[nu, 0.25], value[3], 1.0 / meshes[-1],
+                  f"one point spacing, a/{meshes[-1]}", measure="absolute",
+              )  # fmt: skip
 
 
 def _draw(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:

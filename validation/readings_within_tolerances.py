@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
@@ -31,7 +30,6 @@ from finger3d.sensor import Calibration, Estimate, estimate
 from ._paper import columns
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]
 
 DEPTH_MM, MU = 10.0, (0.05, 1.0)
@@ -187,7 +185,6 @@ def _honest(name: str, some: list[Judged], kind: Literal["verification", "statem
 
 def _draw(figure: Any, found: list[Judged]) -> None:
     figure.set_size_inches(12.0, 4.8)
-    figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2)
     colours = {("plane-strain", "1"): "#92c5de", ("plane-strain", "3"): "#2166ac", ("solid", "1"): "#f4a582",
                ("solid", "3"): "#b2182b"}  # fmt: skip

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -38,8 +38,6 @@ from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
 from ._rows import Result, Row
-
-Float = NDArray[np.float64]
 
 R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
 BEGIN = -0.5 * WAY

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
@@ -29,7 +29,6 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from ._rows import Result, Row
 from .triangulated_objects import ball
 
-Float = NDArray[np.float64]
 POSE = {"turn_x": 0.06, "turn_y": 0.4, "turn_z": 0.1}
 WRENCH = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
 ROTATED = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])

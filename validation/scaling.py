@@ -12,7 +12,7 @@ work on the machine changes less than wall time.  The limits of memory and conta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,8 @@ def run(quick: bool) -> Result:
     with Bench("_scaling") as bench:
         wanted = lambda s: 1 if quick or s > 8.0 else 2  # noqa: E731
         runs = best_of(bench, "pressed", dict.fromkeys([*unknowns, *rows]), wanted)
-    judged = _memory_rows(runs) + _contact_rows(runs) + _growth_rows(runs, unknowns, quick) + _one_factorisation(runs)
+    judged = [*_memory_rows(runs), *_contact_rows(runs), *_growth_rows(runs, unknowns, quick)]
+    judged += _one_factorisation(runs)
     judged += [] if quick or cores() < 2 else _workers()
     return Result(tuple(judged), _table(runs, unknowns, rows), lambda figure: _draw(figure, runs, unknowns, rows))
 
@@ -57,15 +58,13 @@ def _sizes(quick: bool) -> tuple[list[Size], list[Size]]:
     return unknowns, rows
 
 
-def _memory_rows(runs: Runs) -> list[Row]:
+def _memory_rows(runs: Runs) -> Iterator[Row]:
     """The peak of the smallest run that has as many unknowns as a limit speaks of."""
-    rows = []
     for dofs, limit in LIMITS_MB.items():
         found = sorted((r["dofs"], r["peak_MB"]) for r in runs.values() if r["dofs"] >= dofs)
         if found:
             what = f"peak memory (MB), {found[0][0]} unknowns, all stages and output"
-            rows.append(Row(what, GOAL, limit, found[0][1], 0.0, "a bound", "validation", "at most"))
-    return rows
+            yield Row(what, GOAL, limit, found[0][1], 0.0, "a bound", "validation", "at most")
 
 
 def _contact_rows(runs: Runs) -> list[Row]:

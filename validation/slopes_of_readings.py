@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -33,8 +33,6 @@ from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
 from ._paper import columns
 from ._rows import Result, Row
-
-Float = NDArray[np.float64]
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
 EVEN = "20 mm wide, swept, base edges twice as long"
@@ -182,7 +180,6 @@ def _section(found: Curves) -> list[Row]:
 def _draw(figure: Any, found: Curves) -> None:
     cases = list(dict.fromkeys(key[0] for key in found))
     figure.set_size_inches(11.0, 3.6 * len(cases))
-    figure.set_layout_engine("constrained")
     panels = figure.subplots(len(cases), 2, sharex=True, sharey="row", squeeze=False)
     for case, row in zip(cases, panels, strict=True):
         row[0].set_ylabel("d strain / d mu, 1e-3")

@@ -11,11 +11,13 @@ paper's gauge, the finger 20 mm wide the gauge that design_search.py finds best,
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
@@ -24,7 +26,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult
 
-from ._paper import STRAIN, Float, columns, fig9, said, under
+from ._paper import STRAIN, columns, fig9, said, under
 from ._rows import Result, Row
 
 RATES = (0.02, 0.05, 0.1)
@@ -131,19 +133,17 @@ def _rows(case: tuple[str, str, bool, float], reads: dict[float, Read]) -> list[
     ]  # fmt: skip
 
 
-def _checks(name: str, body: Problem, found: Found) -> list[Row]:
+def _checks(name: str, body: Problem, found: Found) -> Iterator[Row]:
     """The force where all moduli relax, from that of an elastic press while contact grows."""
     steps = 80
     elastic = np.array([0.0, *(_force(frame) for frame in under(body, MU, steps))])
     age = 1.0 - (np.arange(steps) + 0.5) / steps  # of the forces of an increment, over the duration
-    rows = []
     for (own, control, bulk, rate), reads in found.items():
         if own == name and control == DEPTH and bulk:
             left = [1.0 - sum(rate * (1.0 - np.exp(-age * time / tau)) for tau in DECADES) for time in DURATIONS]
             wanted, got = (float(f[-1] / f[0]) for f in (left @ np.diff(elastic), [r.force for r in reads.values()]))
-            rows.append(Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
-                            "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", ))  # fmt: skip
-    return rows
+            yield Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
+                      "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", )  # fmt: skip
 
 
 def _draw(figure: Any, found: Found) -> None:

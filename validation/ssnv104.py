@@ -15,15 +15,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 R, E, NU = 50.0, 20_000.0, 0.3
 MODULUS = E / (1.0 - NU**2)
 DEPTHS = np.linspace(1.0, 2.0, 12)  # mm, half the approach

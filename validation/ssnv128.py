@@ -10,6 +10,7 @@ the increments are passed to `solve_increment` directly; `free` is the displacem
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -99,36 +100,30 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: _draw(figure, table, last, state))
 
 
-def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[ContactState]) -> list[Row]:
+def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[ContactState]) -> Iterator[Row]:
     fine = meshes[-1]
     got = np.array(next(r for r in table if r[:4] == (fine, 5, 1.0, "projection"))[4:9], dtype=float)
-    rows = []
     for k, x in enumerate(PLACES):
-        rows.append(Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain"))
+        yield Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain")
     for k, x in enumerate(PLACES):
         what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "last digit of the reference, and different elements"
-        rows.append(Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why))
+        yield Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why)
     smooth = next(r for r in table if r[:4] == (fine, 1, 0.0, "projection"))[4]
-    rows.append(Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits"))
+    yield Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits")
     force = max(float(np.abs(s.force).max()) for s in states)
     apart = max(float(np.abs(s.force - states[0].force).max()) for s in states) / force
     what = "forces after 1, 5 and 20 increments, largest difference over the largest"
-    rows.append(
-        Row(what, "one solution; REFERENCES.md, 6.1", 0.0, apart, 1e-8, "convergence criterion", measure="absolute")
-    )
+    yield Row(what, "one solution; REFERENCES.md, 6.1", 0.0, apart, 1e-8, "convergence criterion", measure="absolute")
     worst = max(r[10] for r in table if r[3] == "projection")
-    rows.append(Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most"))
+    yield Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most")
     values = [next(r for r in table if r[:4] == (n, 5, 1.0, "projection"))[4] for n in meshes]
     steps = np.abs(np.diff(values))
     rate = float(np.log2(steps[0] / steps[-1]) / (len(steps) - 1))
     what, why = "rate at which u_x at 0 mm settles with the mesh", "a bound"
-    rows.append(
-        Row(what, "first order: stress is not smooth where stick ends", 1.0, rate, 0.0, why, measure="at least")
-    )
+    yield Row(what, "first order: stress is not smooth where stick ends", 1.0, rate, 0.0, why, measure="at least")
     literal = next(r for r in table if r[:4] == (fine, 5, 1.0, "paper"))
     what = f"increments of 5 that the paper's rule settles, {fine} cells a side"
-    rows.append(Row(what, "the rule repeats states here", 0.0, literal[11], 0.0, "a count", "sensitivity", "absolute"))
-    return rows
+    yield Row(what, "the rule repeats states here", 0.0, literal[11], 0.0, "a count", "sensitivity", "absolute")
 
 
 def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: ContactState) -> None:

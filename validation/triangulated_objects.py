@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -32,7 +33,6 @@ from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, Ri
 from ._common import convergence, rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 RADIUS = 6.0
 CLOSED = "closed form"
 

@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from finger3d._types import Float
 from finger3d.analyses.press import press
 
-from ._paper import Float, columns
+from ._paper import columns
 from ._rows import Result, Row
 
 SOURCE = "Kerdok et al. 2003; REFERENCES.md, 9.2"

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
@@ -31,7 +31,6 @@ from ._common import Body, body
 from ._rows import Result, Row
 from .triangulated_objects import ball
 
-Float = NDArray[np.float64]
 DEPTH, SLIDE, PLACE, MU = 0.3, 0.15, np.array([0.6, 0.0, 0.2]), 0.3
 FINGER = 4.0
 

@@ -14,8 +14,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
@@ -26,7 +26,6 @@ from finger3d.objects import MeshObject
 
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 DOME, WIDTH, E, NU, DEPTH = 10.0, 2.0, 1.0, 0.3, 0.1
 EQUAL, UNEQUAL = (45.0, 45.0), (35.0, 60.0)
 CORNER_DEPTH = 2.0

@@ -10,13 +10,14 @@ to find the two states of the problem of one point, and says how often.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
@@ -28,7 +29,7 @@ from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import stations
 
 from ._increments import PlainCoulomb
-from ._paper import STRAIN, STRESS, Float, columns, fig9, said
+from ._paper import STRAIN, STRESS, columns, fig9, said
 from ._rows import Result, Row
 
 WIDE = "20 mm wide"
@@ -115,27 +116,24 @@ def _start(force: Float, mu: float, random: np.random.Generator) -> Float:
     return np.column_stack([normal, (share * min(mu, 10.0) * normal)[:, None] * tangents])
 
 
-def _rows(found: Sequence[Searched]) -> list[Row]:
+def _rows(found: Sequence[Searched]) -> Iterator[Row]:
     """The paper's statement for its own range of mu, and what the search found beyond."""
-    rows = []
     for model in dict.fromkeys(s.model for s in found):
         own = [s for s in found if s.model == model]
         for text, some in (("up to 1", [s for s in own if s.mu <= 1.0]), ("above 1", [s for s in own if s.mu > 1.0])):
             tried = sum(s.solved + s.others + s.unsettled for s in some)
             what = f"other solutions of an increment, {tried} random starts, mu {text}, {model}"
             others = sum(s.others for s in some)
-            rows.append(said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most"))
+            yield said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most")
             what = f"random starts that end in no solution, of {tried}, mu {text}, {model}"
             unsettled = sum(s.unsettled for s in some)
-            rows.append(Row(what, "no reference", 0.0, unsettled, 0.0, "the fallbacks start from any forces",
-                            "statement", "at most"))  # fmt: skip
-    return rows
+            yield Row(what, "no reference", 0.0, unsettled, 0.0, "the fallbacks start from any forces",
+                      "statement", "at most")  # fmt: skip
 
 
-def _one_point(random: np.random.Generator, loads: int) -> list[Row]:
+def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
     """Loads that nearly close a gap of one point, K = [[1, .8], [.8, 2]] (t, n): several solutions above mu = 1.25."""
     compliance = np.linalg.inv(np.array([[2.0, 0.8], [0.8, 1.0]])).reshape(1, 2, 1, 2)
-    rows = []
     for mu, most in ((1.2, 0), (2.0, loads)):
         several = 0
         for gap, slip in random.uniform((0.005, 0.3), (0.03, 0.5), size=(loads, 2)):
@@ -148,12 +146,11 @@ def _one_point(random: np.random.Generator, loads: int) -> list[Row]:
             several += bool(len(forces) and np.ptp(forces, axis=0).max() > DIFFERENT)
         what = f"loads with several solutions found, one point, mu = {mu:g}, of {loads}"
         if most:
-            rows.append(Row(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, 0.0, "the search finds them",
-                            measure="at least"))  # fmt: skip
+            yield Row(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, 0.0, "the search finds them",
+                      measure="at least")  # fmt: skip
         else:
-            rows.append(Row(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, 0.0, "the solution is unique",
-                            measure="at most"))  # fmt: skip
-    return rows
+            yield Row(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, 0.0, "the solution is unique",
+                      measure="at most")  # fmt: skip
 
 
 def _draw(figure: Any, found: Sequence[Searched]) -> None:

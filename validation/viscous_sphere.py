@@ -24,6 +24,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import residue
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
@@ -43,8 +44,6 @@ from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vert
 from . import _rings
 from ._common import box, graded, held_at
 from ._rows import Result, Row
-
-Float = NDArray[np.float64]
 
 RADIUS = 100.0
 HEIGHT_MM = 50.0

@@ -16,9 +16,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -29,7 +29,6 @@ from finger3d.objects import Wave, Wedge
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
 from ._rows import Result, Row
 
-Float = NDArray[np.float64]
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
 MODULUS = 1.0 / (1.0 - NU**2)
 PEAK = np.pi * MODULUS * AMPLITUDE  # p* for a wavelength of 1 mm

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
@@ -23,7 +24,7 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
 from . import fig03_forces, fig04_zones, fig05_strains_depth, fig06_forces_mu, fig07_strains_mu, fig12_gauge_angles
-from ._paper import BELOW_FIG9, MUS, Float, Profile, columns, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, Profile, columns, fig9, line, said, strains, under
 from ._rows import Result, Row
 
 NU, COUNT = 0.49, 25
