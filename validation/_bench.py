@@ -45,7 +45,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import MeshObject, Plane, RigidObject, Sphere
 from finger3d.progress import Progress
 
-from ._rows import Row
+from ._rows import Row, at_most
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -439,7 +439,7 @@ def _row(what: str, most: float, got: float, reason: str = "a bound") -> Row:
     load = os.getloadavg()[0]
     busy = "" if load <= 1.3 * cores() else ", BUSY"
     reason = f"{reason}; load {load:.1f} on {cores()} cores{busy}"
-    return Row(what, "goal of this project", most, got, 0.0, reason, "statement", "at most")
+    return at_most(what, "goal of this project", most, got, reason, "statement")
 
 
 def main(arguments: Sequence[str]) -> None:

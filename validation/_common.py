@@ -249,10 +249,7 @@ def convergence(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel(xlabel)
-    axes.set_ylabel(ylabel)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
 
 
 def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Float:

@@ -50,9 +50,7 @@ def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_
     """Plane strain, `points` to the half-width; symmetric where the legs are."""
     block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=1.0)
     mesh = MeshOptions(1.0 / points, height / 8.0, "swept")
-    model = Model(
-        block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain",
-    )  # fmt: skip
+    model = Model(block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain")
     return build(model, margin=_CANDIDATES)
 
 

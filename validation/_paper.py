@@ -52,9 +52,7 @@ def fig9(
     A section is 1 mm wide, a solid 20 mm as the finger that was built.
     """
     width = 20.0 if plane == "solid" else 1.0
-    design = designs()["clipped_cylinder"](
-        radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=width
-    )  # fmt: skip
+    design = designs()["clipped_cylinder"](radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=width)
     return _built(design, nu, plane, MeshOptions(size, 4.0 * size, "swept"), Leg(10.0, steps=steps), gauges, mu)
 
 
@@ -62,9 +60,7 @@ def _built(
     design: Any, nu: float, plane: str, mesh: MeshOptions, leg: Leg, gauges: Sequence[Gauge], mu: float
 ) -> Problem:
     domain: Any = plane.replace(" ", "-")
-    model = Model(
-        design, Isotropic(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain
-    )  # fmt: skip
+    model = Model(design, Isotropic(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain)
     return build(model)
 
 
@@ -191,9 +187,3 @@ def said(
 ) -> Row:
     """A statement of the paper, measured; `where` is its section or figure."""
     return Row(what, f"{PAPER}, {where}", wanted, float(got), tolerance, reason, "statement", measure)
-
-
-def columns(names: str, rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
-    """A table of a study from its lines; five digits keep the files small."""
-    short = [[float(f"{v:.5g}") if isinstance(v, float) else v for v in row] for row in rows]
-    return dict(zip(names.split(), map(list, zip(*short, strict=True)), strict=True))

@@ -30,7 +30,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult
 
 from ._common import rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns, zero
 
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
 _ROUND = "round-off; 2e-13 or less measured"
@@ -117,11 +117,10 @@ def run(quick: bool) -> Result:
             ("loss", "energy that friction gives back at a point in an increment, over the most it takes"),
             ("net", "net friction of the press before the slide, over its force"),
         ):
-            rows.append(Row(f"{what}, {name}, largest", _ALWAYS, 0.0, worst[key], 1e-10, _ROUND, measure="absolute"))
+            rows.append(zero(f"{what}, {name}, largest", _ALWAYS, worst[key], 1e-10, _ROUND))
         rows += _energy(problem, f"{name}, nu = {nu:g}", quick, curves, table)
-    names = ("case", "mu", "increments_per_leg", "work_less_stored_and_lost")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "case mu increments_per_leg work_less_stored_and_lost"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
 def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> Iterator[Row]:
@@ -135,7 +134,7 @@ def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[t
         if mu == 0.0:
             worst = float(np.abs(found).max())
             what = f"work less stored and lost, over the work, {kind}, {counts[0]} to {counts[-1]} increments, largest"
-            yield Row(what, _ALWAYS, 0.0, worst, 1e-10, "round-off", measure="absolute")
+            yield zero(what, _ALWAYS, worst, 1e-10, "round-off")
             continue
         what = f"work over stored and lost, {kind}, {counts[-1]} increments a leg"
         yield Row(
@@ -155,10 +154,7 @@ def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None
         if mu != "mu = 0":
             steps, errors = list(both.values())[-1]  # of the solid
             axes.loglog(steps, 2.0 * errors[-1] * (steps / steps[-1]) ** 2, "k--", label="second order")
-        axes.set_xlabel("1 / increments of a leg")
-        axes.set_ylabel("work not stored or dissipated, over the work")
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.3)
+        axes.set(xlabel="1 / increments of a leg", ylabel="work not stored or dissipated, over the work")
         ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
         axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
         axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}")

@@ -34,8 +34,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, columns
 
 SEED = 23
 """The factors of the estimates were chosen with the seed 2026."""
@@ -161,10 +160,8 @@ def run(quick: bool) -> Result:
 
 def _estimated(found: list[Judged], pressed: int) -> Row:
     share = len({j.scene for j in found if j.by == LARGE}) / pressed
-    return Row(
-        f"share of {pressed} scenes whose change by large deformation was estimated", CLAIM, SHARE, share, 0.0,
-        "the others have small strains, or a coarse press of them fails", measure="at least",
-    )  # fmt: skip
+    return at_least(f"share of {pressed} scenes whose change by large deformation was estimated", CLAIM, SHARE, share,
+               "the others have small strains, or a coarse press of them fails")  # fmt: skip
 
 
 def _rows(found: list[Judged], what: str) -> Iterator[Row]:
@@ -173,25 +170,17 @@ def _rows(found: list[Judged], what: str) -> Iterator[Row]:
     if said:
         text = f"{what}, {len(said)} reported of {len(found)}"
         within, covered = (float(np.mean([getattr(j, key) for j in said])) for key in ("within", "covered"))
-        yield Row(
-                  f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within, 0.0,
-                  "a bound", measure="at least",
-              )  # fmt: skip
-        yield Row(
-                  f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered, 0.0, "a bound",
-                  measure="at least",
-              )  # fmt: skip
+        yield at_least(f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within)
+        yield at_least(f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered)
     if silent:
         covered = float(np.mean([j.covered for j in silent]))
-        yield Row(
+        yield at_least(
             f"share of changes not reported whose interval holds: {what}, {len(silent)} of {len(found)}",
             "nothing is claimed of them",
             COVERED,
             covered,
-            0.0,
             "that of reported changes",
             "statement",
-            "at least",
         )
 
 
@@ -224,8 +213,7 @@ def _draw(figure: Any, found: list[Judged]) -> None:
             unit = "% of the largest strain" if kind == "gauge" else "% of the number"
             axes.set(title=f"{KINDS[kind]}, {by}", xlim=(-reach, reach), ylim=(-reach, reach))
             axes.set(xlabel=f"estimated change, {unit}", ylabel=f"true change, {unit}")
-            axes.grid(alpha=0.3)
-    panels[0, 0].legend(fontsize=8, loc="upper left")
+    panels[0, 0].legend(loc="upper left")
 
 
 def _scale(judged: Judged, found: list[Judged]) -> float:

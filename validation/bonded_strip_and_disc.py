@@ -20,7 +20,7 @@ from finger3d.fem.mesh.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, nodes_of, solve
 from ._corner import clamped_free, extrapolated, observed
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 _WILLIAMS = "2e of the rim, Williams 1952; REFERENCES.md, 5.3"
 _BOND = "Gent and Lindley 1959; REFERENCES.md, 5.5"
@@ -79,9 +79,8 @@ def run(quick: bool) -> Result:
         why = "on the coarsest mesh the smooth part of the error, of fourth order, still contributes"
         what, got = f"rate of E_a, {body}, nu = {nu:g}", observed(sizes, found)
         rows.append(Row(what, _WILLIAMS, theory, got, 0.05 if body == "strip" else 0.15, why, measure="absolute"))
-    names = ("body", "nu", "cells", "apparent_modulus_over_E")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors))
+    names = "body nu cells apparent_modulus_over_E"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, errors))
 
 
 def draw(figure: Any, counts: dict[str, tuple[int, ...]], errors: dict[str, dict[str, list[float]]]) -> None:

@@ -172,4 +172,3 @@ def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     axes.set_yticks(range(len(off)), table["case"], fontsize=8)
     axes.invert_yaxis()
     axes.set(xlabel="force, finger3d over CalculiX - 1, %", xlim=(-1.5, 1.5))
-    axes.legend(fontsize=8, loc="lower right")

@@ -96,5 +96,3 @@ def _draw(figure: Any, curves: dict[float, np.ndarray], table: dict[str, list[An
     right.set(xlabel="depth, mm", ylabel="finger3d over CalculiX - 1, %", ylim=(-2.5, 2.5))
     right.axhspan(-2.0, 2.0, color="0.92", label="tolerance: 2 %")
     right.axhline(0.0, color="k", lw=0.6)
-    for axes in (left, right):
-        axes.legend(fontsize=8)

@@ -29,8 +29,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
 from finger3d.sensor import Calibration, estimate
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 Steps = int | Literal["auto"]
 
@@ -147,24 +146,18 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
             if len(z_mu) > 10:
                 yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
-            yield Row(
-                f"share of 90 % sets that contain the true mu: {what}", "mu drawn evenly", 0.9, share, 0.0,
-                "systematic errors are stated by their size, so more may be covered", "statement", "at least",
-            )  # fmt: skip
+            yield at_least(f"share of 90 % sets that contain the true mu: {what}", "mu drawn evenly", 0.9, share,
+                      "systematic errors are stated by their size, so more may be covered", "statement")  # fmt: skip
             worst = float(np.abs([r.z_without for r in some]).max())
-            yield Row(
-                f"largest z of the strain without the tolerance of the increments: {what}", "no reference", 3.0, worst,
-                0.0, "a reading off by more than three standard deviations", "statement", "at least",
-            )  # fmt: skip
+            yield at_least(f"largest z of the strain without the tolerance of the increments: {what}", "no reference",
+                      3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
 
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
     """Yield two rows: the stated errors are not too small, and they are not much too large."""
     why = "all readings of a body share one error of that body"
-    yield Row(what, "1 if the errors are right", 1.3, _rms(z), 0.0, why, "sensitivity", "at most")
-    yield Row(
-        f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), 0.0, why, "statement", "at least"
-    )
+    yield at_most(what, "1 if the errors are right", 1.3, _rms(z), why, "sensitivity")
+    yield at_least(f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), why, "statement")
 
 
 def _rms(z: Float) -> float:
@@ -178,11 +171,10 @@ def _compared(nu: float, size: float) -> Row:
     stated = np.array([increment_error(strains[b], strains[b // 2], 0.5) for b in LEVELS[1:]])
     off = np.array([np.abs(strains[b] - strains[640]) for b in LEVELS[1:]])
     big = off > 0.1 * NOISE
-    return Row(
-        "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
-        "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), 0.0, "nine in ten", "statement",
-        "at least",
-    )  # fmt: skip
+    return at_least(
+               "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
+               "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), "nine in ten",
+               "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Reading]) -> None:
@@ -210,4 +202,4 @@ def _draw(figure: Any, found: list[Reading]) -> None:
     right.axhspan(-1.0, 1.0, color="#dddddd", lw=0, zorder=0, label="one standard deviation")
     right.set(xlabel="true mu", ylabel="z of the strain", title="The same errors over mu")
     for axes in (left, right):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8, frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False)

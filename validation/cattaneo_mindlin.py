@@ -23,16 +23,14 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
 from . import _halfplane, _halfspace
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, exact_columns, zero
 
 NU, MU = 0.5, 0.25
 DEPTH = float(_halfplane.depth(1.0, _halfplane.DEPTH_OF_BLOCK))
 SHARES = (0.5, 1.0, 1.4)  # of mu times the depth: slides of the cylinder
 JOHNSON_2D = "Cattaneo 1938; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.1"
 JOHNSON_3D = "Mindlin and Deresiewicz 1953; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.2"
-COLUMNS = (
-    "dim points_per_a increments s a_mm c_over_a c_over_a_exact W_over_exact loop_over_exact shift_over_exact".split()
-)
+COLUMNS = "dim points_per_a increments s a_mm c_over_a c_over_a_exact W_over_exact loop_over_exact shift_over_exact"
 
 
 def line_loss(s: float, force: float) -> float:
@@ -129,7 +127,7 @@ def run(quick: bool) -> Result:
     table = [row for points, count in runs for row in cylinder(points, count)]
     table += [row for points in solid for row in ball(points, height, 10)]
     rows = (*_line_rows(table, fine), *_ball_rows(table, solid[-1]))
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    columns = exact_columns(COLUMNS, table)
     return Result(rows, columns, lambda figure: _draw(figure, {k: np.array(v) for k, v in columns.items()}, fine))
 
 
@@ -151,11 +149,11 @@ def _line_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
             change = max(abs(one[k] - other[k]) for one, other in zip(few, many, strict=True))
             what = f"{name}, cylinder: largest change from 5 to {most} increments"
             why = "a hundredth of what the mesh leaves"
-            yield Row(what, "a limit that few increments reach", 0.0, change, 3e-5, why, measure="absolute")
+            yield zero(what, "a limit that few increments reach", change, 3e-5, why)
         first, last = (max(abs(r[7] - 1.0) for r in table if r[:3] == (2, n, 10)) for n in (10, fine))
         falls = float(np.log(first / last) / np.log(fine / 10))
         what = "rate at which the error of the work lost falls with the mesh, cylinder"
-        yield Row(what, "first order in the spacing, like c", 1.0, falls, 0.0, "a bound", measure="at least")
+        yield at_least(what, "first order in the spacing, like c", 1.0, falls)
         gaps = [max(abs(r[8] - r[7]) for r in table if r[:3] == (2, fine, n)) for n in (5, 20)]
         falls = float(np.log(gaps[0] / gaps[1]) / np.log(4.0))
         what = "rate at which the area of the loop nears the work lost with the increments, cylinder"
@@ -204,5 +202,3 @@ def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:
     left.set(xlabel="s = Q/(mu P)", ylabel="c/a", title="stick zone")
     middle.set(xlabel="points per a", ylabel="error of the work lost in a cycle, %", title="mesh")
     right.set(xlabel="increments to the peak", ylabel="|loop area - work lost|, % of exact", title="increments")
-    for axes in (left, middle, right):
-        axes.legend(fontsize=7)

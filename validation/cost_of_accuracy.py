@@ -32,7 +32,7 @@ from ._cost_extrapolated import EMPTY, at, constant, extrapolate, memory_mb, rat
 from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, zero
 
 BY_NAME = True
 WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
@@ -173,9 +173,7 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
     rows += [*_float_rows(floats), *_extrapolation_rows(made, runs, errors, truths, rates)]
     holes = sum(a.case is None for _, a in advices)
     if not quick:
-        rows.append(
-            Row("cells of the table without a mesh", "each has one", 0.0, holes, 0.0, "none", measure="absolute")
-        )
+        rows.append(zero("cells of the table without a mesh", "each has one", holes, 0.0, "none"))
     lines += [_advice_line(body, a) for body, a in advices]
     lines += [{"kind": "rate of the error", "quantity": q, "rate": round(power, 3)} for q, power in rates.items()]
     lines += [_plain_line(c, p, runs[c]) for c, p in plain.items()] + [_float_line(c, f) for c, f in floats.items()]
@@ -216,8 +214,8 @@ def _extrapolation_rows(
     ]  # fmt: skip
     if ratios:
         what = f"error extrapolated to the finest mesh over that found there, median of {len(ratios)}"
-        yield Row(what, "no error is larger than its law", 3.0, float(np.median(ratios)), 0.0,
-                  "errors of coarser meshes scatter, and the largest counts", "sensitivity", "at most")  # fmt: skip
+        yield at_most(what, "no error is larger than its law", 3.0, float(np.median(ratios)),
+                  "errors of coarser meshes scatter, and the largest counts", "sensitivity")  # fmt: skip
     for body, series in made.items():
         *coarser, finest = (runs[c] for c in series[BEST[body]])
         dofs, peaks = ([run[key] for run in coarser] for key in ("dofs", "peak_MB"))
@@ -233,8 +231,8 @@ def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row
     far = {"force": 0.002, "friction_sum": 0.02, "gauge_strain": 0.05, "contact_length": 0.05, "stick_length": 0.15}
     why = "levels differ by more than this; a wrong extrapolation would show"
     return [
-        Row(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run", 0.0,
-            truths[q].check, far[q] * (4.0 if quick else 1.0), why, "verification", "absolute")
+        zero(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run",
+            truths[q].check, far[q] * (4.0 if quick else 1.0), why)
         for q in QUANTITIES
         if q not in LENGTHS or not quick
     ]  # fmt: skip
@@ -266,8 +264,8 @@ def _solver_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
             own = runs[replace(case, solver="pardiso", way=way)]
             worst = max(worst, *(abs(value(runs[case], k) / value(own, k) - 1.0) for k in keys))
         why = "round-off of two factorisations" if limit == 1e-9 else "a step may stop at a residual of 1e-8"
-        yield Row(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", 0.0, worst,
-                  limit, why, measure="absolute")  # fmt: skip
+        yield zero(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", worst,
+                  limit, why)  # fmt: skip
 
 
 def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -279,9 +277,7 @@ def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
         f"time of {runs[case]['factorizations']} factorisations over that of one condensation, {own['dofs']} unknowns"
     )
     why = "for so small a body the contact solves cost as much as some factorisations"
-    return [
-        Row(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, 0.0, why, "sensitivity", "at least")
-    ]
+    return [at_least(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, why, "sensitivity")]
 
 
 def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -291,7 +287,7 @@ def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
     times = seconds(runs[case]) / seconds(runs[small])
     what = f"time of a press at large deformation over one in small strain, {runs[case]['dofs']} unknowns, {body}"
     why = "ten increments, each a solution of its own, with fewer factorisations than increments"
-    return [Row(what, "a goal of this project", 20.0, times, 0.0, why, "sensitivity", "at most")]
+    return [at_most(what, "a goal of this project", 20.0, times, why, "sensitivity")]
 
 
 def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, float]]) -> list[Row]:
@@ -301,11 +297,11 @@ def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, 
     got = errors[case]["force"]
     here = f"error of the force, linear elements of {case.size:g} mm, {body}"
     if body == HALF:
-        return [Row(f"{here}: no locking at nu = .3", "truth above", 0.01, got, 0.0, "plane stress", measure="at most")]
+        return [at_most(f"{here}: no locking at nu = .3", "truth above", 0.01, got, "plane stress")]
     factor = got / best[case.size]
     return [
-        Row(f"{here}, over that of {BEST[body]} ones: they lock", "Hughes 2000, ch. 4; cook.py", 10.0, factor, 0.0,
-            "volumetric locking at nu = .49", measure="at least")
+        at_least(f"{here}, over that of {BEST[body]} ones: they lock", "Hughes 2000, ch. 4; cook.py", 10.0, factor,
+            "volumetric locking at nu = .49")
     ]  # fmt: skip
 
 
@@ -328,11 +324,10 @@ def _float_rows(floats: Runs) -> Iterator[Row]:
     """A compliance kept in single precision: what it changes, and how near to the limit of a step it stops."""
     for case, found in floats.items():
         here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
-        yield Row(f"largest change of force, friction sum and strain, {here}", "double precision", 0.0, found["change"],
-                  1e-5, "its last digit is 6e-8", "sensitivity", "absolute")  # fmt: skip
-        yield Row(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
-                  found["residual"], 0.0, "less than a digit below that, which is too close", "sensitivity",
-                  "at least")  # fmt: skip
+        yield zero(f"largest change of force, friction sum and strain, {here}", "double precision", found["change"],
+                  1e-5, "its last digit is 6e-8", "sensitivity")  # fmt: skip
+        yield at_least(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
+                  found["residual"], "less than a digit below that, which is too close", "sensitivity")  # fmt: skip
 
 
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:

@@ -19,8 +19,8 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.geometry.registry import designs
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, columns, fig9, line, said, strains, under
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, fig9, line, said, strains, under
+from ._rows import Result, Row, at_most, columns
 from .geometry_search import CHOSEN, EDGES, RADII
 
 NU = 0.49
@@ -128,8 +128,8 @@ def _statements(plane: str, over: str, found: dict[Any, Judged], x: Float) -> It
     yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
     error, step = own.error[over].ravel()[own.value[over].argmax()], np.diff(MUS).min()
     text = f"error of the strain by the increments at the best gauge, {where}, over the least change from mu to mu"
-    yield Row(text, "half as many increments", 0.3, float(error / (abs(value) * step)), 0.0,
-              "the least change may be small", "statement", "at most")  # fmt: skip
+    yield at_most(text, "half as many increments", 0.3, float(error / (abs(value) * step)),
+              "the least change may be small", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, radii: Any, edges: Any, found: dict[Any, Judged], x: Float) -> None:
@@ -164,5 +164,5 @@ def _gauge_map(figure: Any, axes: Any, finger: Judged, x: Float, name: str, over
     axes.plot(at, angle, "k*", ms=13, label=f"best, x = {at:.0f} mm, {angle:.0f}°")
     axes.plot(*GAUGE, "s", ms=10, mfc="none", mec="#e74c3c", mew=2.5, label="the paper's, 36 mm, 30°")
     axes.set(xlabel="x of the gauge (mm)", ylabel="angle (degrees)", title=f"{name}, {over}: R = 100, H = 36.6")
-    axes.legend(loc="lower left", fontsize=8)
+    axes.legend(loc="lower left")
     figure.colorbar(picture, ax=axes, label="least d strain / d mu; < 0: turns back")

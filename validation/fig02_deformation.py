@@ -13,8 +13,8 @@ import numpy as np
 
 from finger3d.fem.mesh.simplex import unfold
 
-from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, moved, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, Profile, half_cylinder, moved, said, under
+from ._rows import Result, Row, columns, zero
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 DRAWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
@@ -43,7 +43,7 @@ def run(quick: bool) -> Result:
     problem, frame, profile = found[STRESS, 0.3]
     gap = np.abs(frame.state.gap[frame.state.status != 0]).max()
     what = "distance of the contact from the plate, mm"
-    rows.append(Row(what, "Eq. 2", 0.0, gap, 1e-8, "solver tolerance", measure="absolute"))
+    rows.append(zero(what, "Eq. 2", gap, 1e-8, "solver tolerance"))
     for plane in (STRESS, STRAIN):
         for what, key in (("force", "force"), ("contact half-width at rest", "a"), ("stick half-width", "c")):
             low, high = (getattr(found[plane, nu][2], key) for nu in (0.3, 0.49))
@@ -74,5 +74,5 @@ def _draw(figure: Any, found: dict[Any, Any]) -> None:
         axes.axhline(4.0, color="#c0392b", lw=1.2)
         axes.set(xlim=(-5.8, 5.8), ylim=(-0.3, 5.3), aspect="equal", xlabel="x (mm)")
         told = f"{profile.force:.2f} N/mm, contact {2 * profile.deformed:.2f} mm wide"
-        axes.set_title(f"{plane}, nu = {nu:g}\n{told}", fontsize=10)
+        axes.set_title(f"{plane}, nu = {nu:g}\n{told}")
     panels[0].set_ylabel("y (mm)")

@@ -16,8 +16,8 @@ import numpy as np
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Model
 
-from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, Profile, half_cylinder, said, under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
@@ -116,9 +116,9 @@ def _draw(figure: Any, found: dict[Any, list[Profile]]) -> None:
             on = np.abs(profile.x) < profile.a + 0.3
             panels[0, column].plot(profile.x[on], profile.p[on], color=colour, label=f"{0.2 * (i + 1):.1f} mm")
             panels[1, column].plot(profile.x[on], profile.q[on], color=colour)
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
         panels[1, column].set_xlabel("x (mm)")
         panels[1, column].axhline(0.0, color="#999999", lw=0.7)
     panels[0, 0].set_ylabel("normal f_n (MPa)")
     panels[1, 0].set_ylabel("friction f_t along x (MPa)")
-    panels[0, 0].legend(title="depth", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="depth", frameon=False)

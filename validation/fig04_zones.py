@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ._paper import STRAIN, STRESS, Profile, columns, half_cylinder, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, Profile, half_cylinder, said, under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
@@ -69,7 +69,7 @@ def _draw(figure: Any, found: dict[Any, list[Profile]]) -> None:
         axes.plot(last.x[on], -0.25 * last.p[on], "--", color="#777777", lw=1)
         axes.plot(last.x[on], last.q[on], color="#c0392b", label="f_t")
         axes.set(xlabel="x (mm)", xlim=(-3.2, 3.2), ylim=(-0.13, 0.5), title=f"{plane}, nu = {nu:g}, 1 mm")
-    panels[0].legend(fontsize=8, loc="upper left", framealpha=1.0)
+    panels[0].legend(loc="upper left", framealpha=1.0)
     panels[0].set_ylabel("traction on the finger (MPa)")
     for i, (plane, nu) in enumerate(JUDGED):
         profiles = found[plane, nu]
@@ -77,4 +77,4 @@ def _draw(figure: Any, found: dict[Any, list[Profile]]) -> None:
         style = "o-" if plane == STRESS else "s--"
         panels[2].plot(depth, [p.a - p.c for p in profiles], style, ms=4, color=f"C{i}", label=f"{plane}, nu = {nu:g}")
     panels[2].set(xlabel="depth (mm)", ylabel="width of each slip zone (mm)")
-    panels[2].legend(frameon=False, fontsize=8)
+    panels[2].legend(frameon=False)

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, said, under
-from ._rows import Result, Row
+from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, said, under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
@@ -75,9 +75,9 @@ def _draw(figure: Any, found: dict[Any, Profile]) -> None:
             colour = colormaps["plasma"](0.85 * i / 4)
             panels[0, column].plot(profile.x[on], profile.p[on], color=colour, label=f"{mu:g}")
             panels[1, column].plot(profile.x[on], profile.q[on], color=colour)
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
         panels[1, column].set_xlabel("x (mm)")
         panels[1, column].axhline(0.0, color="#999999", lw=0.7)
     panels[0, 0].set_ylabel("normal f_n (MPa)")
     panels[1, 0].set_ylabel("friction f_t along x (MPa)")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="mu", frameon=False)

@@ -14,20 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ._paper import (
-    BELOW_R5,
-    MUS,
-    STRAIN,
-    STRESS,
-    Profile,
-    columns,
-    half_cylinder,
-    line_r5,
-    said,
-    strains,
-    under,
-)  # fmt: skip
-from ._rows import Result, Row
+from ._paper import BELOW_R5, MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains, under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
@@ -107,6 +95,6 @@ def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
                 panels[row, column].plot(x, found[plane, nu, mu][row], color=colour, label=f"{mu:g}")
             panels[row, column].axhline(0.0, color="#999999", lw=0.7)
             panels[row, 0].set_ylabel(NAMES[row])
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
         panels[2, column].set_xlabel("x (mm)")
-    panels[1, 0].legend(title="mu", frameon=False, fontsize=8)
+    panels[1, 0].legend(title="mu", frameon=False)

@@ -17,8 +17,8 @@ import numpy as np
 
 from finger3d.contact.friction import Branch, TwoCoefficients
 
-from ._paper import MUS, STRAIN, STRESS, columns, half_cylinder, line_r5, said, strains, under
-from ._rows import Result, Row
+from ._paper import MUS, STRAIN, STRESS, half_cylinder, line_r5, said, strains, under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 JUDGED = ((STRESS, 0.3), (STRAIN, 0.49))
@@ -83,7 +83,7 @@ def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
             for i, ratio in enumerate(RATIOS):
                 axes.plot(x, found[plane, nu, 0.25, branch, ratio], color=f"C{i}", label=f"{ratio:g}", lw=1.2)
             axes.axhline(0.0, color="#999999", lw=0.7)
-            axes.set_title(f"{plane}, nu = {nu:g}, branch {branch}", fontsize=10)
+            axes.set_title(f"{plane}, nu = {nu:g}, branch {branch}")
             panels[row, 0].set_ylabel("gamma_xy")
         panels[1, column].set_xlabel("x (mm)")
-    panels[0, 0].legend(title="mu_k / mu_s", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="mu_k / mu_s", frameon=False)

@@ -14,8 +14,8 @@ import numpy as np
 
 from finger3d.fem.mesh.simplex import unfold
 
-from ._paper import STRAIN, STRESS, Profile, columns, fig9, moved, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, Profile, fig9, moved, said, under
+from ._rows import Result, Row, at_most, columns
 
 NUS = (0.0, 0.3, 0.4, 0.43, 0.45, 0.49, 0.5)
 SHOWN_MU = (0.06, 0.25, 1.0)
@@ -58,10 +58,8 @@ def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:
     """By how much mu moves the width, beside what nu does."""
     by_mu = np.ptp([widths[STRAIN, 0.49, mu][1] for mu in SHOWN_MU])
     by_nu = np.ptp([widths[STRAIN, nu, 0.25][1] for nu in NUS])
-    return Row(
-        "deformed width in plane strain: what mu = .06 to 1 moves over what nu = 0 to .5 moves", "this code", 0.5,
-        float(by_mu / by_nu), 0.0, "79 mm tells nu rather than mu", "sensitivity", "at most",
-    )  # fmt: skip
+    return at_most("deformed width in plane strain: what mu = .06 to 1 moves over what nu = 0 to .5 moves", "this code",
+               0.5, float(by_mu / by_nu), "79 mm tells nu rather than mu", "sensitivity")  # fmt: skip
 
 
 def _draw(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
@@ -81,7 +79,7 @@ def _draw(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, .
         axes.axhline(problem.model.design.height_mm - 10.0, color="#c0392b", lw=1.2)
         axes.set(xlim=(-62, 62), ylim=(-2, 54), aspect="equal", xlabel="x (mm)")
         told = f"{profile.force:.1f} N/mm, {2 * profile.deformed:.1f} mm"
-        axes.set_title(f"plane strain, nu = {nu:g}: {told}", fontsize=10)
+        axes.set_title(f"plane strain, nu = {nu:g}: {told}")
     axes = figure.add_subplot(grid[1, :])
     for plane, style in ((STRAIN, "o-"), (STRESS, "s--")):
         for k, what in ((0, "at rest"), (1, "as deformed")):

@@ -14,22 +14,8 @@ import numpy as np
 
 from finger3d.geometry.registry import designs
 
-from ._paper import (
-    BELOW_FIG9,
-    MUS,
-    STRAIN,
-    STRESS,
-    Profile,
-    columns,
-    fig9,
-    half_cylinder,
-    line,
-    line_r5,
-    said,
-    strains,
-    under,
-)  # fmt: skip
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, half_cylinder, line, line_r5, said, strains, under
+from ._rows import Result, Row, columns
 
 NUS = (0.3, 0.45, 0.49)
 
@@ -98,7 +84,7 @@ def _draw(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
                 axes.plot(x, found[plane, nu][i], color=colormaps["plasma"](0.85 * i / 4), label=f"{mu:g}")
             axes.axvline(36.0, color="#999999", ls=":", lw=1)
             axes.axhline(0.0, color="#999999", lw=0.7)
-            axes.set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+            axes.set_title(f"{plane}, nu = {nu:g}")
             panels[row, 0].set_ylabel("gamma_xy")
         panels[1, column].set_xlabel("x (mm); dotted: 36 mm")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="mu", frameon=False)

@@ -16,8 +16,8 @@ import numpy as np
 
 from finger3d.mechanics.model import Gauge
 
-from ._paper import BELOW_FIG9, STRAIN, STRESS, columns, fig9, said, under
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, STRAIN, STRESS, fig9, said, under
+from ._rows import Result, Row, columns
 
 ANGLES = (0, 15, 30, 45, 60, 75, 90)
 FINE = (0.06, 0.125, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -92,4 +92,4 @@ def _draw(figure: Any, mus: np.ndarray, found: dict[Any, np.ndarray]) -> None:
         axes.axhline(0.0, color="#999999", lw=0.7)
         axes.set(xlabel="mu", title=f"{plane}, nu = {nu:g}")
     panels[0].set_ylabel("normal strain along the gauge")
-    panels[0].legend(title="angle", frameon=False, fontsize=8, ncols=2, loc="lower left")
+    panels[0].legend(title="angle", frameon=False, ncols=2, loc="lower left")

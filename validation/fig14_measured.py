@@ -36,8 +36,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
-from ._paper import STRAIN, STRESS, columns, said
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, said
+from ._rows import Result, Row, columns
 
 NOISE, ERROR = 1.5e-4, 0.1
 MUS = np.array([0.06, 0.125, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
@@ -208,8 +208,8 @@ def _draw(figure: Any, curves: list[Curve]) -> None:
                 axes.plot(curve.mu, change, style, color=f"C{models.index(curve.model)}", lw=1.5, label=label)
         axes.axhline(0.0, color="#999999", lw=0.7)
         axes.set(xlabel="friction coefficient mu", ylabel="strain less that at mu = 0.06, 1e-3", ylim=(-9.0, 9.0))
-        axes.set_title(f"gauge at {leaning}°, y = 40 mm, z = 0, nu = 0.49", fontsize=10)
-    figure.legend(*panels[0].get_legend_handles_labels(), title="solid: free strain, dotted: foil of 4 mm", fontsize=8,
+        axes.set_title(f"gauge at {leaning}°, y = 40 mm, z = 0, nu = 0.49")
+    figure.legend(*panels[0].get_legend_handles_labels(), title="solid: free strain, dotted: foil of 4 mm",
                   loc="outside lower left", ncols=4, frameon=False)  # fmt: skip
     shares = [[np.mean([getattr(c, by) for c in curves if c.model == m and c.kind == FREE and c.leaning == lean])
                for lean in LEANING] for m in models for by in ("by_slope", "by_vertex")]  # fmt: skip
@@ -222,4 +222,4 @@ def _draw(figure: Any, curves: list[Curve]) -> None:
              for name in LEANING for lean in name.split()[:1]]  # fmt: skip
     axes.set_xticks(range(len(LEANING)), names, fontsize=7)
     axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=7)
-    axes.set_title("share of places and nu compatible", fontsize=10)
+    axes.set_title("share of places and nu compatible")

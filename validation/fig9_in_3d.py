@@ -17,20 +17,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.results.history import measure
 
-from ._paper import (
-    BELOW_FIG9,
-    MUS,
-    STRAIN,
-    STRESS,
-    Profile,
-    columns,
-    fig9,
-    line,
-    said,
-    strains,
-    under,
-)  # fmt: skip
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains, under
+from ._rows import Result, Row, columns
 from .fig12_gauge_angles import ANGLES, gauges, statements
 
 SOLID = "solid"
@@ -127,8 +115,7 @@ def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middl
             panels[1, column].plot(x, shear[plane, nu][i], color=colour, lw=1.1)
         for i, angle in enumerate((15, 30, 45, 60)):
             panels[2, column].plot(MUS, gauge[plane, nu][angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
-        panels[0, column].set_title("20 mm wide, z = 0" if plane == SOLID else plane, fontsize=11)
-        panels[0, column].set_xlabel("x (mm)")
+        panels[0, column].set(title="20 mm wide, z = 0" if plane == SOLID else plane, xlabel="x (mm)")
         panels[1, column].set_xlabel("x (mm)")
         panels[2, column].set_xlabel("mu")
         for row in range(3):
@@ -136,5 +123,5 @@ def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middl
     panels[0, 0].set_ylabel("friction along x (MPa)")
     panels[1, 0].set_ylabel("gamma_xy under the surface")
     panels[2, 0].set_ylabel("gauge strain at x = 36")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8, ncols=2)
-    panels[2, 0].legend(title="angle", frameon=False, fontsize=8, ncols=2)
+    panels[0, 0].legend(title="mu", frameon=False, ncols=2)
+    panels[2, 0].legend(title="angle", frameon=False, ncols=2)

@@ -18,7 +18,7 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns, zero
 
 HEIGHT = 200.0  # a = 1 mm, E = 1 MPa
 AWAY = 0.9
@@ -66,7 +66,7 @@ def run(quick: bool) -> Result:
         found = np.array([errors(h, nu) for h in sizes])
         _, worst, _, half = found[-1]
         what = f"pressure up to 0.9 a over P/(pi sqrt(a^2 - x^2)), nu = {nu:g}, worst point, less 1"
-        rows.append(Row(what, _SOURCE, 0.0, float(worst), 0.02, _TWO, measure="absolute"))
+        rows.append(zero(what, _SOURCE, float(worst), 0.02, _TWO))
         why = "the tolerance of the pressure, of which it is a mean"
         rows.append(
             Row(f"share of the force within a/2, nu = {nu:g}", "arcsin(1/2) 2/pi", 1 / 3, (1 + half) / 3, 0.02, why)
@@ -79,9 +79,8 @@ def run(quick: bool) -> Result:
         curves[f"pressure up to 0.9 a, worst, nu = {nu:g}"] = found[:, 1]
         curves[f"force within a/2, nu = {nu:g}"] = found[:, 3]
         table += [(nu, *e) for e in found]
-    names = ("nu", "corner_element_over_a", "worst_error", "rms_error", "error_of_inner_force")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, found[:, 0], curves))
+    names = "nu corner_element_over_a worst_error rms_error error_of_inner_force"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, found[:, 0], curves))
 
 
 def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
@@ -94,8 +93,4 @@ def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
     right.plot(fine, exact(fine, 2.0), "k--", linewidth=1.0, label="P / (pi sqrt(a^2 - x^2))")
     right.plot(x, p / mean, "o", markersize=4.5, label="nodes, h = 0.01 a")
     right.axvline(AWAY, color="0.6", linewidth=0.8)
-    right.set_ylim(0.0, 4.0)
-    right.set_xlabel("x / a")
-    right.set_ylabel("pressure / mean pressure")
-    right.legend(fontsize=8)
-    right.grid(alpha=0.3)
+    right.set(ylim=(0.0, 4.0), xlabel="x / a", ylabel="pressure / mean pressure")

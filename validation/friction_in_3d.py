@@ -32,8 +32,7 @@ from finger3d.mechanics.readings.reading import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 Domain = Literal["solid", "plane-strain"]
 
@@ -57,9 +56,7 @@ Spread = dict[tuple[Domain, str, str, str], Float]
 def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
     """Return the finger without readings."""
     design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    found = Model(
-        design, Isotropic(1.0, 0.49), MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),), domain=domain
-    )  # fmt: skip
+    found = Model(design, Isotropic(1.0, 0.49), MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),), domain=domain)
     return LargeDeformation().apply(found) if large else found
 
 
@@ -151,17 +148,17 @@ def _rows(spread: Spread) -> Iterator[Row]:
     for (domain, measure, name, read), sd in spread.items():
         at = float(np.interp(0.5, MUS, sd))
         what = f"standard deviation of mu = 0.5: {NAMES[domain]}, {measure}, {name}, {read}"
-        yield Row(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, 0.0, "the paper's claim", "statement", "at most")
+        yield at_most(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, "the paper's claim", "statement")
         share = float(np.mean(sd <= LIMIT))
         what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
-        yield Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least")
+        yield at_least(what, "no reference", 0.5, share, "half of the range", "statement")
     for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
         mean = [float(sd.mean()) for key, sd in spread.items()
                 if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
         what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
-        yield Row(what, "more readings tell more", 1.05, worst, 0.0, "placed with the error of the mesh, judged "
-                  "without", "sensitivity", "at most")  # fmt: skip
+        yield at_most(what, "more readings tell more", 1.05, worst,
+                  "placed with the error of the mesh, judged " "without", "sensitivity")  # fmt: skip
 
 
 def _draw(figure: Any, spread: Spread) -> None:
@@ -180,7 +177,6 @@ def _draw(figure: Any, spread: Spread) -> None:
         axes.axhline(LIMIT, color="#222222", lw=0.8)
         axes.text(0.06, LIMIT * 1.08, "the paper's 0.1", fontsize=8)
         axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(2e-3, 0.4))
-        axes.grid(alpha=0.3)
     panels[0].set_ylabel("standard deviation of mu")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)

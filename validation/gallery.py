@@ -30,7 +30,7 @@ from finger3d.mechanics.results.history import measure
 from finger3d.scene import load
 
 from . import _layer
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 SCENES = Path(__file__).resolve().parents[1] / "geometries"
 LAYER = "bonded layer; REFERENCES.md, 1.1 and 1.7"
@@ -97,9 +97,8 @@ def run(quick: bool) -> Result:
         curves[name] = depths, np.array([force(own[0], own[1][: k + 1]) for k in range(len(depths))])
     if not quick:
         rows += _theory_rows(**round_ones)
-    columns = "scene size_mm other_mesh force_N other_force_N other_force_sd_N".split()
-    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), kept, lambda figure: _draw(figure, curves))
+    columns = "scene size_mm other_mesh force_N other_force_N other_force_sd_N"
+    return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, curves))
 
 
 def round_by_parabola(q: float) -> float:
@@ -136,5 +135,3 @@ def _draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
         pressing = np.flatnonzero(np.diff(depth, prepend=0.0) > 0.0)  # a slide stands still at its depth
         axes.plot([0.0, *depth[pressing]], [0.0, *values[pressing]], "o-", ms=4, label=name.replace("_", " "))
     axes.set(xlabel="depth, mm", ylabel="normal force, N")
-    axes.grid(alpha=0.3)
-    axes.legend()

@@ -25,7 +25,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import contact_table, measure
 from finger3d.objects import MeshObject
 
-from ._rows import Result, Row
+from ._rows import Result, at_least, zero
 
 TEETH, DEPTH = 24, 1.0
 PITCH = 360.0 / TEETH
@@ -75,25 +75,25 @@ def run(quick: bool) -> Result:
     further, back = pressed(angles[1] + PITCH, size), pressed(-angles[1], size)
     some, scale = found[1], abs(found[1]["force_y_N"])
     rows = [
-        Row(f"change of {name} by a turn of one pitch, over the force", "periodicity", 0.0,
-            abs(further[name] - some[name]) / scale, 1e-3, "the STL's corners have 32 bits, and its arcs are chords",
-            measure="absolute")
+        zero(f"change of {name} by a turn of one pitch, over the force", "periodicity",
+            abs(further[name] - some[name]) / scale, 1e-3,
+            "the STL's corners have 32 bits, and its arcs are chords")
         for name in ("force_x_N", "force_y_N")
     ]  # fmt: skip
     rows += [
-        Row(f"{name} of opposite turns, their {what} over the force", "mirror image", 0.0,
-            abs(back[name] + sign * some[name]) / scale, 1e-3, "the STL is its own mirror image to 32 bits",
-            measure="absolute")
+        zero(f"{name} of opposite turns, their {what} over the force", "mirror image",
+            abs(back[name] + sign * some[name]) / scale, 1e-3,
+            "the STL is its own mirror image to 32 bits")
         for name, sign, what in (("force_x_N", 1.0, "sum"), ("force_y_N", -1.0, "difference"))
     ]  # fmt: skip
     rows += [
-        Row("sideways over vertical force of a symmetric position", "mirror image", 0.0,
-            abs(found[0]["force_x_N"]) / abs(found[0]["force_y_N"]), 1e-3, "as before", measure="absolute"),
-        Row(f"the same at {angles[1]:g} deg", "flanks push sideways", 5e-3, abs(some["force_x_N"]) / scale, 0.0,
-            "no mirror image", measure="at least"),
-        Row("torque reported less that of the points, over force times an edge length", "statics", 0.0,
+        zero("sideways over vertical force of a symmetric position", "mirror image",
+            abs(found[0]["force_x_N"]) / abs(found[0]["force_y_N"]), 1e-3, "as before"),
+        at_least(f"the same at {angles[1]:g} deg", "flanks push sideways", 5e-3, abs(some["force_x_N"]) / scale,
+            "no mirror image"),
+        zero("torque reported less that of the points, over force times an edge length", "statics",
             max(abs(f["torque_Nmm"] - f["of_points_Nmm"]) / abs(f["force_y_N"]) for f in found) / size, 1.0,
-            "forces act at the centroids of hats, the table gives their vertices", measure="absolute"),
+            "forces act at the centroids of hats, the table gives their vertices"),
     ]  # fmt: skip
     table: dict[str, Any] = {"angle_deg": list(angles)} | {key: [f[key] for f in found] for key in found[0]}
     return Result(tuple(rows), table, lambda figure: _draw(figure, table))
@@ -105,9 +105,7 @@ def _draw(figure: Any, table: dict[str, Any]) -> None:
     left.plot(table["angle_deg"], table["force_x_N"], "s-", label="sideways")
     left.axhline(0.0, color="0.6", lw=0.8)
     left.set(xlabel="turn of the wheel (deg)", ylabel="force on the finger (N)")
-    left.legend(fontsize=8)
     right.plot(table["angle_deg"], table["torque_Nmm"], "o-", label="reported")
     right.plot(table["angle_deg"], table["of_points_Nmm"], "x", label="from the points")
     right.axhline(0.0, color="0.6", lw=0.8)
     right.set(xlabel="turn of the wheel (deg)", ylabel="torque on the finger about the axis (N mm)")
-    right.legend(fontsize=8)

@@ -17,8 +17,8 @@ import numpy as np
 
 from finger3d.geometry.registry import designs
 
-from ._paper import BELOW_FIG9, MUS, Profile, columns, fig9, line, said, strains, under
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains, under
+from ._rows import Result, Row, columns
 
 RADII = (60.0, 80.0, 100.0, 150.0, 200.0, 300.0)
 EDGES = (15.0, 25.0, 36.6, 50.0, 60.0)

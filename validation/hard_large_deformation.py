@@ -43,7 +43,7 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
-from ._rows import Result, Row, Settled, settled
+from ._rows import Result, Row, Settled, at_least, at_most, settled
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -278,7 +278,7 @@ def run(quick: bool) -> Result:
 
 
 def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
-    return Row(what, reference, float(most), float(got), 0.0, reason, measure="at most")
+    return at_most(what, reference, float(most), float(got), reason)
 
 
 def _settling(found: Sequence[Found]) -> list[Row]:
@@ -289,12 +289,12 @@ def _settling(found: Sequence[Found]) -> list[Row]:
     return [
         _bound(f"{here}: share unsettled", 0.02, len(unsettled) / len(found), "sharp corners that fold without end"),
         _bound(f"{here}: unsettled without cause or cure", 0, sum(not _cured(f) for f in unsettled), "none"),
-        Row(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
-            float(sum(not f.folds for f in unsettled)), 0.0, "none", "statement", "at most"),
+        at_most(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
+            float(sum(not f.folds for f in unsettled)), "none", "statement"),
         _bound(f"{here}: scenes with a point inside the object that is not in contact", 0,
                sum(not f.outside for f in found), "none"),
-        Row(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
-            min(f.least_volume for f in found), 0.0, "no cell inverted", measure="at least"),
+        at_least(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
+            min(f.least_volume for f in found), "no cell inverted"),
         _bound(f"{here}: factorisations of an increment", 3.0, sum(f.factorizations for f in found) / increments, GOAL,
                GOAL),
     ]  # fmt: skip
@@ -311,9 +311,9 @@ def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> Iterator[R
         for kind, solid in (("sections", False), ("solids", True)):
             here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
             if here:
-                yield Row(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
-                          max(f.penetration for f in here), 0.0, "largest at sharp edges of finger and object",
-                          "statement", "at most")  # fmt: skip
+                yield at_most(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
+                          max(f.penetration for f in here), "largest at sharp edges of finger and object",
+                          "statement")  # fmt: skip
     what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
     for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
         smooth = [
@@ -363,5 +363,3 @@ def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     right.axvline(1.0, color="k", lw=0.8, ls=":")
     left.set(xlabel="edge length at the contact (mm)", ylabel="largest penetration, % of the depth")
     right.set(xlabel="largest penetration, % of the depth", ylabel="share of the scenes, %", xscale="log")
-    for axes in (left, right):
-        axes.legend(fontsize=7)

@@ -27,7 +27,7 @@ from finger3d.objects import Sphere
 
 from ._common import body, contact_axis, convergence, graded, quarter_block, rate
 from ._layer import point
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 RADIUS = 1000.0  # a = 1
 HEIGHT = 10.0
@@ -107,9 +107,8 @@ def run(quick: bool) -> Result:
     if not quick:
         what = "P/P_Hertz(a), nu = 0.3, ftetwild, 5 points to a, mean of 12 depths"
         rows.append(Row(what, _HERTZ, 1.0, own_path(0.3, 5), 0.01, _ONE))
-    names = ("nu", "points_per_a", "force_rms_error", "pressure_L2_error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "nu points_per_a force_rms_error pressure_L2_error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
 def draw(figure: Any, curves: dict[float, tuple[Float, Float]]) -> None:

@@ -24,7 +24,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, RigidObject, Sphere
 
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns, zero
 
 DOME, BAR, ANGLE = 20.0, 5.0, math.radians(30.0)
 BESIDE = (DOME + BAR) * math.sin(ANGLE)
@@ -68,15 +68,15 @@ def run(quick: bool) -> Result:
                 "the contact moves by a part of the depth", measure="absolute"),
             Row(f"half width of contact over Hertz's, {at}", HERTZ, 1.0, half / hertz, sizes[-1] / half + 0.02,
                 "an edge length, and 2 % for the curvature over the contact"),
-            Row(f"distance of the force from the bar's axis, {at}, mm", "statics", 0.0, arm, depth,
-                "forces act on the finger at rest, off by less than the depth", measure="absolute"),
+            zero(f"distance of the force from the bar's axis, {at}, mm", "statics", arm, depth,
+                "forces act on the finger at rest, off by less than the depth"),
         ]  # fmt: skip
     _, found, _ = pressed(Sphere(BESIDE, radius_mm=BAR), 0.2, 0.5 if quick else 0.25, "solid")
     ratio = -found["force_x_N"] / -found["force_y_N"]
     rows.append(Row("sideways over vertical force of a ball, solid", "tan 30 deg", math.tan(ANGLE), ratio, 0.1,
                     "the depth over the radius, 0.2/5, both ways"))  # fmt: skip
-    columns = "size_mm depth_mm force_N inclination_deg half_width_mm hertz_mm off_axis_mm".split()
-    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    columns = "size_mm depth_mm force_N inclination_deg half_width_mm hertz_mm off_axis_mm"
+    data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
 
 
@@ -93,5 +93,3 @@ def _draw(figure: Any, data: dict[str, list[float]]) -> None:
     depth, hertz = ([data[name][k] for k in finest] for name in ("depth_mm", "hertz_mm"))
     right.plot(depth, hertz, "k-", lw=0.8, label="Hertz")
     right.set(xlabel="depth (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None))
-    for axes in (left, right):
-        axes.legend(fontsize=8)

@@ -30,8 +30,8 @@ from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Sphere
 
 from ._increments import PlainCoulomb, imbalance, pressed
-from ._paper import STRAIN, columns, fig9
-from ._rows import Result, Row
+from ._paper import STRAIN, fig9
+from ._rows import Result, Row, at_least, at_most, columns
 
 COUNTS = (10, 20, 40, 80)
 ROUND_OFF = 1e-9
@@ -124,22 +124,22 @@ def _rows(counts: tuple[int, ...], own: dict[str, np.ndarray], plain: dict[str, 
     falls = np.array([_fall(errors) for errors in own.values()])
     for name, fall in zip(own, falls, strict=True):
         what = f"fall of errors in a halving, median over quantities, {name}, {few} to {many} increments"
-        yield Row(what, ORDER, 3.3, float(np.nanmedian(fall)), 0.0, "points close one by one", "statement", "at least")
+        yield at_least(what, ORDER, 3.3, float(np.nanmedian(fall)), "points close one by one", "statement")
     every = f"all presses, {few} to {many} increments"
     what = f"fall of errors in a halving, median over quantities and presses, {every}"
-    yield Row(what, ORDER, 3.3, float(np.nanmedian(falls)), 0.0, "points close one by one", measure="at least")
+    yield at_least(what, ORDER, 3.3, float(np.nanmedian(falls)), "points close one by one")
     for name, got in _medians(falls):
         what = f"fall of the error of the {name} in a halving, median over {every}"
-        yield Row(what, ORDER, 3.3, got, 0.0, "points close one by one", "statement", "at least")
+        yield at_least(what, ORDER, 3.3, got, "points close one by one", "statement")
     twenty = np.array([errors[1, :-1] for errors in own.values()])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = twenty / np.array(list(plain.values()))[:, :-1]
     for name, got in _medians(share):
         what = f"error of the {name} in 20 increments over that in {PLAIN} plain ones, median over presses"
-        yield Row(what, "eight times as many", 1.0, got, 0.0, "0/0 is left out", "statement", "at most")
+        yield at_most(what, "eight times as many", 1.0, got, "0/0 is left out", "statement")
     what = f"error in 20 increments over that in {PLAIN} plain ones, median over quantities and presses"
     got = float(np.nanmedian(share))
-    yield Row(what, "goal of finger3d", 1.0, got, 0.0, "eight times as many", "statement", "at most")
+    yield at_most(what, "goal of finger3d", 1.0, got, "eight times as many", "statement")
 
 
 def _draw(figure: Any, counts: tuple[int, ...], own: dict[str, np.ndarray], plain: dict[str, np.ndarray]) -> None:
@@ -158,4 +158,4 @@ def _draw(figure: Any, counts: tuple[int, ...], own: dict[str, np.ndarray], plai
         axes.set_axis_off()
     panels[0].set_ylabel("error")
     figure.supxlabel("increments a leg; crosses: plain ones; dotted: slope -2", fontsize=9)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(NAMES), fontsize=8)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=len(NAMES))

@@ -23,11 +23,11 @@ from finger3d.mechanics.discretise.problem import Problem
 
 from ._halfplane import compliance, line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Kind, Result, Row
+from ._rows import Kind, Result, Row, at_least, exact_columns
 
 NU, STATIC = 0.3, 0.25
 SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"
-COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations".split()
+COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations"
 Key = tuple[str, float, int, int]
 
 
@@ -62,8 +62,7 @@ def run(quick: bool) -> Result:
                     found[branch, ratio, points, count] = numbers(problem, law, count)
     rows = _rows(found, meshes, counts, ratios)
     table = [(*k, *v) for k, v in found.items()]
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, found, meshes, counts))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, found, meshes, counts))
 
 
 def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -> Iterator[Row]:
@@ -82,11 +81,11 @@ def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -
     kind: Kind = "sensitivity"
     away = abs(literal[2] - 0.263)
     what = f"paper, ratio .7: distance of c/a from the exact one, {here}"
-    yield Row(what, SOURCE, 0.1, away, 0.0, "a bound: this rule does not converge to it", kind, "at least")
+    yield at_least(what, SOURCE, 0.1, away, "a bound: this rule does not converge to it", kind)
     values = [found["paper", 0.7, fine, n][2] for n in counts]
     what = f"paper, ratio .7: change of c/a from {counts[0]} to {many} increments, {fine} points to a"
     why = "a bound: the result depends on the increments"
-    yield Row(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), 0.0, why, kind, "at least")
+    yield at_least(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), why, kind)
     what = f"paper, ratio .7: int_0^a q/P over the exact one, {here}"
     why = "4 % measured; not to be relied on"
     yield Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind)
@@ -105,4 +104,3 @@ def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -
         ax.set(xlabel="increments", ylabel=label)
     best = found["keep", 0.7, meshes[-1], counts[-1]]
     figure.suptitle(f"mu_k/mu_s = .7; keep: error of int q/P {100 * abs(best[0] / 0.0773 - 1):.1f} %")
-    axes[0].legend(fontsize=7)

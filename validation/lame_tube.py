@@ -21,7 +21,7 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 _LAME = "Lame 1852; REFERENCES.md, 5.6"
 KINDS = ("displacement, L2", "gradient, L2", "u(a)")
@@ -101,9 +101,8 @@ def run(quick: bool) -> Result:
             rows.append(
                 Row(what, source, theory, got, 0.1, "rate of the limit; a higher one passes", measure="at least")
             )
-    names = ("dim", "nu", "plane_stress", "cells_per_side", "displacement_L2", "gradient_L2", "widening_mm")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, curves))
+    names = "dim nu plane_stress cells_per_side displacement_L2 gradient_L2 widening_mm"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, curves))
 
 
 def draw(figure: Any, counts: dict[int, tuple[int, ...]], curves: dict[int, dict[str, Float]]) -> None:

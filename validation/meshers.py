@@ -23,8 +23,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.scene import parse
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns, zero
 
 MESHERS = ("ftetwild", "netgen")
 COMMON = {"material": {"E_MPa": 1.0, "nu": 0.45}, "friction": {"mu": 0.25}, "object": {"shape": "plane"}}
@@ -155,18 +154,18 @@ def _rows(found: list[Meshed]) -> Iterator[Row]:
         yield Row(f"{name}: different meshes of three by netgen", "the same program and input", 1, gen.different_meshes,
                   0.0, "a count", measure="absolute")  # fmt: skip
         for m in (wild, gen):
-            yield Row(f"{name}: volume error, {m.mesher}", "CAD", 0.0, m.volume_error, 1e-3,
-                      "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge", measure="absolute")  # fmt: skip
-            yield Row(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", 0.0, m.force_error,
-                      0.03, "the error bar of such meshes, 1 to 3 % (error_bars)", measure="absolute")  # fmt: skip
-        yield Row(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
-                  gen.seconds / wild.seconds, 0.0, "a statement", "statement", "at most")  # fmt: skip
-        yield Row(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
-                  gen.min_dihedral_deg / wild.min_dihedral_deg, 0.0, "a claim", "statement", "at least")  # fmt: skip
+            yield zero(f"{name}: volume error, {m.mesher}", "CAD", m.volume_error, 1e-3,
+                      "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge")  # fmt: skip
+            yield zero(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", m.force_error,
+                      0.03, "the error bar of such meshes, 1 to 3 % (error_bars)")  # fmt: skip
+        yield at_most(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
+                  gen.seconds / wild.seconds, "a statement", "statement")  # fmt: skip
+        yield at_least(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
+                  gen.min_dihedral_deg / wild.min_dihedral_deg, "a claim", "statement")  # fmt: skip
         for key, what in (("force_error", "force"), ("gauge_error", "gauge")):
             ratio = getattr(gen, key) / getattr(wild, key)
-            yield Row(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio, 0.0,
-                      "a statement", "statement", "at most")  # fmt: skip
+            yield at_most(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio,
+                      "a statement", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Meshed]) -> None:
@@ -181,4 +180,4 @@ def _draw(figure: Any, found: list[Meshed]) -> None:
         axes.set_yticks(np.arange(len(names)), names)
         axes.set_xlabel(title)
         axes.invert_yaxis()
-    figure.axes[0].legend(fontsize=8)
+    figure.axes[0].legend()

@@ -28,8 +28,8 @@ from finger3d.mechanics.results.history import StepResult, measure
 
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance, pressed
-from ._paper import STRAIN, STRESS, columns, fig9, half_cylinder
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, fig9, half_cylinder
+from ._rows import Result, Row, at_least, columns, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
 GRID_NU, GRID_MU = (0.0, 0.3, 0.49, 0.5), (0.0, 0.06, 0.25, 1.0, 3.0, 10.0, 1e3, 1e6)
@@ -118,10 +118,9 @@ def _known(automatic: list[tuple[Any, ...]]) -> list[Row]:
     within, covered = [true <= WITHIN * told for *_, true, told, _ in automatic], [e <= b for *_, e, _, b in automatic]
     what = f"share of {len(within)} errors of automatic increments within"
     return [
-        Row(f"{what} the bar of mesh and increments", GOAL, SHARE, float(np.mean(covered)), 0.0, "a bound",
-            measure="at least"),
-        Row(f"{what} {WITHIN:g} estimates of the increments alone", GOAL, SHARE, float(np.mean(within)), 0.0, "a bound",
-            "statement", "at least"),
+        at_least(f"{what} the bar of mesh and increments", GOAL, SHARE, float(np.mean(covered))),
+        at_least(f"{what} {WITHIN:g} estimates of the increments alone", GOAL, SHARE, float(np.mean(within)),
+            kind="statement"),
     ]  # fmt: skip
 
 
@@ -151,9 +150,9 @@ def _grid_rows(grid: Sequence[tuple[Any, ...]]) -> list[Row]:
     here = f"{len(grid)} histories, mu up to {max(line[1] for line in grid):g}"
     apart, balance = (max(line[k] for line in grid) for k in (2, 3))
     what = f"{here}: largest change of a number at the end of a leg with the results on the way, relative"
-    rows = [Row(what, SAME, 0.0, apart, 1e-9, "round-off", measure="absolute")]
+    rows = [zero(what, SAME, apart, 1e-9, "round-off")]
     what = f"{here}: work less stored energy less dissipation, over the work"
-    return [*rows, Row(what, "first law", 0.0, balance, 1e-9, "round-off", measure="absolute")]
+    return [*rows, zero(what, "first law", balance, 1e-9, "round-off")]
 
 
 def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tuple[Any, ...]]) -> None:

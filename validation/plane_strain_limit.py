@@ -28,7 +28,7 @@ from finger3d.mechanics.results.history import measure
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns, zero
 
 STEPS = 5
 _WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
@@ -87,9 +87,8 @@ def run(quick: bool) -> Result:
         rows.append(
             Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, "order h^1.2 on either mesh; 0.2 % measured")
         )
-    names = ("body", "nu", "size_mm", "force_N", "rms_error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "body nu size_mm force_N rms_error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
 def _mirrors(size: float) -> Iterator[Row]:
@@ -99,7 +98,7 @@ def _mirrors(size: float) -> Iterator[Row]:
         other = press(size, 0.49, symmetry=planes)[-1]
         away = max(abs(other[k] / quarter[k] - 1.0) for k in ("normal_force_N", "friction_sum_N", "dissipation_mJ"))
         what = f"{name} against quarter: force, friction sum, dissipation, largest relative difference"
-        yield Row(what, "mirror image", 0.0, away, 1e-9, "the same, up to convergence of contact", measure="absolute")
+        yield zero(what, "mirror image", away, 1e-9, "the same, up to convergence of contact")
 
 
 def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> None:

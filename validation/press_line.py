@@ -26,7 +26,7 @@ from finger3d.contact.friction import SLIP
 
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, exact_columns, zero
 
 C_OVER_A = {  # REFERENCES.md, 2.1, fully coupled; (nu, mu)
     (0.0, 0.25): 0.09910, (0.0, 0.5): 0.52191, (0.0, 1.0): 0.88959,
@@ -41,8 +41,8 @@ SPENCE = "Spence 1968; REFERENCES.md, 2.1"
 STEPPED = "REFERENCES.md, 2.4"
 THREE = "first order in the point spacing, since c lies between two points; 0.6 % or less measured at 40 points to a"
 ONE = "0.14 % or less measured at 40 points to a; coarser meshes must pass too"
-COLUMNS = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a".split()
-COLUMNS += ["reported_D_over_AP2", "plain"]
+COLUMNS = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a"
+COLUMNS += " reported_D_over_AP2 plain"
 FEW = 5
 """Increments of which a second-order error is left; twice as many give the stick zone to the point."""
 HEIGHTS = (100.0, 200.0)
@@ -113,7 +113,7 @@ def run(quick: bool) -> Result:
         if nu == 0.3:
             rows += _step_rows(plain, c_last, finest, counts)
             rows.append(_curve_row(curves[nu]))
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, curves[0.3], columns, finest, most))
 
 
@@ -128,7 +128,7 @@ def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], f
     here = f"nu = {nu:g}, mu = .25"
     yield Row(f"P/P_Hertz(a), {here}", SPENCE, force, value[0], 0.01, ONE)
     yield Row(f"int_0^a q/P, {here}", SPENCE, outward, value[1], 0.03, THREE)
-    yield Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE, lost, value[4], 0.03, THREE)  # fmt: skip
+    yield Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE, lost, value[4], 0.03, THREE)
     if most == 200:  # fewer increments are not yet on the line ~ 1/N
         few, many = (_extrapolated(plain, finest, 0.25, n)[2] for n in (50, most))
         in_steps = many + (many - few) * 50 / (most - 50)
@@ -168,7 +168,7 @@ def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], fin
     rate = float(np.log2((lost[FEW] - lost[most]) / (lost[2 * FEW] - lost[most])))
     settles = f"rate at which the dissipation settles, {here}, {FEW} to {2 * FEW} increments"
     return [
-        Row(what, "self-similar, whatever the increments", 0.0, change, 0.5 / finest, why, measure="absolute"),
+        zero(what, "self-similar, whatever the increments", change, 0.5 / finest, why),
         Row(settles, "second order", 2.0, rate, 0.5, "points close one by one", measure="at least"),
     ]
 
@@ -183,21 +183,15 @@ def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int,
                   "one point spacing, since this is no mean over increments", measure="absolute",
               )  # fmt: skip
     errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS[0.3][2] for n in (1, 10)]
-    yield Row(
-              "rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
-              "1/N; REFERENCES.md, 2.4",
-              1.0,
-              float(np.log10(errors[0] / errors[1])), 0.0, "a bound", measure="at least",
-          )  # fmt: skip
+    yield at_least("rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
+              "1/N; REFERENCES.md, 2.4", 1.0, float(np.log10(errors[0] / errors[1])))  # fmt: skip
 
 
 def _curve_row(profile: Profile) -> Row:
     got = _normalised(profile, np.linspace(0.0, 1.0, 11))
     worst = float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
-    return Row(
-        "q(x), largest deviation over its largest value, nu = .3, mu = .25", SPENCE, 0.0, worst, 0.05,
-        "q has a kink at c, and c lies between two points", measure="absolute",
-    )  # fmt: skip
+    return zero("q(x), largest deviation over its largest value, nu = .3, mu = .25", SPENCE, worst, 0.05,
+               "q has a kink at c, and c lies between two points")  # fmt: skip
 
 
 def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:

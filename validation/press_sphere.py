@@ -18,7 +18,7 @@ import numpy as np
 
 from . import _halfspace, _rings
 from ._halfspace import RADIUS
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 SPENCE = "Spence 1975; REFERENCES.md, 2.2"
 C_OVER_A = {
@@ -30,7 +30,7 @@ FULL_STICK = {0.0: 1.052891, 0.3: 1.016213}
 THREE = "first order in the spacing, since c lies between two points; 0.5 % or less measured at 10 points to a"
 ONE = "0.05 % or less measured; coarser meshes must pass too"
 LOST = "first order in the spacing, and the reference's last digit"
-COLUMNS = "body nu mu points_per_a increments P_over_Hertz T_over_P D_over_Pd c_over_a iterations".split()
+COLUMNS = "body nu mu points_per_a increments P_over_Hertz T_over_P D_over_Pd c_over_a iterations"
 DEPTH = 1.0 / RADIUS  # a = 1
 
 
@@ -75,8 +75,7 @@ def run(quick: bool) -> Result:
             )
         rows += [*_ring_rows(nu, found, rings, many), *_tet_rows(nu, found, rings, meshes)]
     table = [(*k, *v) for k, v in found.items()]
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, found, rings))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, found, rings))
 
 
 def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -> Iterator[Row]:
@@ -93,9 +92,8 @@ def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -
         in_steps = value[2] + (value[2] - found["rings", nu, 0.25, rings, 50][2]) * 50 / (200 - 50)
         rounding = 0.5 * 10.0 ** np.floor(np.log10(lost) - (1 if nu else 2)) / lost
         yield Row(
-                  f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200", SPENCE, lost, in_steps, 0.03 + rounding,
-                  LOST,
-              )  # fmt: skip
+            f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200", SPENCE, lost, in_steps, 0.03 + rounding, LOST
+        )
     for (case, mu), want in C_OVER_A.items():
         key = ("rings", nu, mu, rings, many)
         if case == nu and key in found:
@@ -153,5 +151,3 @@ def _draw(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
     for axes in (middle, right):
         axes.set_xticks(points, [str(n) for n in points])
         axes.set_xticks([], minor=True)
-    for axes in (left, middle, right):
-        axes.legend(fontsize=7)

@@ -27,8 +27,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Taxel
 from finger3d.sensor import Calibration, Estimate, estimate
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 Domain = Literal["solid", "plane-strain"]
 
@@ -150,21 +149,16 @@ def _rows(found: list[Judged], kind_of_all: Literal["verification", "statement"]
                 (f"mu above {PLATEAU:g}", [one for one in some if one.mu > PLATEAU], "statement"),
             ):
                 inside = float(np.mean([one.inside for one in chosen]))
-                yield Row(
-                    f"share of 90 % sets that contain mu: {name}, {part}, {len(chosen)} readings",
-                    "0.9 if stated rightly", 0.85, inside, 0.0,
-                    "where the sensor saturates, an error of the reading looks like another mu", kind, "at least",
-                )  # fmt: skip
+                yield at_least(f"share of 90 % sets that contain mu: {name}, {part}, {len(chosen)} readings",
+                          "0.9 if stated rightly", 0.85, inside,
+                          "where the sensor saturates, an error of the reading looks like another mu",
+                          kind)  # fmt: skip
             share = float(np.mean([one.status in ("ok", "coarse") for one in some]))
-            yield Row(
-                f"share of readings that determine mu: {name}", "no reference", 1.0, share, 0.0,
-                "the others say above, below, blind or ambiguous", "statement", "at most",
-            )  # fmt: skip
+            yield at_most(f"share of readings that determine mu: {name}", "no reference", 1.0, share,
+                      "the others say above, below, blind or ambiguous", "statement")  # fmt: skip
             wrong = float(np.mean([one.status in ("outside", "contradiction") for one in some]))
-            yield Row(
-                f"share of readings called out of range or contradictory: {name}", "p = 0.001", 0.02, wrong, 0.0,
-                "all are presses of a sensor within its tolerances", "verification", "at most",
-            )  # fmt: skip
+            yield at_most(f"share of readings called out of range or contradictory: {name}", "p = 0.001", 0.02, wrong,
+                      "all are presses of a sensor within its tolerances")  # fmt: skip
 
 
 def _honest(name: str, some: list[Judged], kind: Literal["verification", "statement"]) -> Iterator[Row]:
@@ -176,11 +170,11 @@ def _honest(name: str, some: list[Judged], kind: Literal["verification", "statem
         rms = float(np.sqrt(np.mean(z**2)))
         what = f"rms of z of mu, not {{}}: {name}, {len(z)} of {len(some)} with an estimate"
         one = "1 if stated rightly"
-        yield Row(what.format("above"), one, 1.2, rms, 0.0, why, kind, "at most")
-        yield Row(what.format("below"), one, 0.8, rms, 0.0, why, kind, "at least")
+        yield at_most(what.format("above"), one, 1.2, rms, why, kind)
+        yield at_least(what.format("below"), one, 0.8, rms, why, kind)
     what = f"share of 90 % sets that contain mu: {name}, {len(some)} readings"
-    yield Row(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, 0.0, why, kind, "at least")
-    yield Row(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, 0.0, why, kind, "at most")
+    yield at_least(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, why, kind)
+    yield at_most(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, why, kind)
 
 
 def _draw(figure: Any, found: list[Judged]) -> None:
@@ -202,4 +196,4 @@ def _draw(figure: Any, found: list[Judged]) -> None:
     left.set(xlabel="true mu", ylabel="z of mu", ylim=(-4.0, 4.0), title="Error of mu over its standard deviation")
     right.set(xlabel="z of mu", ylabel="share of readings below", xlim=(-3.5, 3.5), title="Distribution of z")
     for axes in (left, right):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8, frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)

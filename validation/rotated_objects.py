@@ -26,7 +26,7 @@ from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
-from ._rows import Result, Row
+from ._rows import Result, zero
 from .triangulated_objects import ball
 
 POSE = {"turn_x": 0.06, "turn_y": 0.4, "turn_z": 0.1}
@@ -92,10 +92,8 @@ def run(quick: bool) -> Result:
         change = float(np.abs(second - ROTATED * first).max() / np.linalg.norm(first[:3]))
         where = f"{domain}, large deformation" if large else domain
         rows.append(
-            Row(
-                f"largest change of force and moment, rotated back, {name}, {where}", "symmetry", 0.0, change, 1e-6,
-                "the residual of 1e-8, times arms of some mm and the iteration over normals", measure="absolute",
-            )
+            zero(f"largest change of force and moment, rotated back, {name}, {where}", "symmetry", change, 1e-6,
+                "the residual of 1e-8, times arms of some mm and the iteration over normals")
         )  # fmt: skip
         for key, value in zip(table, (name, where, change, float(np.hypot(first[0], first[2]))), strict=True):
             table[key].append(value)
@@ -110,5 +108,3 @@ def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     axes.axhline(1e-6, color="k", lw=0.8, label="allowed")
     axes.set_xticks(at, names, fontsize=6)
     axes.set(ylabel="change over the force, rotated back", ylim=(1e-17, 1e-5))
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.3)

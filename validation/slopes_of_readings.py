@@ -31,8 +31,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_most, columns
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
 EVEN = "20 mm wide, swept, base edges twice as long"
@@ -127,17 +126,13 @@ def _against_finer(found: Curves) -> list[Row]:
     error = {key: c.error(found[half]) for key, c in found.items() if (half := (*key[:2], key[2] / 2.0)) in found}
     what = "largest error of d strain / d mu, mu = .1 to 1, over the largest slope"
     goal = [
-        Row(
-            f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value, 0.0,
-            "the goal", "statement", "at most",
-        )
+        at_most(f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value,
+            "the goal", "statement")
         for (case, refinement, size), value in error.items()
     ]  # fmt: skip
     left = [
-        Row(
-            f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
-            value / error[case, PLAIN, size], 0.0, "half pays for its cells", "statement", "at most",
-        )
+        at_most(f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
+            value / error[case, PLAIN, size], "half pays for its cells", "statement")
         for (case, refinement, size), value in error.items()
         if refinement == REFINED and case != EVEN
     ]  # fmt: skip
@@ -150,11 +145,9 @@ def _between_meshers(found: Curves) -> list[Row]:
         "largest difference of d strain / d mu between swept and fTetWild, over the largest slope, 20 mm wide, 1.4 mm"
     )
     return [
-        Row(
-            f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
-            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), 0.0, "the goal, of each of them",
-            "statement", "at most",
-        )
+        at_most(f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
+            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), "the goal, of each of them",
+            "statement")
         for refinement in (PLAIN, REFINED)
         if (WILD, refinement, 1.4) in found
     ]  # fmt: skip
@@ -166,14 +159,9 @@ def _section(found: Curves) -> list[Row]:
     error = {refinement: found[SECTION, refinement, 1.0].error(finest) for refinement in (PLAIN, REFINED)}
     what = "largest error of d strain / d mu by the finest refined mesh, over the largest slope, section, 1 mm"
     return [
-        Row(
-            f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], 0.0, "the goal", "sensitivity",
-            "at most",
-        ),
-        Row(
-            f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN], 0.0,
-            "edges half as long at the gauge leave a quarter of its error", "sensitivity", "at most",
-        ),
+        at_most(f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], "the goal", "sensitivity"),
+        at_most(f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN],
+            "edges half as long at the gauge leave a quarter of its error", "sensitivity"),
     ]  # fmt: skip
 
 
@@ -194,7 +182,5 @@ def _draw(figure: Any, found: Curves) -> None:
                 continue
             kind = "no refinement" if refinement == PLAIN else f"gauge_refinement = {refinement:g}"
             axes.set_title(f"{case}: {kind}", fontsize=9)
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize=8, frameon=False)
     for axes in panels[-1]:
         axes.set_xlabel("friction coefficient mu")

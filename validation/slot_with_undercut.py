@@ -24,7 +24,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.objects import MeshObject
 
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, zero
 
 E, NU = 1.0, 0.3
 HALF, HEIGHT, WIDTH = 4.0, 6.0, 4.0
@@ -108,16 +108,16 @@ def run(quick: bool) -> Result:
             "the slot is open over the lowest 0.02 mm"),
         Row("pressure on a wall over that on the contact face", "nu / (1 - nu)", NU / (1.0 - NU), side / top, 0.005,
             "as before, in the middle of the wall"),
-        Row("force on the walls before the slide, N", "no contact", 0.0, end["wall_before_N"], 0.0,
-            "the bulge is below the clearance", measure="absolute"),
-        Row(f"lowest touching point above the slot's mouth, mm, {at}", "the lip", 0.0, end["lowest"], 2.0 * sizes[-1],
-            "hats reach an edge length beyond the lip, and points move", measure="absolute"),
+        zero("force on the walls before the slide, N", "no contact", end["wall_before_N"], 0.0,
+            "the bulge is below the clearance"),
+        zero(f"lowest touching point above the slot's mouth, mm, {at}", "the lip", end["lowest"], 2.0 * sizes[-1],
+            "hats reach an edge length beyond the lip, and points move"),
         Row(f"highest touching point above the slot's mouth, mm, {at}", "the lip", LIP, end["highest"],
             2.0 * sizes[-1], "the same", measure="absolute"),
-        Row(f"force of the lip on the wall, N, {at}", "it pushes along the slide", 0.1, end["wall_N"], 0.0,
-            "the sign of the slide", measure="at least"),
-        Row("penetration on the finest mesh over that on the coarsest", "the points see the lip better", 0.7,
-            end["penetration_mm"] / found[0]["penetration_mm"], 0.0, "between the points", measure="at most"),
+        at_least(f"force of the lip on the wall, N, {at}", "it pushes along the slide", 0.1, end["wall_N"],
+            "the sign of the slide"),
+        at_most("penetration on the finest mesh over that on the coarsest", "the points see the lip better", 0.7,
+            end["penetration_mm"] / found[0]["penetration_mm"], "between the points"),
     ]  # fmt: skip
     keys = ("wall_N", "face_N", "lowest", "highest", "penetration_mm")
     table: dict[str, Any] = {"size_mm": list(sizes)} | {key: [f[key] for f in found] for key in keys}
@@ -135,4 +135,3 @@ def _draw(figure: Any, sizes: tuple[float, ...], found: list[dict[str, Any]]) ->
     left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)")
     right.plot(sizes, [f["penetration_mm"] for f in found], "o-")
     right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", xlim=(0.0, None), ylim=(0.0, None))
-    left.legend(fontsize=8)

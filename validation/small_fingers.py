@@ -25,8 +25,8 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
-from ._paper import columns, said
-from ._rows import Result, Row
+from ._paper import said
+from ._rows import Result, Row, columns
 from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, best_gauges, markers, spreads, with_foils
 
 RADII = (5.0, 10.0)
@@ -105,9 +105,7 @@ def _draw(figure: Any, found: Spread) -> None:
                 label = readings if radius == RADII[0] else None
                 axes.semilogy(MUS, sd, color=colour, lw=width, label=label)
         axes.axhline(LIMIT, color="#222222", lw=0.8)
-        axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4))
-        axes.set_title(f"{measure}, {tolerances}", fontsize=10)
-        axes.grid(alpha=0.3)
+        axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4), title=f"{measure}, {tolerances}")
     panels[0].set_ylabel("standard deviation of mu")
     lines = {line.get_label(): line for axes in panels for line in axes.get_legend_handles_labels()[0]}
     title = "thick: R = 5 mm, thin: R = 10 mm"

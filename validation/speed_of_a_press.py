@@ -26,8 +26,8 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult
 
-from ._paper import STRAIN, columns, fig9, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, fig9, said, under
+from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
 """Share of the stress at once that relaxes in every decade."""
@@ -161,11 +161,11 @@ def _draw(figure: Any, found: Found) -> None:
         axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
         shares = sorted({100.0 * key[3] for key in found if key[0] == model})
         title = f"{', '.join(f'{share:g}' for share in shares)} % per decade{', thin to thick' if shares[1:] else ''}"
-        axes.legend(title=title, title_fontsize=8, frameon=False, fontsize=8)
+        axes.legend(title=title, title_fontsize=8, frameon=False)
     for (name, control, bulk, rate), reads in found.items():
         if name == models[0] and control == DEPTH and bulk:
             panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
                                 label=f"{100.0 * rate:g} % per decade")  # fmt: skip
     panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s",
                    title=f"{models[0]}, all moduli")  # fmt: skip
-    panels[-1].legend(frameon=False, fontsize=8)
+    panels[-1].legend(frameon=False)

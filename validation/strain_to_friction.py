@@ -34,8 +34,8 @@ from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap
 
-from ._paper import columns, said
-from ._rows import Result, Row
+from ._paper import said
+from ._rows import Result, Row, at_most, columns
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)
@@ -169,7 +169,7 @@ def _left(what: str, c: ReadingCurve) -> list[Row]:
     error = float(c.tolerance_sd(mus)[names.index("increments")].max())
     text = f"error of that change by the increments, over the change, {what}"
     share = error / abs(float(np.diff(c.at(mus))[0]))
-    return [Row(text, "presses of fewer", 0.25, share, 0.0, "that of mu is as much", "statement", "at most")]
+    return [at_most(text, "presses of fewer", 0.25, share, "that of mu is as much", "statement")]
 
 
 def _widths(found: Found) -> list[Row]:
@@ -202,7 +202,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
             axes.plot(c.grid, 1e3 * c.at(c.grid, "fit"), "--", color=colours[domain], lw=1.0, label="its second order")
         axes.set(xlabel="mu", ylabel="strain, 1e-3", title=f"gauge at 30°: {kind}")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False)
     right = panels[0, 2]
     for (domain, kind), calibration in found.items():
         c = calibration.readings[0]
@@ -211,7 +211,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         right.semilogy(c.grid, shown, style, color=colours[domain], lw=1.5, label=f"{NAMES[domain]}, {kind}")
     right.plot(0.5, 0.1, "k*", ms=11, label="the paper, measured")
     right.set(xlabel="mu", ylabel="standard deviation of mu", title="from a strain noise of 1.5e-4", ylim=(5e-4, 50.0))
-    right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     for axes, domain in zip(panels[1], NAMES, strict=False):
         slope_panel(figure, axes, maps[domain], TURN, 0.5)
         axes.set_title(f"d strain / d mu, 30°, mu = .5, {NAMES[domain]}")

@@ -28,7 +28,7 @@ from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import ContactPath, MeshObject, PlacedObject, first_touch
 
 from ._common import Body, body
-from ._rows import Result, Row
+from ._rows import Result, at_least, zero
 from .triangulated_objects import ball
 
 DEPTH, SLIDE, PLACE, MU = 0.3, 0.15, np.array([0.6, 0.0, 0.2]), 0.3
@@ -109,16 +109,12 @@ def run(quick: bool) -> Result:
     allowed = 0.03 if quick else 0.01
     one = f"the same on one mesh of size {size:g} mm"
     rows = [
-        Row(
-            "largest change of the force, turned back, mesh turned too", "symmetry", 0.0, exact, 1e-9,
-            "the solver's residual of 1e-8 at worst, 1e-15 as a rule", measure="absolute",
-        ),
-        Row(
-            "largest change of the height of first touch, mm", "symmetry", 0.0, float(np.ptp(touched)), 1e-4 * DEPTH,
-            "1e-4 of the depth, or 1.5e-4 of the force; it is searched on finer and finer grids", measure="absolute",
-        ),
-        Row(one, "symmetry", 0.0, meshed, allowed, "the mesh is not invariant under the rotation", measure="absolute"),
-        Row("friction over force at the end", "mu = 0.3", 0.05, sideways, 0.0, "friction acts", measure="at least"),
+        zero("largest change of the force, turned back, mesh turned too", "symmetry", exact, 1e-9,
+            "the solver's residual of 1e-8 at worst, 1e-15 as a rule"),
+        zero("largest change of the height of first touch, mm", "symmetry", float(np.ptp(touched)), 1e-4 * DEPTH,
+            "1e-4 of the depth, or 1.5e-4 of the force; it is searched on finer and finer grids"),
+        zero(one, "symmetry", meshed, allowed, "the mesh is not invariant under the rotation"),
+        at_least("friction over force at the end", "mu = 0.3", 0.05, sideways, "friction acts"),
     ]  # fmt: skip
     world = np.array([turn(a) @ f[-1] for a, f in zip(angles, alone, strict=True)])
     table: dict[str, Any] = {"angle_deg": list(angles)}
@@ -142,6 +138,3 @@ def _draw(figure: Any, angles: Float, with_mesh: Float, world: Float) -> None:
     for angle, force in zip(angles, with_mesh, strict=True):
         right.plot(steps, -force[:, 1], "o-", mfc="none", ms=4 + 3 * list(angles).index(angle), label=f"{angle:g} deg")
     right.set(xlabel="increment: press, then slide", ylabel="normal force, mesh turned too, N", xticks=steps)
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)

@@ -24,7 +24,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import MeshObject
 
-from ._rows import Result, Row
+from ._rows import Result, Row, at_most, zero
 
 DOME, WIDTH, E, NU, DEPTH = 10.0, 2.0, 1.0, 0.3, 0.1
 EQUAL, UNEQUAL = (45.0, 45.0), (35.0, 60.0)
@@ -61,10 +61,8 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
     obj = MeshObject(apex + float(MeshObject(surface=surface).origin[0]), surface=surface)
     mesh = MeshOptions(size, 3.0, "swept")
     problem = build(
-        Model(
-            dome, Isotropic(E, NU), mesh, (Leg(DEPTH, steps=2),), object=obj, domain="plane-strain", symmetry=()
-        )
-    )  # fmt: skip
+        Model(dome, Isotropic(E, NU), mesh, (Leg(DEPTH, steps=2),), object=obj, domain="plane-strain", symmetry=())
+    )
     *_, last = march(problem)
     assert last.outcome.ok, last.outcome
     force, at = problem.world_force(last.meshed_state.contact)[:, :2], problem.points.points[:, :2]
@@ -118,14 +116,14 @@ def run(quick: bool) -> Result:
         rows += [
             Row(f"half width of contact over Hertz's, {at}", "Johnson 1985, Sec. 4.2", 1.0, half / hertz,
                 sizes[-1] / hertz + 0.02, "an edge length at the ends, and 2 % for the finite dome"),
-            Row(f"distance of the force from the dome's axis, {at}, mm", "statics", 0.0, arm, DEPTH,
-                "the contact moves by a part of the depth", measure="absolute"),
+            zero(f"distance of the force from the dome's axis, {at}, mm", "statics", arm, DEPTH,
+                "the contact moves by a part of the depth"),
         ]  # fmt: skip
     total = np.array(found["total_N"])
     parts = np.array(found["force_N"]) @ normals_of(UNEQUAL)
-    rows.append(Row("total force less those of the flanks, over it", "statics", 0.0,
+    rows.append(zero("total force less those of the flanks, over it", "statics",
                     float(np.linalg.norm(total - parts) / np.linalg.norm(total)), 1e-6,
-                    "the normals are those of the flanks but for round-off", measure="absolute"))  # fmt: skip
+                    "the normals are those of the flanks but for round-off"))  # fmt: skip
     equal = on_flanks(EQUAL, sizes[-1])
     each = -equal["total_N"][1] / (2.0 * math.sin(math.radians(EQUAL[0])))
     for side, force in zip(("left", "right"), equal["force_N"], strict=True):
@@ -143,8 +141,8 @@ def run(quick: bool) -> Result:
     ]  # fmt: skip
     if not quick:
         change = [float(np.linalg.norm(b - a)) for a, b in zip(corners, corners[1:], strict=False)]
-        rows.append(Row("change of the corner's force between the two finest meshes, over that before", "convergence",
-                        1.0, change[-1] / change[-2], 0.0, "the differences fall", measure="at most"))  # fmt: skip
+        rows.append(at_most("change of the corner's force between the two finest meshes, over that before",
+                        "convergence", 1.0, change[-1] / change[-2], "the differences fall"))  # fmt: skip
     data = {"table": table, "sizes": corner_sizes, "faces": np.array(corners)}
     return Result(tuple(rows), table, lambda figure: _draw(figure, data))
 
@@ -157,9 +155,7 @@ def _draw(figure: Any, data: dict[str, Any]) -> None:
         left.plot(table["size_mm"][own], table["half_width_mm"][own], "o-", color=f"C{k}", label=f"{angle:g} deg")
         left.plot(table["size_mm"][own], table["hertz_mm"][own], "--", color=f"C{k}", label=f"{angle:g} deg, Hertz")
     left.set(xlabel="edge length (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None), xlim=(0.0, None))
-    left.legend(fontsize=8)
     for k in range(3):
         right.plot(data["sizes"], data["faces"][:, k], "osv"[k] + "-", mfc="none", label=f"face {k + 1}")
     right.set(xlabel="edge length (mm)", ylabel="normal force on a face of the cube's corner (N)", ylim=(0.0, None))
     right.set_xlim(0.0, None)
-    right.legend(fontsize=8)

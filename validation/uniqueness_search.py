@@ -29,8 +29,8 @@ from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import stations
 
 from ._increments import PlainCoulomb
-from ._paper import STRAIN, STRESS, columns, fig9, said
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, fig9, said
+from ._rows import Result, Row, at_least, at_most, columns
 
 WIDE = "20 mm wide"
 MODELS = ((STRESS, 0.3), (STRAIN, 0.3), (STRAIN, 0.49), (WIDE, 0.3), (WIDE, 0.49))
@@ -127,8 +127,7 @@ def _rows(found: Sequence[Searched]) -> Iterator[Row]:
             yield said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most")
             what = f"random starts that end in no solution, of {tried}, mu {text}, {model}"
             unsettled = sum(s.unsettled for s in some)
-            yield Row(what, "no reference", 0.0, unsettled, 0.0, "the fallbacks start from any forces",
-                      "statement", "at most")  # fmt: skip
+            yield at_most(what, "no reference", 0.0, unsettled, "the fallbacks start from any forces", "statement")
 
 
 def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
@@ -146,11 +145,9 @@ def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
             several += bool(len(forces) and np.ptp(forces, axis=0).max() > DIFFERENT)
         what = f"loads with several solutions found, one point, mu = {mu:g}, of {loads}"
         if most:
-            yield Row(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, 0.0, "the search finds them",
-                      measure="at least")  # fmt: skip
+            yield at_least(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, "the search finds them")
         else:
-            yield Row(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, 0.0, "the solution is unique",
-                      measure="at most")  # fmt: skip
+            yield at_most(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, "the solution is unique")
 
 
 def _draw(figure: Any, found: Sequence[Searched]) -> None:
@@ -164,6 +161,5 @@ def _draw(figure: Any, found: Sequence[Searched]) -> None:
             left.plot([s.mu for s in own], shares, style, ms=4, color=f"C{i}", label=f"{model}, nu = {nu:g}, {path}")
             right.loglog([s.mu for s in own], [max(s.apart, 1e-16) for s in own], style, ms=4, color=f"C{i}")
     left.set(xscale="log", xlabel="mu", ylabel="random starts that end in another solution (%)")
-    left.legend(frameon=False, fontsize=7)
     right.axhline(DIFFERENT, color="#222222", lw=0.8)
     right.set(xlabel="mu", ylabel="largest difference of a force over the largest force")

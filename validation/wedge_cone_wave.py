@@ -27,7 +27,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Wave, Wedge
 
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
 MODULUS = 1.0 / (1.0 - NU**2)
@@ -212,9 +212,8 @@ def run(quick: bool) -> Result:
     rows.append(Row(what, _JOHNSON, 1.0, own_path(count), 0.01, _ONE))
     got = full_contact(20 if quick else 40)
     rows.append(Row("amplitude of the pressure over p*, all touching, wave", _WESTERGAARD, 1.0, got, 0.01, _WAVE))
-    names = ("case", "points", "force_rms_error", "pressure_L2_error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "case points force_rms_error pressure_L2_error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
 def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
@@ -230,8 +229,6 @@ def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
     left.xaxis.set_minor_formatter(NullFormatter())
     left.set_xlabel("point spacing / a (wave: / half a wavelength)")
     left.set_ylabel("force at equal a, relative error, rms over depths")
-    left.grid(alpha=0.3)
-    left.legend(fontsize=8)
     label = "pressure, relative L2 error, rms over depths"
     for name, slope in (("wedge, plane strain", 0.5), ("wave, plane strain", 1.0)):
         convergence(right, curves[name][0], {name: curves[name][1][:, 1]}, slope, left.get_xlabel(), label)

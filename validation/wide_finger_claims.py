@@ -24,8 +24,8 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
 from . import fig03_forces, fig04_zones, fig05_strains_depth, fig06_forces_mu, fig07_strains_mu, fig12_gauge_angles
-from ._paper import BELOW_FIG9, MUS, Profile, columns, fig9, line, said, strains, under
-from ._rows import Result, Row
+from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains, under
+from ._rows import Result, Row, columns
 
 NU, COUNT = 0.49, 25
 ANGLES = (15, 30, 45, 60)
@@ -166,9 +166,8 @@ def _draw(figure: Any, x: Float, found: dict[str, Pressed]) -> None:
             "gauge at x = 36 mm",
         )
         for panel, title in zip(axes, titles, strict=True):
-            panel.set(xlabel="mu" if panel is axes[3] else "x (mm)")
-            panel.set_title(title, fontsize=10)
+            panel.set(xlabel="mu" if panel is axes[3] else "x (mm)", title=title)
             panel.axhline(0.0, color="#999999", lw=0.7)
         axes[0].set_ylabel("large deformation" if "large" in name else "small strain")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8)
-    panels[0, 3].legend(title="angle", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="mu", frameon=False)
+    panels[0, 3].legend(title="angle", frameon=False)
