@@ -39,6 +39,7 @@ from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
+from ._press import changed, fig9_finger
 
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
@@ -92,11 +93,10 @@ def model_of(case: Case) -> Model:
         return Model(
             design, Isotropic(1.0, nu), mesh, (Leg(1.0),), friction=law, gauges=(gauge,), domain="plane-stress"
         )
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     # at large deformation the strain of the section along 30 degrees is near zero there, a twentieth of that along 60
     gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 3 if case.body == LARGE[SECTION] else math.pi / 6)
     domain: Any = "solid" if case.body in (SOLID, LARGE[SOLID]) else "plane-strain"
-    model = Model(design, Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=law, gauges=(gauge,), domain=domain)
+    model = Model(fig9_finger(), Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=law, gauges=(gauge,), domain=domain)
     return LargeDeformation().apply(model) if case.body in LARGE.values() else model
 
 
@@ -195,7 +195,7 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
 def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:
     """Frames of a press in so many increments."""
     legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
-    frames = list(march(replace(problem, model=replace(problem.model, legs=legs)), workspace=workspace))
+    frames = list(march(changed(problem, legs=legs), workspace=workspace))
     if not frames[-1].outcome.ok:
         raise ArithmeticError(f"{count} increments, {frames[-1].target}: {frames[-1].outcome}")
     return frames

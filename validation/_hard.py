@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from finger3d.objects import Plane
 from finger3d.scene import load
 
 from ._common import free_motion
+from ._press import changed
 from ._rows import Row, at_least, at_most
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
@@ -182,7 +182,7 @@ def again(quick: bool) -> Iterator[Row]:
 
 
 def _with(problem: Problem, **changes: Any) -> Problem:
-    return replace(problem, model=replace(problem.model, **changes))
+    return changed(problem, **changes)
 
 
 def coarse_and_deep(quick: bool) -> Iterator[Row]:

@@ -13,7 +13,7 @@ force of the increment; where friction turns during an increment it leaves an er
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,6 @@ from scipy import sparse
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -30,6 +29,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult
 
 from ._common import rate
+from ._press import changed, fig9_finger
 from ._rows import Result, Row, exact_columns, zero
 
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
@@ -39,15 +39,14 @@ SIZES = {"plane-strain": 2.0, "solid": 8.0}
 
 def finger(domain: Any, nu: float) -> Problem:
     """The whole finger, ready for any path that presses 10 mm at first."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh = MeshOptions(SIZES[domain], 2.0 * SIZES[domain], "swept")
-    return build(Model(body, Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
+    return build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
 
 
 def along(problem: Problem, steps: int, mu: float, slide: float) -> list[StepResult]:
     """Frames of a press, and a slide if there is one, of `steps` increments each."""
     legs = (Leg(10.0, steps=steps),) + ((Leg(10.0, slide_x_mm=slide, steps=steps),) if slide else ())
-    return list(march(replace(problem, model=replace(problem.model, legs=legs, friction=Coulomb(mu)))))
+    return list(march(changed(problem, legs=legs, friction=Coulomb(mu))))
 
 
 @dataclass(frozen=True)
@@ -97,8 +96,7 @@ def least_loss(frames: list[StepResult]) -> float:
 
 def run(quick: bool) -> Result:
     """Section and solid, compressible and not; ever more increments."""
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     curves: dict[str, dict[str, tuple[Float, Float]]] = {"mu = 0.25": {}, "mu = 0": {}}
     for domain in ("plane-strain", "solid"):
         worst = dict.fromkeys(("force", "moment", "loss", "net"), 0.0)

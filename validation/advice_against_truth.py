@@ -24,7 +24,6 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -34,6 +33,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
+from ._press import fig9_finger
 from ._rows import Result, Row, at_least, columns
 
 SEED = 23
@@ -85,11 +85,8 @@ def solids(count: int) -> Iterator[tuple[str, Model]]:
     random = np.random.default_rng(SEED)
     for number in range(count):
         u = random.uniform(size=4)
-        fig9 = designs()["clipped_cylinder"](
-            radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=12.0 + 28.0 * u[0]
-        )
-        half = designs()["half_cylinder"](radius_mm=5.0, width_mm=3.0 + 5.0 * u[0])
-        block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=10.0 + 6.0 * u[0])
+        fig9 = fig9_finger(12.0 + 28.0 * u[0])
+        half, block = [], []
         shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
             (fig9, Plane(), FAR, 10.0, 3.0),
             (half, Cylinder(radius_mm=10.0), NEAR, 1.0, 0.35),

@@ -58,8 +58,7 @@ def apparent_modulus(mesh: Mesh, nu: float) -> float:
 def run(quick: bool) -> Result:
     """Three sizes and more, uniform."""
     counts = {"strip": (8, 16, 32) if quick else (8, 16, 32, 64), "disc": (4, 6, 8) if quick else (4, 8, 12)}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     errors: dict[str, dict[str, list[float]]] = {"strip": {}, "disc": {}}
     for (body, nu), wanted in WANTED.items():
         if quick and (body, nu) == ("disc", 0.49):

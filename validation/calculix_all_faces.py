@@ -23,7 +23,6 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
@@ -31,6 +30,7 @@ from finger3d.mechanics.results.history import measure
 
 from ._ccx import program
 from ._ccx import run as run_calculix
+from ._press import fig9_finger
 from ._rows import Result, Row, at_least
 
 LABELS = {2: ("contact", "walls"), 3: ("contact", "walls", "ends")}
@@ -72,10 +72,8 @@ _CYLINDER_N = (6.245192, 6.48522, 6.52479, 8.715404, 8.715928, 8.702082, 11.7422
 
 def cases(quick: bool) -> list[Case]:
     """Sections, then solids; the last is timed."""
-    block = designs()["block"](half_length_mm=6.0, height_mm=10.0, width_mm=1.0)
-    cylinder = designs()["half_cylinder"](radius_mm=10.0, width_mm=1.0)
-    short = designs()["block"](half_length_mm=5.0, height_mm=10.0, width_mm=8.0)
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    block, cylinder, short = [], [], []
+    finger = fig9_finger()
     found = [
         Case(name, body, "plane-strain", nu, mu, depth, 0.7, force)
         for name, body, depth, forces in (

@@ -78,8 +78,7 @@ def run(quick: bool) -> Result:
     """Quick: one nu, three gauges, 10 increments."""
     random = np.random.default_rng(20261123)
     nus, counts, size = ((0.45,), (10,), 0.3) if quick else ((0.3, 0.49), (10, 20, 40, "auto"), 0.1)
-    found: list[Reading] = []
-    bare: dict[tuple[float, float, int], Float] = {}
+    found, bare = [], {}
     for nu in nus:
         mus = np.sort(random.uniform(*RANGE, 5 if quick else 12))
         for steps in counts if nu == nus[-1] else counts[:3]:  # chosen increments take longest, and once is enough

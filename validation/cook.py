@@ -108,9 +108,7 @@ def run(quick: bool) -> Result:
     """Uniform meshes of three and more sizes, one graded, slabs, and linear triangles for contrast."""
     counts = (12, 24, 48) if quick else (16, 32, 64, 128)
     thick = (3, 6, 12) if quick else (8, 16, 32)
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    errors = {}
+    rows, table, errors = [], [], {}
     panels = tuple(p for p in PANELS if not quick or p.nu not in (0.49, 0.4999))
     for panel in panels:
         found = [deflection(square(n), panel) for n in counts]

@@ -149,11 +149,7 @@ def _others(bench: Bench, made: Mapping[str, Groups], quick: bool) -> tuple[Runs
 
 
 def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, quick: bool) -> Result:
-    rows: list[Row] = []
-    lines: list[dict[str, Any]] = []
-    errors: dict[Case, dict[str, float]] = {}
-    steps: dict[str, dict[str, dict[int, float]]] = {}
-    truths: dict[str, dict[str, Truth]] = {}
+    rows, lines, errors, steps, truths = [], [], {}, {}, {}
     for body, series in made.items():
         truths[body] = {q: truth(series[BEST[body]], runs, q) for q in QUANTITIES}
         ladder = series["steps"][0]

@@ -47,6 +47,7 @@ from finger3d.objects import TIME
 from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
+from ._press import changed
 from ._rows import Result, Row, at_least, at_most, columns, zero
 from .held_weights import largest_change
 
@@ -145,7 +146,7 @@ def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
     problem = build(scene_of(tables).model())
     close, weigh = problem.model.legs
     hold = replace(weigh, steps=increments, duration_s=HOLD_S)
-    held = replace(problem, model=replace(problem.model, legs=(close, weigh, hold)))
+    held = changed(problem, legs=(close, weigh, hold))
     steps = list(march(held))
     assert all(step.outcome.ok and step.pose for step in steps)
     poses = np.array([np.delete(step.pose.coordinates, TIME) for step in steps[3:] if step.pose])

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.geometry.registry import designs
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, STRAIN, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
 from ._rows import Result, Row, at_most, columns
 from .geometry_search import CHOSEN, EDGES, RADII
 
@@ -55,7 +55,7 @@ class Judged:
 
 def judged(plane: str, radius: float, edge: float, x: Float, size: float, quick: bool = False) -> Judged:
     """Condense a finger once, press it at every mu, read every gauge."""
-    design = designs()["clipped_cylinder"](radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=1.0)
+    design = fig9_finger(1.0, radius, edge)
     gauges = line(x, design, BELOW_FIG9)
     problem = fig9(NU, plane, size, gauges, radius=radius, edge=edge)
     counts = STEPS[plane] if not quick else (10, 5)
@@ -81,8 +81,7 @@ def run(quick: bool) -> Result:
     """A condensation for each R and H, in plane strain and as a solid."""
     x = np.linspace(4.0, 48.0, 12 if quick else 45)
     radii, edges = ((80.0, 100.0), (25.0, 36.6)) if quick else (RADII, EDGES)
-    found: dict[tuple[str, float, float], Judged] = {}
-    lines = []
+    found, lines = {}, []
     for plane, name in DOMAINS.items():
         size = SIZES[plane] * (3.0 if quick else 1.0)
         for radius in radii:

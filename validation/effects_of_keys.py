@@ -28,6 +28,7 @@ from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
+from ._press import changed
 from ._rows import Result, Row, at_least, columns, zero
 
 SEED = 68
@@ -76,7 +77,7 @@ def judged(name: str, scene: Scene) -> Iterator[Judged]:
     steps = body.steps()
     steps[-1].check(name)
     problem = body.problem
-    problem = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
+    problem = changed(problem, legs=with_increments_of(problem.model.legs, len(steps)))
     changes = changes_of(scene, problem.model, {})
     found, _ = effects_on(problem, changes, QUIET)
     own = problem.model.mesh

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,13 +22,12 @@ import numpy as np
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Model
 
 from ._foil import alone, by_mesh, wing
+from ._press import fig9_finger, under
 from ._rows import Result, Row, exact_columns, zero
 
 FOIL = Effect(3000.0, 0.02, 3.0)
@@ -43,13 +41,10 @@ COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_f
 
 def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
     """The finger with a pair of foils, mirror images of each other."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     turn = math.radians(30.0)
     gauges = (Gauge("g", 36.0, 38.0, 0.0, turn, length), Gauge("m", -36.0, 38.0, 0.0, math.pi - turn, length))
-    model = Model(
-        body, Isotropic(1.0, NU), MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), friction=Coulomb(0.25),
-        gauges=gauges, domain=domain,
-    )  # fmt: skip
+    mesh, legs, law = MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), Coulomb(0.25)
+    model = Model(fig9_finger(), Isotropic(1.0, NU), mesh, legs, friction=law, gauges=gauges, domain=domain)
     return build(FOIL.apply(model))
 
 
@@ -57,10 +52,8 @@ def strains(problem: Problem, mus: tuple[float, ...]) -> np.ndarray:
     """Free strain and what is read (m, 2) at the end of the press for every mu."""
     out = []
     for mu in mus:
-        frames = list(march(replace(problem, model=replace(problem.model, friction=Coulomb(mu)))))
-        if not frames[-1].outcome.ok:
-            raise AssertionError(f"mu = {mu:g}: {frames[-1].outcome}")
-        out.append((frames[-1].gauges["g_free"], frames[-1].gauges["g"]))
+        gauges = under(problem, mu)[-1].gauges
+        out.append((gauges["g_free"], gauges["g"]))
     return np.array(out)
 
 
@@ -71,8 +64,7 @@ def run(quick: bool) -> Result:
     lengths = (1.0, 4.0) if quick else LENGTHS
     sizes: dict[Domain, float] = {"plane-strain": 4.0, "solid": 5.0} if quick else {"plane-strain": 1.0, "solid": 2.5}
     steps = 10 if quick else 160
-    found: dict[tuple[str, float], np.ndarray] = {}
-    table: list[tuple[Any, ...]] = []
+    found, table = {}, []
     for domain, size in sizes.items():
         for length in lengths:
             value = strains(finger(domain, length, size, steps), mus)

@@ -37,6 +37,7 @@ from finger3d.mechanics.results.history import StepResult
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids
+from ._press import changed
 from ._rows import Result, Row, at_least, at_most, columns
 
 DEPTHS = (1.0, 0.6)
@@ -99,7 +100,7 @@ def _runs(model: Model, mus: tuple[float, ...] = MUS) -> Iterator[tuple[float, f
         legs = tuple(replace(leg, depth_mm=share * leg.depth_mm) for leg in model.legs)
         problem = build(replace(model, legs=legs))
         for mu in mus:
-            yield mu, legs[0].depth_mm, replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
+            yield mu, legs[0].depth_mm, changed(problem, friction=Coulomb(mu))
 
 
 def _pressed(problem: Problem) -> tuple[Problem, list[StepResult]]:

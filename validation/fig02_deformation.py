@@ -13,7 +13,8 @@ import numpy as np
 
 from finger3d.fem.mesh.simplex import unfold
 
-from ._paper import STRAIN, STRESS, Profile, half_cylinder, moved, said, under
+from ._paper import STRAIN, STRESS, Profile, half_cylinder, moved, said
+from ._press import under
 from ._rows import Result, Row, columns, zero
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))

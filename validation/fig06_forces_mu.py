@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, said, under
+from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, said
+from ._press import under
 from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))

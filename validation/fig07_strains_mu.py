@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ._paper import BELOW_R5, MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains, under
+from ._paper import BELOW_R5, MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
+from ._press import under
 from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))

@@ -17,7 +17,8 @@ import numpy as np
 
 from finger3d.contact.friction import Branch, TwoCoefficients
 
-from ._paper import MUS, STRAIN, STRESS, half_cylinder, line_r5, said, strains, under
+from ._paper import MUS, STRAIN, STRESS, half_cylinder, line_r5, said, strains
+from ._press import under
 from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))

@@ -14,7 +14,8 @@ import numpy as np
 
 from finger3d.fem.mesh.simplex import unfold
 
-from ._paper import STRAIN, STRESS, Profile, fig9, moved, said, under
+from ._paper import STRAIN, STRESS, Profile, fig9, moved, said
+from ._press import under
 from ._rows import Result, Row, at_most, columns
 
 NUS = (0.0, 0.3, 0.4, 0.43, 0.45, 0.49, 0.5)

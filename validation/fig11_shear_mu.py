@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.geometry.registry import designs
-
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, half_cylinder, line, line_r5, said, strains, under
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, half_cylinder, line, line_r5, said, strains
+from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 
 NUS = (0.3, 0.45, 0.49)
@@ -23,12 +22,11 @@ NUS = (0.3, 0.45, 0.49)
 def run(quick: bool) -> Result:
     """Both fingers in both plane states, under five coefficients, along their lines."""
     size, count = (3.0, 17) if quick else (0.5, 49)
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=1.0)
     x = np.linspace(-48.0, 48.0, count)
     found, small, slip, lines = {}, {}, {}, []
     for nu in NUS:
         for plane in (STRAIN, STRESS):
-            problem = fig9(nu, plane, size, line(x, design, BELOW_FIG9))
+            problem = fig9(nu, plane, size, line(x, fig9_finger(1.0), BELOW_FIG9))
             r5, gauges = line_r5(count=21)
             other = half_cylinder(nu, plane, size / 10.0, gauges)
             small[plane, nu] = np.array([strains(under(other, mu, 1)[-1], len(r5))[2] for mu in MUS])

@@ -16,7 +16,8 @@ import numpy as np
 
 from finger3d.mechanics.model import Gauge
 
-from ._paper import BELOW_FIG9, STRAIN, STRESS, fig9, said, under
+from ._paper import BELOW_FIG9, STRAIN, STRESS, fig9, said
+from ._press import under
 from ._rows import Result, Row, columns
 
 ANGLES = (0, 15, 30, 45, 60, 75, 90)

@@ -32,11 +32,11 @@ from finger3d.analyses.pressed_body import presses
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
 from ._paper import STRAIN, STRESS, said
+from ._press import fig9_finger
 from ._rows import Result, Row, columns
 
 NOISE, ERROR = 1.5e-4, 0.1
@@ -148,11 +148,10 @@ def _gauge(name: str, leaning: str, y: float, z: float, length: float = 0.0, sid
 
 
 def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> Model:
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     size = (6.0 if quick else 2.5) if domain == "solid" else 3.0 if quick else 2.0 if large else 1.0
     mesh = MeshOptions(size, 3.0 * size, "swept")
     legs = (Leg(10.0, steps=4 if quick else 10 if large else 80),)
-    model = Model(body, Isotropic(1.0, nu), mesh, legs, gauges=tuple(gauges), domain=domain)
+    model = Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, gauges=tuple(gauges), domain=domain)
     return LargeDeformation().apply(model) if large else model
 
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.results.history import measure
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 from .fig12_gauge_angles import ANGLES, gauges, statements
 
@@ -30,12 +30,11 @@ def run(quick: bool) -> Result:
     """The solid on swept meshes, and both plane models at the same in-plane sizes."""
     size, count = (4.0, 13) if quick else (1.5, 25)
     nus = (0.49,) if quick else (0.45, 0.49)
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     x = np.linspace(0.0, 48.0, count)
     shear, gauge, middle, numbers, lines = {}, {}, {}, {}, []
     for nu in nus:
         for plane in PLANES:
-            problem = fig9(nu, plane, size, [*line(x, design, BELOW_FIG9), *gauges()])
+            problem = fig9(nu, plane, size, [*line(x, fig9_finger(), BELOW_FIG9), *gauges()])
             frames = [under(problem, mu, STEPS[plane])[-1] for mu in MUS]
             shear[plane, nu] = np.array([strains(f, count)[2] for f in frames])
             gauge[plane, nu] = {t: np.array([f.gauges[f"{BELOW_FIG9}:{t}"] for f in frames]) for t in ANGLES}

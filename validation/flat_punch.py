@@ -59,9 +59,7 @@ def errors(h: float, nu: float) -> tuple[float, float, float, float]:
 def run(quick: bool) -> Result:
     """Two Poisson's ratios, three sizes or more."""
     sizes = np.array([0.02, 0.01, 0.0025] if quick else [0.02, 0.01, 0.005, 0.0025, 0.00125])
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves = {}
+    rows, table, curves = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.45):
         found = np.array([errors(h, nu) for h in sizes])
         _, worst, _, half = found[-1]

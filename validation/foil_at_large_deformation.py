@@ -21,10 +21,10 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 
+from ._press import fig9_finger
 from ._rows import Result, at_least, at_most, columns
 
 NOISE, LIMIT, TURN = 1.5e-4, 0.1, math.radians(30.0)
@@ -36,11 +36,10 @@ FREE, READ = "free", "foil"
 
 def model(quick: bool) -> Model:
     """The finger with the gauge and its mirror image, in small strain."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, 4.0), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, 4.0))
     mesh = MeshOptions(5.0, 12.0, "swept") if quick else MeshOptions(2.0, 6.0, "swept")
     legs = (Leg(10.0, steps=5 if quick else 10),)
-    return FOIL.apply(Model(body, Isotropic(1.0, 0.49), mesh, legs, friction=Coulomb(0.25), gauges=gauges))
+    return FOIL.apply(Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, friction=Coulomb(0.25), gauges=gauges))
 
 
 def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:

@@ -35,6 +35,7 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Sphere
 
+from ._press import changed, fig9_finger
 from ._rows import Result, Row, at_least, zero
 
 E, PRONY = 1.0, ((0.5, 1.0),)
@@ -46,10 +47,9 @@ CONTROL = "REFERENCES.md, 7.3"
 
 def finger(size: float, material: Isotropic, mu: float) -> Model:
     """The section of Fig. 9; the depth of the leg meshes the contact."""
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
     mesh = MeshOptions(size, 8.0, "swept")
-    return Model(design, material, mesh, (Leg(6.0),), friction=Coulomb(mu), gauges=gauges, domain="plane-strain")
+    return Model(fig9_finger(), material, mesh, (Leg(6.0),), friction=Coulomb(mu), gauges=gauges, domain="plane-strain")
 
 
 def block(size: float, material: Isotropic, mu: float) -> Model:
@@ -62,7 +62,7 @@ def block(size: float, material: Isotropic, mu: float) -> Model:
 def history(problem: Problem, legs: tuple[Leg, ...]) -> list[Tree]:
     """What is measured after every increment."""
     out = []
-    for frame in march(replace(problem, model=replace(problem.model, legs=legs))):
+    for frame in march(changed(problem, legs=legs)):
         assert frame.outcome.ok, frame.outcome
         out.append(measure(problem.points, frame))
     return out
@@ -96,8 +96,7 @@ def column(steps: list[Tree], name: str) -> Float:
 def run(quick: bool) -> Result:
     """Two bodies under a cycle of force, and a viscous one under a held force."""
     count = 4 if quick else 10
-    rows: list[Row] = []
-    cycles = {}
+    rows, cycles = [], {}
     for name, model, depth in (
         ("finger, plane strain", finger(2.0 if quick else 1.0, Isotropic(E, 0.45), 0.25), 5.0),
         ("ball on a block", block(0.4 if quick else 0.25, Isotropic(E, 0.3), 0.05), 0.3),
@@ -106,7 +105,7 @@ def run(quick: bool) -> Result:
         force = history(problem, (Leg(depth, steps=4),))[-1]["normal_force_N"]
         cycles[name] = _cycle(problem, depth, force, count)
         rows += _cycle_rows(name, problem, cycles[name], count, force)
-        smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+        smooth = changed(problem, friction=Coulomb(0.0))
         free = _cycle(smooth, depth, force, count)
         rows.append(
             zero(f"depth on the way down less that on the way up, over it, mu = 0, {name}", "unique",
@@ -165,8 +164,7 @@ def creep(t: float) -> float:
 
 def _creep(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     size, per_second = (4.0, 4) if quick else (1.5, 16)
-    rows: list[Row] = []
-    curve: dict[str, Any] = {}
+    rows, curve = [], {}
     nu = 0.45
     shear, bulk = E / (2.0 * (1.0 + nu)), E / (3.0 * (1.0 - 2.0 * nu))
     long = 9.0 * bulk * 0.5 * shear / (3.0 * bulk + 0.5 * shear), (3.0 * bulk - shear) / (6.0 * bulk + shear)

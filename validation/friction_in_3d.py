@@ -26,12 +26,12 @@ from finger3d.analyses.optimise.gauge_search import Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
+from ._press import fig9_finger
 from ._rows import Result, Row, at_least, at_most, columns
 
 Domain = Literal["solid", "plane-strain"]
@@ -55,15 +55,14 @@ Spread = dict[tuple[Domain, str, str, str], Float]
 
 def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
     """Return the finger without readings."""
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    found = Model(design, Isotropic(1.0, 0.49), MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),), domain=domain)
+    mesh, legs = MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),)
+    found = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, domain=domain)
     return LargeDeformation().apply(found) if large else found
 
 
 def run(quick: bool) -> Result:
     """Quick: the section in small strain, with one and two gauges."""
-    spread: Spread = {}
-    placed: list[tuple[Any, ...]] = []
+    spread, placed = {}, []
     for domain, sizes in (QUICK if quick else SIZES).items():
         for measure in (SMALL,) if quick else (SMALL, LARGE):
             large = measure == LARGE

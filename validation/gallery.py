@@ -15,7 +15,6 @@ and the soft ball with Hertz's solution for both moduli and both radii (1.3).  F
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,7 @@ from finger3d.mechanics.results.history import measure
 from finger3d.scene import load
 
 from . import _layer
+from ._press import changed
 from ._rows import Result, Row, exact_columns
 
 SCENES = Path(__file__).resolve().parents[1] / "geometries"
@@ -64,7 +64,7 @@ def force(problem: Problem, frames: list[Any]) -> float:
 
 def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[float, float]:
     """Force without friction over Hertz's at the same contact radius, and that radius (mm), at the end."""
-    smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    smooth = changed(problem, friction=Coulomb(0.0))
     f = _marched(smooth)[-1].state.force[:, 0]
     square = problem.surface.average @ np.sum(problem.surface.samples[:, [0, 2]] ** 2, axis=1)
     a = float(np.sqrt(2.5 * (f @ square[problem.symmetry.image_of]) / f.sum()))
@@ -73,10 +73,7 @@ def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[fl
 
 def run(quick: bool) -> Result:
     """Every scene on two meshes; two of them against theory."""
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, tuple[Float, Float]] = {}
-    round_ones: dict[str, Problem] = {}
+    rows, table, curves, round_ones = [], [], {}, {}
     for name in ("edge", "wavy_plate") if quick else SIZES:
         size = SIZES[name] * (2.0 if quick else 1.0)
         own = pressed(name, f"mesh.size_mm={size:g}")

@@ -20,11 +20,11 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import contact_table, measure
 from finger3d.objects import MeshObject
 
+from ._press import converged
 from ._rows import Result, at_least, zero
 
 TEETH, DEPTH = 24, 1.0
@@ -50,8 +50,7 @@ def pressed(degrees: float, size: float) -> dict[str, float]:
         domain="plane-strain", symmetry=(),
     )  # fmt: skip
     problem = build(model)
-    *_, last = march(problem)
-    assert last.outcome.ok, last.outcome
+    last = converged(problem)[-1]
     found, table = measure(problem.points, last), contact_table(problem.points, last.state)
     lowest = np.array([obj.x_mm, problem.system.first_contact_mm - DEPTH])
     axis = lowest + up

@@ -33,10 +33,7 @@ SHARE = 0.03
 FITS = 0.05
 """Largest distance from a force, relative, of a model that is said to fit."""
 C10, CCX_NU = 0.0725, 0.475
-LAWS: dict[str, dict[str, Any]] = {
-    "neo-Hookean": {},
-    "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02},
-}
+LAWS: dict[str, dict[str, Any]] = {"neo-Hookean": {}, "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02}}
 MUS, NUS = (0.02, 0.1, 0.3, 1.0), (0.45, 0.47, 0.49)
 E, ZERO = "material.E_MPa", "depth_offset_mm"
 FREE = {E: (0.05, 3.0), ZERO: (-0.3, 0.3)}

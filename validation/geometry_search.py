@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.geometry.registry import designs
-
-from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 
 RADII = (60.0, 80.0, 100.0, 150.0, 200.0, 300.0)
@@ -35,9 +34,7 @@ def run(quick: bool) -> Result:
     for nu in nus:
         for radius in radii:
             for edge in edges:
-                design = designs()["clipped_cylinder"](
-                    radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=1.0
-                )
+                design = fig9_finger(1.0, radius, edge)
                 problem = fig9(nu, size=size, gauges=line(x, design, BELOW_FIG9), radius=radius, edge=edge)
                 frames = [under(problem, mu, 1)[-1] for mu in MUS]
                 shear = np.array([strains(f, count)[2] for f in frames])

@@ -66,10 +66,7 @@ class Grid:
 def grids(quick: bool) -> tuple[Grid, ...]:
     """The two grids, thinned to what matters most where it must be quick."""
     if quick:
-        return (
-            Grid(2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]),
-            Grid(3, (0.49,), (0.25,), (2,), (10.0,)),
-        )
+        return (Grid(2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]), Grid(3, (0.49,), (0.25,), (2,), (10.0,)))
     return Grid(2, NU, MU, STEPS, SIZES[2]), Grid(3, (0.0, 0.3, 0.49, 0.5), (0.0, 0.25, 1.0, 1e6), (1, 10), SIZES[3])
 
 

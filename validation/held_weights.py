@@ -35,7 +35,6 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -45,6 +44,7 @@ from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press
+from ._press import changed, fig9_finger
 from ._rows import Result, Row, at_least, at_most, columns, zero
 
 DEPTH, STEPS, DEVIATIONS, LIMIT = 10.0, 4, 3.0, 0.1
@@ -85,10 +85,9 @@ class Lift:
 
 def model(domain: Domain, size: float) -> Model:
     """The finger of docs/tutorials/hold.py."""
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
     mesh = MeshOptions(size, 4.0 * size, "swept")
-    return Model(design, Isotropic(1.0, 0.49), mesh, (Leg(DEPTH),), gauges=gauges, domain=domain)
+    return Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(DEPTH),), gauges=gauges, domain=domain)
 
 
 def held(domain: Domain, size: float) -> Problem:
@@ -99,7 +98,7 @@ def held(domain: Domain, size: float) -> Problem:
 
 def pressed(problem: Problem, mu: float, legs: tuple[Leg, ...]) -> list[StepResult]:
     """All increments of a path."""
-    return list(march(replace(problem, model=replace(problem.model, friction=Coulomb(mu), legs=legs))))
+    return list(march(changed(problem, friction=Coulomb(mu), legs=legs)))
 
 
 def lifting(normal: float, load: float) -> tuple[Leg, Leg]:

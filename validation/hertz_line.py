@@ -115,10 +115,7 @@ def solid(count: int, nu: float) -> float:
 def run(quick: bool) -> Result:
     """Sections of three sizes and more; one solid with held ends."""
     counts = (8, 16, 32) if quick else (10, 20, 40, 80)
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, Float] = {}
-    slopes = []
+    rows, table, curves, slopes = [], [], {}, []
     for domain, nu in CASES:
         if quick and nu == 0.5:
             continue

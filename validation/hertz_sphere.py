@@ -84,9 +84,7 @@ def own_path(nu: float, count: int) -> float:
 def run(quick: bool) -> Result:
     """Quarter blocks of three sizes."""
     cases = {0.3: (3, 4, 5)} if quick else {0.3: (4, 6, 8), 0.5: (4, 6, 8)}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves = {}
+    rows, table, curves = [], [], {}
     for nu, counts in cases.items():
         levels = [measured(nu, n) for n in counts]
         sizes = 1.0 / np.array(counts)

@@ -19,11 +19,11 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, RigidObject, Sphere
 
+from ._press import converged
 from ._rows import Result, Row, exact_columns, zero
 
 DOME, BAR, ANGLE = 20.0, 5.0, math.radians(30.0)
@@ -38,8 +38,7 @@ def pressed(obj: RigidObject, depth: float, size: float, domain: Any) -> tuple[P
     dome = designs()["half_cylinder"](radius_mm=DOME, width_mm=WIDTH)
     mesh = MeshOptions(size, 3.0, "swept")
     problem = build(Model(dome, Isotropic(E, NU), mesh, (Leg(depth, steps=4),), object=obj, domain=domain))
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     found = measure(problem.points, frame)
     return problem, found, found["contact_half_length_mm"] / math.cos(ANGLE)
 

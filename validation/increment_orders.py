@@ -29,8 +29,9 @@ from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Sphere
 
-from ._increments import PlainCoulomb, imbalance, pressed
+from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, fig9
+from ._press import under
 from ._rows import Result, Row, at_least, at_most, columns
 
 COUNTS = (10, 20, 40, 80)
@@ -72,7 +73,7 @@ def presses(quick: bool) -> Iterator[Press]:
 
 def numbers(problem: Problem, mu: float, count: int, plain: bool = False) -> np.ndarray:
     """Values of `NAMES` at the end; the energy balance is NaN where the stored energy is not that of a linear body."""
-    step = pressed(problem, PlainCoulomb(mu) if plain else Coulomb(mu), count)[-1]
+    step = under(problem, PlainCoulomb(mu) if plain else Coulomb(mu), count)[-1]
     found = measure(problem.points, step)
     balance = imbalance(problem, step) if problem.model.is_linear_elastic else np.nan
     return np.array(
@@ -82,9 +83,7 @@ def numbers(problem: Problem, mu: float, count: int, plain: bool = False) -> np.
 
 def run(quick: bool) -> Result:
     """Quick: a section of 2 mm and a solid of 5 mm."""
-    own: dict[str, np.ndarray] = {}
-    plain: dict[str, np.ndarray] = {}
-    lines = []
+    own, plain, lines = {}, {}, []
     for press in presses(quick):
         problem = build(press.model)
         exact = numbers(problem, press.mu, press.finest)

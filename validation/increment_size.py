@@ -19,8 +19,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.results.history import StepResult
 
 from ._exact_path import exact_press
-from ._increments import PlainCoulomb, pressed
+from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
+from ._press import changed, under
 from ._rows import Result, Row, at_least, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
@@ -39,7 +40,7 @@ def run(quick: bool) -> Result:
     for plane, nu in CASES:
         problem = half_cylinder(nu, plane, size, gauges)
         for count in (PATH, *counts):
-            frame = pressed(problem, PlainCoulomb(0.25), count)[-1] if count else _exact(problem)
+            frame = under(problem, PlainCoulomb(0.25), count)[-1] if count else _exact(problem)
             profile = Profile.of(problem, frame)
             friction = float(np.abs(profile.q) @ profile.area)
             shear = float(np.abs(strains(frame, len(x))[2]).max())
@@ -54,7 +55,7 @@ def run(quick: bool) -> Result:
 def _exact(problem: Problem) -> StepResult:
     """The end of the exact path."""
     legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
-    return exact_press(replace(problem, model=replace(problem.model, friction=Coulomb(0.25), legs=legs)))[-1]
+    return exact_press(changed(problem, friction=Coulomb(0.25), legs=legs))[-1]
 
 
 def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: list[int]) -> list[Row]:
@@ -70,10 +71,7 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
     rate = float(np.log(off[5][3] / off[counts[-1]][3]) / np.log(counts[-1] / 5))
     what = f"rate at which the dissipation settles, 5 to {counts[-1]} increments, {here}"
     reason = "about 1; c moves from point to point"
-    return [
-        *rows,
-        at_least(what, "first order at least", 0.8, rate, reason, "sensitivity"),
-    ]
+    return [*rows, at_least(what, "first order at least", 0.8, rate, reason, "sensitivity")]
 
 
 def _draw(figure: Any, found: dict[Any, np.ndarray], counts: list[int]) -> None:

@@ -78,8 +78,7 @@ def errors(dim: int, count: int, nu: float, plane_stress: bool) -> tuple[float, 
 def run(quick: bool) -> Result:
     """Three sizes and more of the section, three of the slice."""
     counts = {2: (4, 8, 16), 3: (2, 4, 8)} if quick else {2: (8, 16, 32, 64), 3: (4, 8, 16)}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     curves: dict[int, dict[str, Float]] = {2: {}, 3: {}}
     for dim in (2, 3):
         slopes = []

@@ -24,14 +24,13 @@ from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 
+from ._press import changed, converged, fig9_finger
 from ._rows import Result, Row, at_least, exact_columns, zero
 
 RADIUS, E, NU, MU = 100.0, 1.0, 0.45, 0.25
@@ -73,9 +72,8 @@ class Sliding:
 
 def model(width: float, size: float) -> Model:
     """The finger of Fig. 9 with another width."""
-    design = designs()["clipped_cylinder"](radius_mm=RADIUS, half_length_mm=50.0, edge_height_mm=36.6, width_mm=width)
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=5.0, slide_z_mm=5.0, turn_y=1.0))
-    return Model(design, Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
+    return Model(fig9_finger(width), Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
 
 
 def centres(problem: Problem, width: float, across: tuple[float, ...]) -> list[float]:
@@ -100,8 +98,7 @@ def slid(problem: Problem, centre: float, steps: int) -> Sliding:
 
 
 def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -> StepResult:
-    frames = list(march(replace(problem, model=replace(problem.model, legs=legs, object=plane or Plane()))))
-    assert all(frame.outcome.ok for frame in frames)
+    frames = converged(changed(problem, legs=legs, object=plane or Plane()))
     return frames[-1]
 
 
@@ -151,8 +148,7 @@ def run(quick: bool) -> Result:
     """The limit surface at two widths, and the largest torque at others."""
     size, steps = (4.0, 40) if quick else (3.0, 100)
     across = ACROSS[::3] if quick else ACROSS
-    rows: list[Row] = []
-    table: list[tuple[float, ...]] = []
+    rows, table = [], []
     for width in (20.0, 40.0):
         problem = build(model(width, size))
         found = [slid(problem, c, steps) for c in centres(problem, width, across)]

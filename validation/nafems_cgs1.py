@@ -100,8 +100,7 @@ def run(quick: bool) -> Result:
     loads = FORCE * np.linspace(0.7, 1.0, 8)
     hertz = [float(np.sqrt(4.0 * load * R / (np.pi * MODULUS))) for load in loads]
     a, p0 = hertz[-1], 2.0 * FORCE / (np.pi * hertz[-1])
-    table: list[tuple[Any, ...]] = []
-    levels = []
+    table, levels = [], []
     for n in counts:
         both = pair(n)
         x = both.surface.points[:, 0]

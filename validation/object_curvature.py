@@ -22,14 +22,13 @@ from scipy.optimize import brentq
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, RigidObject
 
+from ._press import converged, fig9_finger
 from ._rows import Result, Row, at_least
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
@@ -40,9 +39,8 @@ HALVED = "the same with edges twice as long"
 
 def finger(obj: RigidObject, size: float, solid: bool = False) -> Problem:
     """The Fig. 9 finger under an object, deep enough for the force on any of them."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     model = Model(
-        body, Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
+        fig9_finger(), Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
         gauges=(GAUGE,), domain="solid" if solid else "plane-strain",
     )  # fmt: skip
     return build(model)
@@ -53,8 +51,7 @@ def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, flo
 
     def pressed(depth: float) -> dict[str, Any]:
         model = replace(problem.model, friction=Coulomb(mu), legs=(Leg(depth, steps=steps),))
-        *_, frame = march(replace(problem, model=model))
-        assert frame.outcome.ok
+        frame = converged(replace(problem, model=model))[-1]
         return measure(problem.points, frame)
 
     depth = brentq(lambda d: pressed(d)["normal_force_N"] - FORCE, 2.0, 14.0, rtol=1e-6)

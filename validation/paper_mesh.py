@@ -30,7 +30,8 @@ from finger3d.fem.surface.traces import strain_row
 from finger3d.geometry.registry import designs
 from finger3d.meshing.structured.grid import Sizes, rows, triangulate
 
-from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains, under
+from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
+from ._press import under
 from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.45), (STRAIN, 0.49))

@@ -27,8 +27,9 @@ from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult, measure
 
 from ._exact_path import exact_press
-from ._increments import PlainCoulomb, imbalance, pressed
+from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, fig9, half_cylinder
+from ._press import changed, under
 from ._rows import Result, Row, at_least, columns, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
@@ -54,15 +55,14 @@ def run(quick: bool) -> Result:
     sections = {f"Fig. 9, {size:g} mm": fig9(0.49, STRAIN, size, [GAUGE]) for size in sizes}
     if not quick:
         sections[HALF] = half_cylinder(0.3, STRESS, 0.1)
-    errors: dict[tuple[str, float, str, int], dict[str, float]] = {}
-    automatic: list[tuple[Any, ...]] = []
+    errors, automatic = {}, []
     for name, section in sections.items():
         for mu in MUS[1::2] if quick else MUS:
             problem = _under(section, mu, section.model.legs, 1)
             exact = _numbers(problem, exact_press(problem)[-1])
             for kind, law in ((PLAIN, PlainCoulomb(mu)), (OWN, Coulomb(mu))):
                 for count in counts:
-                    errors[name, mu, kind, count] = _errors(exact, _numbers(problem, pressed(problem, law, count)[-1]))
+                    errors[name, mu, kind, count] = _errors(exact, _numbers(problem, under(problem, law, count)[-1]))
             automatic += [(name, mu, *line) for line in _automatic(problem, exact)]
     rows = [row for name, mu in dict.fromkeys(key[:2] for key in errors) for row in _rates(errors, name, mu, counts)]
     rows += _known(automatic)
@@ -77,7 +77,7 @@ def run(quick: bool) -> Result:
 
 def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | str) -> Problem:
     counted: Any = tuple(replace(leg, steps=steps) for leg in legs)  # type: ignore[arg-type]
-    return replace(section, model=replace(section.model, friction=Coulomb(mu), legs=counted))
+    return changed(section, friction=Coulomb(mu), legs=counted)
 
 
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:

@@ -20,7 +20,6 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -28,6 +27,7 @@ from finger3d.mechanics.results.history import measure
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
+from ._press import fig9_finger
 from ._rows import Result, Row, exact_columns, zero
 
 STEPS = 5
@@ -37,9 +37,8 @@ _HALF = "the corners of the base leave an error of order h^1.2; 0.2 % or less me
 
 def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list[dict[str, Any]]:
     """Numbers of every increment."""
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
-    problem = build(Model(finger, Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
+    problem = build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
     frames = list(march(problem))
     if len(frames) < STEPS or not frames[-1].outcome.ok:
         return [{"normal_force_N": np.nan, "friction_sum_N": np.nan}] * STEPS
@@ -55,9 +54,7 @@ def run(quick: bool) -> Result:
     """Sections and held solids of three sizes and more, mirror images, two meshers."""
     flat = (4.0, 2.0, 1.0) if quick else (4.0, 2.0, 1.0, 0.5, 0.25)
     deep = (8.0, 6.0, 4.0) if quick else (8.0, 4.0, 2.0)
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[float, dict[str, tuple[Float, Float]]] = {}
+    rows, table, curves = [], [], {}
     for nu in (0.3, 0.49):
         theory = 2.0 * clamped_free(np.pi / 2, nu)
         sections = [forces(s, nu, domain="plane-strain") for s in flat]

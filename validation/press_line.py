@@ -83,13 +83,9 @@ def run(quick: bool) -> Result:
     meshes = (10, 14, 20) if quick else (10, 20, 40)
     finest, most = meshes[-1], 50 if quick else 200
     counts = [n for n in STEPS if n <= most]
-    rows: list[Row] = []
-    table: list[tuple[float, ...]] = []
-    curves: dict[float, Profile] = {}
+    rows, table, curves = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.0):
-        at: dict[tuple[float, int, float, int], np.ndarray] = {}
-        plain: dict[tuple[float, int, float, int], np.ndarray] = {}
-        c_last, c_own = dict[Any, float](), dict[Any, float]()
+        at, plain, c_last, c_own = {}, {}, {}, {}
         for height, points in [(HEIGHTS[0], finest), *((HEIGHTS[1], n) for n in meshes)]:
             problem = line(nu, points, loading(1), height)
             if height == HEIGHTS[1] and not quick:

@@ -74,8 +74,7 @@ def run(quick: bool) -> Result:
     """Cylinder: 10, 20, 40 points to a, 100 to 400 increments each way; ball: 6 points to a."""
     counts = (25, 50, 100) if quick else (100, 200, 400)
     meshes = (10, 20) if quick else (10, 20, 40)
-    table, rows = [], []
-    drops = {}
+    table, rows, drops = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.0):
         for points in meshes:
             problem = line(nu, points, loading(1))

@@ -47,9 +47,7 @@ def depths(count: int) -> list[float]:
 def run(quick: bool) -> Result:
     """Rings a/80 wide under 200 increments; tets of a/4, a/7, a/10 under 40."""
     rings, many, meshes = (40, 50, (5,)) if quick else (80, 200, (4, 7, 10))
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    found: dict[tuple[str, float, float, int, int], np.ndarray] = {}
+    rows, table, found = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.0):
         body = _rings.rings(nu, round(1.1 * rings), round(1.1 * rings) / rings)
         cases = [(0.25, 40), (0.25, 50), (0.25, many), (1e6, many)]

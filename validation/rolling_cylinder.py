@@ -32,11 +32,11 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import frictional_dissipation
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
+from ._press import changed, converged
 from ._rows import Result, Row, at_most, exact_columns, zero
 
 R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
@@ -89,8 +89,7 @@ def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -
 
 def pressed(problem: Problem) -> State[Any]:
     """The state after the press."""
-    *_, frame = march(replace(problem, model=replace(problem.model, legs=problem.model.legs[:1])))
-    assert frame.outcome.ok
+    frame = converged(changed(problem, legs=problem.model.legs[:1]))[-1]
     return frame.meshed_state
 
 
@@ -174,8 +173,7 @@ def _by_legs(problem: Problem) -> list[Row]:
     way, steps = 0.4, 8
     angles = [-way * k / steps / R for k in range(1, steps + 1)]
     path = [Leg(DEPTH - R * (1.0 - math.cos(t)), R * (math.sin(t) - t), turn_z=t, steps=1) for t in angles]
-    *_, frame = march(replace(problem, model=replace(problem.model, legs=(*problem.model.legs[:1], *path))))
-    assert frame.outcome.ok
+    frame = converged(changed(problem, legs=(*problem.model.legs[:1], *path)))[-1]
     one = travel(problem, pressed(problem), way, -way / R, steps)
     legs = sums(problem, frame.meshed_state, BEGIN + way)
     away = max(abs(legs[0] - one.normal[-1]), abs(legs[1] - one.tangential[-1]), abs(legs[-1] - one.torque[-1]) / R)
@@ -188,8 +186,8 @@ def _by_legs(problem: Problem) -> list[Row]:
 def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
     """Torque and force of turning, sliding and rolling."""
     mu, way = 0.3, 0.6
-    rough = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
-    smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    rough = changed(problem, friction=Coulomb(mu))
+    smooth = changed(problem, friction=Coulomb(0.0))
     start = pressed(rough)
     turned, slid = travel(rough, start, 0.0, -way / R, steps), travel(rough, start, way, 0.0, steps)
     rolled = travel(rough, start, way, -way / R, steps)

@@ -21,11 +21,11 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 
+from ._press import converged
 from ._rows import Result, zero
 from .triangulated_objects import ball
 
@@ -73,8 +73,7 @@ def pressed(obj: RigidObject, domain: Domain) -> Model:
 def wrench(model: Model) -> Float:
     """Force (N) and moment (N mm) on the finger at the end."""
     problem = build(model)
-    *_, last = march(problem)
-    assert last.outcome.ok, last.outcome
+    last = converged(problem)[-1]
     found = measure(problem.points, last)
     return np.array([found[name] for name in WRENCH])
 

@@ -26,11 +26,11 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
+from ._press import fig9_finger
 from ._rows import Result, Row, at_most, columns
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
@@ -85,10 +85,9 @@ Curves = dict[tuple[str, float, float], Curve]
 def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     """Return the strain of the gauge over mu on a mesh."""
     domain, mesher, growth = CASES[case]
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh = MeshOptions(size, growth * size, mesher, gauge_refinement=refinement)
     gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
-    model = Model(design, Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
+    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
     problem = build(model)
     strain = []
     near: Sequence[Float] = ()

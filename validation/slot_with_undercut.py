@@ -19,11 +19,11 @@ from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.objects import MeshObject
 
+from ._press import converged
 from ._rows import Result, Row, at_least, at_most, zero
 
 E, NU = 1.0, 0.3
@@ -62,8 +62,7 @@ def confined(size: float) -> tuple[float, float, float]:
     depth, strip = 0.3, 0.02
     problem = build(model(slot(2.0 * HALF + 2e-5, 2.0 * HALF + 2e-5, HEIGHT - depth - strip), size,
                           (Leg(depth, steps=1),), 0.0))  # fmt: skip
-    *_, last = march(problem)
-    assert last.outcome.ok, last.outcome
+    last = converged(problem)[-1]
     pressure, face = last.state.force[:, 0] / problem.points.area, problem.points.face
     middle = (face == WALLS) & (np.abs(problem.points.points[:, 1] - 0.6 * HEIGHT) < 0.2 * HEIGHT)
     return depth / HEIGHT, float(pressure[face == 0].mean()), float(pressure[middle].mean())
@@ -74,8 +73,7 @@ def slid(size: float) -> dict[str, Any]:
     depth = 0.5
     legs = (Leg(depth, steps=1), Leg(depth, slide_x_mm=0.8, steps=4))
     problem = build(model(slot(2.0 * HALF + 0.6, 2.0 * HALF + 3.0, 4.0, LIP), size, legs, 0.2))
-    steps = list(march(problem))
-    assert all(step.outcome.ok for step in steps), [str(step.outcome) for step in steps]
+    steps = converged(problem)
     last = steps[-1]
     force, at = problem.world_force(last.meshed_state.contact), problem.points.points
     touching = (last.state.status != OPEN) & (problem.points.face == WALLS)

@@ -22,11 +22,11 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult
 
-from ._paper import STRAIN, fig9, said, under
+from ._paper import STRAIN, fig9, said
+from ._press import changed, converged, under
 from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
@@ -61,8 +61,7 @@ Found = dict[tuple[str, str, bool, float], dict[float, Read]]
 
 def run(quick: bool) -> Result:
     """Quick: the section on a coarse mesh with one rate."""
-    found: Found = {}
-    bodies = {}
+    found, bodies = {}, {}
     for name in (STRAIN,) if quick else (STRAIN, WIDE):
         body = fig9(0.49, "solid" if name == WIDE else STRAIN, 3.0 if quick or name == WIDE else 1.0, [GAUGES[name]])
         bodies[name] = body
@@ -110,9 +109,7 @@ def _extended(value: float, x: Float, y: Float) -> float:
 
 def _pressed(problem: Problem, mu: float) -> StepResult:
     """Last frame of a press."""
-    *_, last = march(replace(problem, model=replace(problem.model, friction=Coulomb(mu))))
-    if not last.outcome.ok:
-        raise AssertionError(f"mu = {mu:g}: {last.outcome}")
+    last = converged(changed(problem, friction=Coulomb(mu)))[-1]
     return last
 
 

@@ -26,7 +26,6 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.plotting.calibration import resolution_panel, slope_panel
@@ -35,6 +34,7 @@ from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap
 
 from ._paper import said
+from ._press import fig9_finger
 from ._rows import Result, Row, at_most, columns
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
@@ -53,19 +53,16 @@ Found = dict[tuple[Domain, str], Calibration]
 
 def model(domain: Domain, sizes: tuple[float, float], length: float, quick: bool = False) -> Model:
     """The finger with its gauge, and the mirror image of it."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, length), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, length))
     leg = Leg(10.0, steps=4 if quick else "auto")
-    return Model(body, Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
+    return Model(fig9_finger(), Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
 
 
 def run(quick: bool) -> Result:
     """Quick: coarse meshes, five values of mu, tolerances of one kind only."""
     mus = (0.02, 0.4, 0.5, 0.6, 1.2) if quick else MUS
     wanted = {**STEPS_ALONE, "gauge_angle_deg": 2.0} if quick else None
-    found: Found = {}
-    maps: dict[Domain, StrainMap] = {}
-    rows: list[Row] = []
+    found, maps, rows = {}, {}, []
     for domain, sizes in (QUICK if quick else SIZES).items():
         free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, {"gauge": NOISE}, LIMIT, wanted)
         found[domain, FREE] = free

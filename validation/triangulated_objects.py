@@ -25,12 +25,12 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_touch
 
 from ._common import convergence, rate
+from ._press import converged
 from ._rows import Result, Row, at_least, exact_columns, zero
 
 RADIUS = 6.0
@@ -86,8 +86,7 @@ def pressed(obj: RigidObject, size: float) -> dict[str, Any]:
         friction=Coulomb(0.3),
     )  # fmt: skip
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     return measure(problem.points, frame)
 
 
@@ -95,9 +94,7 @@ def run(quick: bool) -> Result:
     """Two shapes on three fineness levels; distances from a box."""
     levels = (24, 40, 64) if quick else (32, 64, 128, 256)
     size = 1.0 if quick else 0.4
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, list[float]] = {}
+    rows, table, curves = [], [], {}
     dome = designs()["clipped_cylinder"](20.0, 12.0, 3.0, 8.0)
     for name, make, exact in (
         ("ball", ball, Sphere(0.7, 0.4, radius_mm=RADIUS)),

@@ -34,6 +34,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Move, ObjectPose, Sphere
 
+from ._press import changed
 from ._rows import Result, Row, exact_columns, zero
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
@@ -100,10 +101,7 @@ def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, fl
     force = float(state.contact.force[:, 0].sum())
     a = radius_of(force)
     unit = MU * 1.5 * force / (math.pi * a**2) / SHEAR
-    rough, formulation = (
-        replace(problem, model=replace(problem.model, friction=Coulomb(MU))),
-        formulation_of(problem.model),
-    )
+    rough, formulation = (changed(problem, friction=Coulomb(MU)), formulation_of(problem.model))
     place, area, out = problem.surface.centroids, problem.surface.area, []
     for share in shares:
         end = ObjectPose(DEPTH, turn_y=unit * turn_of(share))

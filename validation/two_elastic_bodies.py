@@ -29,7 +29,6 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.elastic_object import ObjectBody
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, vertical_frame
@@ -37,6 +36,7 @@ from finger3d.progress import QUIET
 
 from ._common import held_at, solve
 from ._halfplane import Profile, under
+from ._press import converged
 from ._rows import Result, Row, exact_columns, zero
 
 SPENCE = "Spence 1975 with Dundurs' beta; REFERENCES.md, 1.3 and 2.1"
@@ -84,10 +84,7 @@ def numbers(profiles: list[Profile], pair: Any, size: float) -> np.ndarray:
 def run(quick: bool) -> Result:
     """Pairs at two thicknesses; who is the finger; NAFEMS CGS-1."""
     points, steps = (8, 14) if quick else (30, 200)
-    rows: list[Row] = []
-    found: dict[str, np.ndarray] = {}
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, Profile] = {}
+    rows, found, table, curves = [], {}, [], {}
     for name, pair in PAIRS.items():
         mu = 0.0 if name == "unlike" else 0.25
         at = []
@@ -132,8 +129,7 @@ def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: fl
 
 def _last(model: Model) -> dict[str, Any]:
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     return measure(problem.points, frame)
 
 
@@ -149,12 +145,7 @@ def _mirror_rows() -> list[Row]:
     return [
         zero(what, "symmetry", share, 1e-4, "an arc on quadratic facets"),
         Row(
-            "their force over that on a smooth plane at half the depth",
-            "symmetry",
-            1.0,
-            plane,
-            1e-5,
-            "chords for arcs",
+            "their force over that on a smooth plane at half the depth", "symmetry", 1.0, plane, 1e-5, "chords for arcs"
         ),
         Row(
             "force with E2 = 1e12 E1 over that of a rigid object", "a rigid object", 1.0, limit, 1e-9, "stiffness ratio"
@@ -184,8 +175,7 @@ def _third_law_rows() -> list[Row]:
     model = Effect(*pair[1]).apply(_half(*pair[0], 0.15, Cylinder(0.4, radius_mm=5.0), 0.8, **block))
     model = replace(model, legs=(Leg(0.8, steps=3), Leg(0.8, slide_x_mm=0.1, steps=2)))
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
     other = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh().mesh

@@ -20,10 +20,10 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import MeshObject
 
+from ._press import converged
 from ._rows import Result, Row, at_most, zero
 
 DOME, WIDTH, E, NU, DEPTH = 10.0, 2.0, 1.0, 0.3, 0.1
@@ -63,8 +63,7 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
     problem = build(
         Model(dome, Isotropic(E, NU), mesh, (Leg(DEPTH, steps=2),), object=obj, domain="plane-strain", symmetry=())
     )
-    *_, last = march(problem)
-    assert last.outcome.ok, last.outcome
+    last = converged(problem)[-1]
     force, at = problem.world_force(last.meshed_state.contact)[:, :2], problem.points.points[:, :2]
     found: dict[str, list[float]] = {"force_N": [], "half_width_mm": [], "off_axis_mm": []}
     for normal in normals_of(angles):
@@ -90,8 +89,7 @@ def cube_corner(size: float) -> Float:
     block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
     mesh = MeshOptions(size, 1.5, "swept")
     problem = build(Model(block, Isotropic(E, NU), mesh, (Leg(CORNER_DEPTH, steps=3),), object=turned))
-    *_, last = march(problem)
-    assert last.outcome.ok, last.outcome
+    last = converged(problem)[-1]
     axes = problem.placed(last.target).turned.T
     down = -axes * np.sign(axes[:, 1])[:, None]  # the normals of the three faces that look down
     return np.asarray(down @ problem.world_force(last.meshed_state.contact).sum(axis=0))

@@ -30,6 +30,7 @@ from finger3d.mechanics.path import stations
 
 from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, fig9, said
+from ._press import changed
 from ._rows import Result, Row, at_least, at_most, columns
 
 WIDE = "20 mm wide"
@@ -75,7 +76,7 @@ def run(quick: bool) -> Result:
         problem = fig9(nu, "solid" if model == WIDE else model, size)
         for mu in MUS[1:4:2] if quick else MUS:
             for path, legs in PATHS.items():
-                case = replace(problem, model=replace(problem.model, friction=PlainCoulomb(mu), legs=legs))
+                case = changed(problem, friction=PlainCoulomb(mu), legs=legs)
                 start = Searched(model, nu, mu, path, case.coupling())
                 found.append(_search(case, start, 5 if quick else STARTS[model], random))
     rows = [*_rows(found), *_one_point(random, 10 if quick else 100)]

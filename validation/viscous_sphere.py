@@ -259,8 +259,7 @@ def run(quick: bool) -> Result:
     """Rings a/100 wide under 100 steps a second; tets of a/4, a/7, a/10 under 20."""
     count, per_second, meshes = (40, 20, (3,)) if quick else (100, 100, (4, 7, 10))
     viscous = Viscoelastic(Relaxation(PRONY, True))
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     body = on_rings(0.3, count)
     k = 4.0 / 3.0 / (1.0 - 0.3**2) * np.sqrt(RADIUS) * DEPTH**1.5
     held, release = long_hold(per_second), ramp_hold_release(per_second)

@@ -157,35 +157,18 @@ def full_contact(count: int) -> float:
 def run(quick: bool) -> Result:
     """Three sizes of each."""
     studies: dict[str, tuple[Any, tuple[int, ...], str, str]] = {
-        "wedge, plane strain": (
-            wedge,
-            (5, 10, 20) if quick else (5, 10, 20, 40),
-            _JOHNSON,
-            _ONE,
-        ),
+        "wedge, plane strain": (wedge, (5, 10, 20) if quick else (5, 10, 20, 40), _JOHNSON, _ONE),
         "cone, 3D": (
             lambda n: cone(n, 2.2 if quick else 1.6),
             (3, 4, 5) if quick else (4, 6, 8),
             "Sneddon 1965; REFERENCES.md, 1.4",
             _ONE,
         ),
-        "wave, plane strain": (
-            lambda n: wave(n, 2),
-            (10, 20, 40) if quick else (20, 40, 80),
-            _WESTERGAARD,
-            _WAVE,
-        ),
-        "wave, 3D with held faces": (
-            lambda n: wave(n, 3),
-            (6, 10, 14) if quick else (10, 20, 40),
-            _WESTERGAARD,
-            _WAVE,
-        ),
+        "wave, plane strain": (lambda n: wave(n, 2), (10, 20, 40) if quick else (20, 40, 80), _WESTERGAARD, _WAVE),
+        "wave, 3D with held faces": (lambda n: wave(n, 3), (6, 10, 14) if quick else (10, 20, 40), _WESTERGAARD, _WAVE),
     }
     edges = {"wedge, plane strain": 0.5, "wave, plane strain": 1.0}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves = {}
+    rows, table, curves = [], [], {}
     for name, (measure, counts, source, reason) in studies.items():
         levels = [measure(n) for n in counts]
         sizes = 1.0 / np.array(counts)

@@ -17,14 +17,14 @@ from finger3d._types import Float
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
 from . import fig03_forces, fig04_zones, fig05_strains_depth, fig06_forces_mu, fig07_strains_mu, fig12_gauge_angles
-from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains, under
+from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 
 NU, COUNT = 0.49, 25
@@ -73,9 +73,9 @@ class Pressed:
 def run(quick: bool) -> Result:
     """Quick: a coarse mesh and few increments."""
     x = np.linspace(0.0, 48.0, COUNT)
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     size = 6.0 if quick else 2.5
-    small = fig9(NU, "solid", size if quick else 1.5, [*line(x, design, BELOW_FIG9), *fig12_gauge_angles.gauges()])
+    gauges = [*line(x, fig9_finger(), BELOW_FIG9), *fig12_gauge_angles.gauges()]
+    small = fig9(NU, "solid", size if quick else 1.5, gauges)
     mesh = MeshOptions(size, 3.0 * size, "swept")
     large = build(LargeDeformation().apply(replace(small.model, mesh=mesh)))
     found, rows, lines = {}, [], []
