@@ -30,7 +30,6 @@ from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.generate import mesh_solid
@@ -39,7 +38,7 @@ from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
-from ._press import changed, fig9_finger
+from ._press import changed, converged, fig9_finger
 
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
@@ -195,10 +194,7 @@ def condensed(parts: Parts, solver: str | None = None) -> Problem:
 def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:
     """Frames of a press in so many increments."""
     legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
-    frames = list(march(changed(problem, legs=legs), workspace=workspace))
-    if not frames[-1].outcome.ok:
-        raise ArithmeticError(f"{count} increments, {frames[-1].target}: {frames[-1].outcome}")
-    return frames
+    return converged(changed(problem, legs=legs), workspace)
 
 
 def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.results.history import StepResult
 
@@ -25,7 +30,7 @@ def changed(problem: Problem, **fields: Any) -> Problem:
     return replace(problem, model=replace(problem.model, **fields))
 
 
-def converged(problem: Problem) -> list[StepResult]:
+def converged(problem: Problem, workspace: Workspace | None = None) -> list[StepResult]:
     """Return the increments of a press.
 
     Raises
@@ -33,7 +38,7 @@ def converged(problem: Problem) -> list[StepResult]:
     AssertionError
         If one of them does not converge.
     """
-    steps = list(march(problem))
+    steps = list(march(problem, workspace=workspace))
     if not steps[-1].outcome.ok:
         raise AssertionError(f"mu = {problem.model.friction.mu:g}, {steps[-1].target}: {steps[-1].outcome}")
     return steps
@@ -44,3 +49,17 @@ def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = N
     law = Coulomb(friction) if isinstance(friction, int | float) else friction
     legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
     return converged(changed(problem, friction=law, legs=legs))
+
+
+@contextmanager
+def empty_mesh_cache() -> Iterator[None]:
+    """Keep meshes in a folder of their own for a while, so that each is made anew once."""
+    before = os.environ.get("FINGER3D_CACHE")
+    with TemporaryDirectory(prefix="finger3d_meshes_") as folder:
+        os.environ["FINGER3D_CACHE"] = folder
+        try:
+            yield
+        finally:
+            del os.environ["FINGER3D_CACHE"]
+            if before is not None:
+                os.environ["FINGER3D_CACHE"] = before

@@ -14,8 +14,6 @@ of the load converges as h^(2 e).  A section under a plane has no increments; el
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from typing import Any
@@ -32,6 +30,7 @@ from ._cost_extrapolated import EMPTY, at, constant, extrapolate, memory_mb, rat
 from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
+from ._press import empty_mesh_cache
 from ._rows import Result, Row, at_least, at_most, zero
 
 BY_NAME = True
@@ -119,20 +118,10 @@ def run(quick: bool) -> Result:
     made = {body: groups(body, quick) for body in bodies}
     cases = list(dict.fromkeys(c for g in made.values() for cs in g.values() for c in cs))
     cases += [c for c in map(default, bodies) if c not in cases and not quick]
-    with tempfile.TemporaryDirectory(prefix="finger3d_cost_") as cache:
-        # pytetwild meshes are made here, once, and their time counts
-        kept = os.environ.get("FINGER3D_CACHE")
-        os.environ["FINGER3D_CACHE"] = cache
-        try:
-            with Bench(MODULE) as bench:
-                runs = best_of(
-                    bench, "measured", cases, lambda s: 1 if quick else 3 if s < 1.5 else 2 if s < 4.0 else 1
-                )
-                plain, floats = _others(bench, made, quick)
-        finally:
-            os.environ.pop("FINGER3D_CACHE")
-            if kept is not None:
-                os.environ["FINGER3D_CACHE"] = kept
+    # pytetwild meshes are made here, once, and their time counts
+    with empty_mesh_cache(), Bench(MODULE) as bench:
+        runs = best_of(bench, "measured", cases, lambda s: 1 if quick else 3 if s < 1.5 else 2 if s < 4.0 else 1)
+        plain, floats = _others(bench, made, quick)
     return _judged(made, runs, plain, floats, quick)
 
 

@@ -7,10 +7,8 @@ netgen's with half of them.
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +21,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.scene import parse
 
+from ._press import empty_mesh_cache
 from ._rows import Result, Row, at_least, at_most, columns, zero
 
 MESHERS = ("ftetwild", "netgen")
@@ -103,15 +102,15 @@ def run(quick: bool) -> Result:
             if quick and name != "STEP":
                 continue
             fine = Body(SMALL, body.depth, body.sizes, body.gauge, {}) if name == "STEP" else body
-            truth = _pressed(fine.scene("netgen" if name == "hemisphere" else "swept", 0.5), Path(folder) / "truth")[1]
-            found += [_meshed(name, body, mesher, truth, Path(folder)) for mesher in MESHERS]
+            truth = _pressed(fine.scene("netgen" if name == "hemisphere" else "swept", 0.5))[1]
+            found += [_meshed(name, body, mesher, truth) for mesher in MESHERS]
     lines = [tuple(vars(m).values()) for m in found]
     names = "body mesher cells seconds different_meshes min_dihedral_deg volume_error force_error gauge_error"
     return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
 
 
-def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float], folder: Path) -> Meshed:
-    runs = [_pressed(body.scene(mesher), folder / f"{name}-{mesher}-{i}", press=i == 0) for i in range(3)]
+def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float]) -> Meshed:
+    runs = [_pressed(body.scene(mesher), press=i == 0) for i in range(3)]
     report, numbers = runs[0]
     error = {key: abs(numbers[key] / truth[key] - 1.0) for key in ("normal_force_N", "gauge_g")}
     return Meshed(
@@ -127,25 +126,11 @@ def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float], folder:
     )
 
 
-def _pressed(scene: Any, cache: Path, press: bool = True) -> tuple[Any, dict[str, float]]:
+def _pressed(scene: Any, press: bool = True) -> tuple[Any, dict[str, float]]:
     """Return the report on the mesh, made anew, and the numbers after the press."""
-    with _mesh_cache(cache):
+    with empty_mesh_cache():
         problem = build(scene.model())
     return problem.body.report, press_numbers(problem, list(march(problem))[-1]) if press else {}
-
-
-@contextmanager
-def _mesh_cache(folder: Path) -> Iterator[None]:
-    """Keep meshes in a folder for a while."""
-    before = os.environ.get("FINGER3D_CACHE")
-    os.environ["FINGER3D_CACHE"] = str(folder)
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["FINGER3D_CACHE"]
-        else:
-            os.environ["FINGER3D_CACHE"] = before
 
 
 def _rows(found: list[Meshed]) -> Iterator[Row]:
