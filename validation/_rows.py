@@ -137,6 +137,29 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
+def together(size: tuple[float, float], **parts: Result) -> Result:
+    """Return the result of a study of several parts: their rows, and tables and figures one below the other.
+
+    Parameters
+    ----------
+    size : of the whole figure, inches
+    """
+
+    def draw(figure: Any) -> None:
+        figure.set_size_inches(*size)
+        for part, panel in zip(parts.values(), figure.subfigures(len(parts), 1), strict=True):
+            part.figure(panel)
+
+    lines = [
+        {"part": name, **dict(zip(part.table, line, strict=True))}
+        for name, part in parts.items()
+        for line in zip(*part.table.values(), strict=True)
+    ]
+    names = dict.fromkeys(name for line in lines for name in line)
+    table = {name: [line.get(name, "") for line in lines] for name in names}
+    return Result(tuple(row for part in parts.values() for row in part.rows), table, draw)
+
+
 def number(value: float) -> str:
     """Format a number with five significant digits."""
     if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:

@@ -232,13 +232,14 @@ def draw(figure: Callable[[Any], None], path: Path) -> None:
 
 
 def _finish(figure: Any) -> None:
-    """Add a grid under curves, and legends if the study has drawn none."""
-    has_legend = figure.legends or any(axes.get_legend() for axes in figure.axes)
-    for axes in figure.axes:
-        if axes.lines and not axes.images and all(drawn.get_array() is None for drawn in axes.collections):
-            axes.grid(alpha=0.3)
-        if not has_legend and axes.get_legend_handles_labels()[0]:
-            axes.legend()
+    """Add a grid under curves, and legends to a figure, or a part of one, that has none."""
+    for part in figure.subfigs or (figure,):
+        has_legend = part.legends or any(axes.get_legend() for axes in part.axes)
+        for axes in part.axes:
+            if axes.lines and not axes.images and all(drawn.get_array() is None for drawn in axes.collections):
+                axes.grid(alpha=0.3)
+            if not has_legend and axes.get_legend_handles_labels()[0]:
+                axes.legend()
 
 
 def _place(out: Path, study: Study) -> Path:
