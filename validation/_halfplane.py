@@ -22,7 +22,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
-DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_line
+DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_with_friction
 _CANDIDATES = -0.2  # share of the depth; keeps the points within 2.2 a, which `a` needs beyond the edge
 
 

@@ -31,6 +31,8 @@ from ._rows import Measure, Row
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 NUS = (0.3, 0.45, 0.49)
 STRESS, STRAIN = "plane stress", "plane strain"
+CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
+"""Plane states and Poisson's ratios of the half cylinder."""
 BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
 PAPER = "Maeno 2004"
 

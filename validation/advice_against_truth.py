@@ -158,7 +158,7 @@ def run(quick: bool) -> Result:
 def _estimated(found: list[Judged], pressed: int) -> Row:
     share = len({j.scene for j in found if j.by == LARGE}) / pressed
     return at_least(f"share of {pressed} scenes whose change by large deformation was estimated", CLAIM, SHARE, share,
-               "the others have small strains, or a coarse press of them fails")  # fmt: skip
+                    "the others have small strains, or a coarse press of them fails")  # fmt: skip
 
 
 def _rows(found: list[Judged], what: str) -> Iterator[Row]:

@@ -146,10 +146,10 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
                 yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
             yield at_least(f"share of 90 % sets that contain the true mu: {what}", "mu drawn evenly", 0.9, share,
-                      "systematic errors are stated by their size, so more may be covered", "statement")  # fmt: skip
+                           "systematic errors are stated by their size, so more may be covered", "statement")  # fmt: skip
             worst = float(np.abs([r.z_without for r in some]).max())
             yield at_least(f"largest z of the strain without the tolerance of the increments: {what}", "no reference",
-                      3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
+                           3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
 
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
@@ -171,9 +171,9 @@ def _compared(nu: float, size: float) -> Row:
     off = np.array([np.abs(strains[b] - strains[640]) for b in LEVELS[1:]])
     big = off > 0.1 * NOISE
     return at_least(
-               "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
-               "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), "nine in ten",
-               "statement")  # fmt: skip
+        "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
+        "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), "nine in ten",
+        "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Reading]) -> None:

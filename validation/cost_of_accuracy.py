@@ -200,7 +200,7 @@ def _extrapolation_rows(
     if ratios:
         what = f"error extrapolated to the finest mesh over that found there, median of {len(ratios)}"
         yield at_most(what, "no error is larger than its law", 3.0, float(np.median(ratios)),
-                  "errors of coarser meshes scatter, and the largest counts", "sensitivity")  # fmt: skip
+                      "errors of coarser meshes scatter, and the largest counts", "sensitivity")  # fmt: skip
     for body, series in made.items():
         *coarser, finest = (runs[c] for c in series[BEST[body]])
         dofs, peaks = ([run[key] for run in coarser] for key in ("dofs", "peak_MB"))
@@ -250,7 +250,7 @@ def _solver_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
             worst = max(worst, *(abs(value(runs[case], k) / value(own, k) - 1.0) for k in keys))
         why = "round-off of two factorisations" if limit == 1e-9 else "a step may stop at a residual of 1e-8"
         yield zero(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", worst,
-                  limit, why)  # fmt: skip
+                   limit, why)  # fmt: skip
 
 
 def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -310,9 +310,9 @@ def _float_rows(floats: Runs) -> Iterator[Row]:
     for case, found in floats.items():
         here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
         yield zero(f"largest change of force, friction sum and strain, {here}", "double precision", found["change"],
-                  1e-5, "its last digit is 6e-8", "sensitivity")  # fmt: skip
+                   1e-5, "its last digit is 6e-8", "sensitivity")  # fmt: skip
         yield at_least(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
-                  found["residual"], "less than a digit below that, which is too close", "sensitivity")  # fmt: skip
+                       found["residual"], "less than a digit below that, which is too close", "sensitivity")  # fmt: skip
 
 
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:

@@ -192,15 +192,15 @@ def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[
     ratios = [line["creep_mm_per_min"] / line["formula_mm_per_min"] for line in soft]
     here = "MuJoCo, default settings"
     yield at_most("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours,
-              "a bound above round-off")  # fmt: skip
+                  "a bound above round-off")  # fmt: skip
     yield Row("least grip, finger3d (N)", "m g / (2 mu)", LEAST_GRIP, least, 0.01, "bisection to 1 %")
     yield at_least(f"least grip, {here}: a fall of {FALLS:g} mm in 1 s (N)", "m g / (2 mu)", LEAST_GRIP,
-              default["least_grip_N"], "soft friction creeps before it slips", "sensitivity")  # fmt: skip
+                   default["least_grip_N"], "soft friction creeps before it slips", "sensitivity")  # fmt: skip
     yield at_least(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], "a micron",
-              "sensitivity")  # fmt: skip
+                   "sensitivity")  # fmt: skip
     yield at_most("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}",
-              default["creep_mm_per_min"], abs(noslip["creep_mm_per_min"]), "what it is made for",
-              "sensitivity")  # fmt: skip
+                  default["creep_mm_per_min"], abs(noslip["creep_mm_per_min"]), "what it is made for",
+                  "sensitivity")  # fmt: skip
     yield Row(f"creep of MuJoCo over v = R f / b, models without noslip: {len(soft)}, furthest from 1", DOCS, 1.0,
               max(ratios, key=lambda ratio: abs(ratio - 1.0)), 0.01,
               "overlap and load of all contacts are equal")  # fmt: skip
@@ -208,7 +208,7 @@ def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[
     if steps:
         away = max(abs(creep / default["creep_mm_per_min"] - 1.0) for creep in steps)
         yield zero("change of that creep with time steps of 0.5, 1 and 4 ms, largest", f"{DOCS}: none", away, 1e-3,
-                  "the formula has no time step", "sensitivity")  # fmt: skip
+                   "the formula has no time step", "sensitivity")  # fmt: skip
 
 
 def _label(line: tuple[Any, ...]) -> str:

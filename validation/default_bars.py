@@ -106,11 +106,11 @@ def _rows(found: list[Number], named: set[str]) -> Iterator[Row]:
         if some:
             share = float(np.mean([n.relative > QUARTER for n in some]))
             yield at_most(f"share of {len(some)} numbers with a bar above a quarter, {what}", "goal of this project",
-                      SHARE, share, "one in twenty", "statement")  # fmt: skip
+                          SHARE, share, "one in twenty", "statement")  # fmt: skip
     for n in found:
         if n.scene == "fig9" and n.name in FIG9:
             yield at_most(f"bar over {n.name}, fig9", "goal of this project", FIG9[n.name], n.relative, "of use",
-                      "statement")  # fmt: skip
+                          "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Number]) -> None:

@@ -282,16 +282,16 @@ def _rows(found: list[Compared], failed: int, quick: bool) -> Iterable[Row]:
         "verification" if quick else "statement", "at least",
     )  # fmt: skip
     yield at_least(f"share of {len(shares)} numbers whose truth lies within two total bars of mesh and model", GOAL,
-              COVERED, float(np.mean(np.array(shares) <= 2.0)))  # fmt: skip
+                   COVERED, float(np.mean(np.array(shares) <= 2.0)))  # fmt: skip
     yield at_most(
-              f"time of a press over that without the judgement, median of the {len(ratios)} with the right effects",
-              GOAL, COST, float(np.median(ratios)), kind="statement")  # fmt: skip
+        f"time of a press over that without the judgement, median of the {len(ratios)} with the right effects",
+        GOAL, COST, float(np.median(ratios)), kind="statement")  # fmt: skip
     for effect, label in LABELS.items():
         here = [v for v in verdicts if v.effect == effect]
         missed, idle = (sum(not v.right and v.used == used for v in here) for used in (False, True))
         text = f"{label}: needed in {sum(v.needed for v in here)} of {len(here)} scenes, missed in {missed}"
         yield at_least(f"{text}, used in vain in {idle}; share decided rightly", GOAL, RIGHT,
-                  float(np.mean([v.right for v in here])), "that of the sets", "statement")  # fmt: skip
+                       float(np.mean([v.right for v in here])), "that of the sets", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, verdicts: list[Verdict]) -> None:

@@ -84,21 +84,21 @@ def _plane_rows(quick: bool) -> Iterator[Row]:
     for length in (1.0, 4.0, 10.0):
         want = wing(length, 9.0, 1.0, NU)
         yield Row(
-                  f"read over free, {length:g} mm, plane strain without end", WING, want,
-                  alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
-              )  # fmt: skip
+            f"read over free, {length:g} mm, plane strain without end", WING, want,
+            alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
+        )  # fmt: skip
     fine = [by_mesh(4.0, foil, 1.0, NU, 2, n) for n in ((4, 8) if quick else (8, 16))]
     yield Row(
-              "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
-              2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
-          )  # fmt: skip
+        "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
+        2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
+    )  # fmt: skip
     for below in DEPTHS[1:] if quick else DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, NU, 2, n, 4.0 * below) for n in ((4, 8) if quick else (8, 16))]
         yield Row(
-                  f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
-                  "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
-                  "left out by the effect", "sensitivity",
-              )  # fmt: skip
+            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
+            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
+            "left out by the effect", "sensitivity",
+        )  # fmt: skip
 
 
 def _space_rows() -> Iterator[Row]:
@@ -106,17 +106,17 @@ def _space_rows() -> Iterator[Row]:
     for length in (1.0, 4.0, 10.0):
         meshes = [by_mesh(length, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
         yield Row(
-                  f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
-                  2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
-              )  # fmt: skip
+            f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
+            2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
+        )  # fmt: skip
     endless = [by_mesh(4.0, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
     for below in DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, 0.3, 3, n, 4.0 * below) for n in (2, 4)]
         yield Row(
-                  f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
-                  "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
-                  "left out by the effect", "sensitivity",
-              )  # fmt: skip
+            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
+            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
+            "left out by the effect", "sensitivity",
+        )  # fmt: skip
 
 
 def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> Iterator[Row]:
@@ -126,13 +126,13 @@ def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, .
         slopes = np.gradient(found[domain, 4.0], np.array(mus), axis=0)[at]
         for slope, what in zip(slopes, ("free strain", "as a foil of 4 mm reads it"), strict=True):
             yield zero(f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER,
-                      float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement")  # fmt: skip
+                       float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement")  # fmt: skip
             yield zero(f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER,
-                      float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement")  # fmt: skip
+                       float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement")  # fmt: skip
         strain = found[domain, 4.0][:, 1]
         rising = np.maximum(np.diff(strain), 0.0).sum() / np.abs(np.diff(strain)).sum()
         yield zero(f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
-                  float(rising), 0.05, "round-off and increments", "statement")  # fmt: skip
+                   float(rising), 0.05, "round-off and increments", "statement")  # fmt: skip
 
 
 def _steps_row(domain: str, value: np.ndarray, half: np.ndarray, mus: tuple[float, ...], steps: int) -> Row:

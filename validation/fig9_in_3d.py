@@ -19,7 +19,7 @@ from finger3d.mechanics.results.history import measure
 from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
-from .fig12_gauge_angles import ANGLES, gauges, statements
+from .fig9_strains import ANGLES, gauges, statements
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)

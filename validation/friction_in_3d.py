@@ -157,7 +157,7 @@ def _rows(spread: Spread) -> Iterator[Row]:
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
         what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
         yield at_most(what, "more readings tell more", 1.05, worst,
-                  "placed with the error of the mesh, judged " "without", "sensitivity")  # fmt: skip
+                      "placed with the error of the mesh, judged " "without", "sensitivity")  # fmt: skip
 
 
 def _draw(figure: Any, spread: Spread) -> None:

@@ -119,7 +119,7 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
 
     def least(peer: str, what: str, tried: Sequence[float]) -> Row:
         return at_most(f"least share of the press that {peer} does, {what}, {np.isfinite(tried).sum()} values of mu",
-                   "finger3d: 1", 1.0, float(np.nanmin(tried)), kind="sensitivity")  # fmt: skip
+                       "finger3d: 1", 1.0, float(np.nanmin(tried)), kind="sensitivity")  # fmt: skip
 
     rows = [
         Row(f"increments that settle, finger3d, of {here}", "hard_cases", total, settled, 0.0, "all"),

@@ -136,23 +136,23 @@ def _rows(models: list[Model], best: Model) -> Iterator[Row]:
     fitting = [m for m in models if m.misfit <= FITS]
     told = f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}, E = {best.E:.3f} MPa"
     yield at_most(f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS,
-              best.misfit, "a block for a gel with a rounded rim; force and zero without published errors",
-              "validation")  # fmt: skip
+                  best.misfit, "a block for a gel with a rounded rim; force and zero without published errors",
+                  "validation")  # fmt: skip
     yield at_least("models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models),
-              "if the forces told nothing but modulus and zero", "statement")  # fmt: skip
+                   "if the forces told nothing but modulus and zero", "statement")  # fmt: skip
     for name, values in {"friction coefficient": [m.mu for m in fitting], "Young's modulus": [m.E for m in fitting],
                          "Poisson's ratio": [m.nu for m in fitting]}.items():  # fmt: skip
         ratio = max(values, default=np.nan) / min(values, default=np.nan)
         yield at_most(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
-                  1.1, ratio, "10 %", "statement")  # fmt: skip
+                      1.1, ratio, "10 %", "statement")  # fmt: skip
     # of all models: which of them fit is known only with the fourth force
     band = [m.predicted + sign * 2.0 * m.predicted_sd for m in models for sign in (-1.0, 1.0)]
     outside = max(min(band) - FORCES[3], FORCES[3] - max(band), 0.0)
     yield Row(
-              f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
-              f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
-              "two standard deviations about every model", "validation", "absolute",
-          )  # fmt: skip
+        f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
+        f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
+        "two standard deviations about every model", "validation", "absolute",
+    )  # fmt: skip
 
 
 def _checks(best: Model, finer: Model, size: float) -> list[Row]:

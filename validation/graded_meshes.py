@@ -149,20 +149,20 @@ def _rows(found: list[Mesh]) -> Iterator[Row]:
         for mesh in (mesh for mesh in some if mesh.way == "graded"):
             name = f"{goal}, {domain}, {mesh.dofs} unknowns"
             yield at_most(f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
-                      mesh.error / mesh.told, "two error bars")  # fmt: skip
+                          mesh.error / mesh.told, "two error bars")  # fmt: skip
             # an error may be small by chance: the bar of the graded mesh counts, and no finer mesh may exceed it
             large = [other.dofs for other in equal if other.error > max(mesh.error, mesh.told)]
             enough = [other.dofs for other in equal if other.dofs > max(large, default=0)]
             ratio = min(enough, default=equal[-1].dofs) / mesh.dofs
             yield at_least(
-                      f"unknowns of {equal[0].way} for an error below its bar, over those of the graded mesh: {name}",
-                      "goal of this project", WANTED, ratio, "the finest of them where none suffices",
-                      "statement")  # fmt: skip
+                f"unknowns of {equal[0].way} for an error below its bar, over those of the graded mesh: {name}",
+                "goal of this project", WANTED, ratio, "the finest of them where none suffices",
+                "statement")  # fmt: skip
             if not any(np.isnan(other.told) for other in equal):
                 enough = [other.dofs for other in equal if other.told <= mesh.told]
                 yield at_least(f"unknowns of {equal[0].way} with as small a bar, over those of the graded mesh: {name}",
-                          "goal of this project", WANTED, min(enough, default=equal[-1].dofs) / mesh.dofs,
-                          "the finest of them where none has", "statement")  # fmt: skip
+                               "goal of this project", WANTED, min(enough, default=equal[-1].dofs) / mesh.dofs,
+                               "the finest of them where none has", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Mesh]) -> None:

@@ -312,8 +312,8 @@ def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> Iterator[R
             here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
             if here:
                 yield at_most(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
-                          max(f.penetration for f in here), "largest at sharp edges of finger and object",
-                          "statement")  # fmt: skip
+                              max(f.penetration for f in here), "largest at sharp edges of finger and object",
+                              "statement")  # fmt: skip
     what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
     for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
         smooth = [

@@ -218,9 +218,9 @@ def _rows(lifts: list[Lift], said: Float) -> list[Row]:
 
 def _creep_row(name: str, count: int, mm: float) -> Row:
     return at_most(
-               f"largest change of any pose, gap, slip or displacement in a hold of {count} increments, {name} (mm)",
-               "a contact that sticks does not creep", 1e-12, mm,
-               "a bound; round-off of the displacements, of about 2 mm, is 4e-16 mm")  # fmt: skip
+        f"largest change of any pose, gap, slip or displacement in a hold of {count} increments, {name} (mm)",
+        "a contact that sticks does not creep", 1e-12, mm,
+        "a bound; round-off of the displacements, of about 2 mm, is 4e-16 mm")  # fmt: skip
 
 
 def _draw(figure: Any, lifts: list[Lift]) -> None:

@@ -143,11 +143,11 @@ def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
         what = f"{name}, {len(some)} values"
         # a posterior that is flat up to a bound, or has two maxima, has longer tails
         yield at_most(f"largest |z|: {what}", "normally distributed errors", 4.0, float(np.abs(z).max()),
-                  "one in 16 000 is beyond", "statement")  # fmt: skip
+                      "one in 16 000 is beyond", "statement")  # fmt: skip
         if len(some) >= 8:
             share = float(np.mean(np.abs(z) <= 2.0))
             yield at_least(f"share within two stated deviations: {what}", "0.954 if errors are normally distributed",
-                      0.9, share, "bars of nine in ten; readings bend with mu")  # fmt: skip
+                           0.9, share, "bars of nine in ten; readings bend with mu")  # fmt: skip
         if len(some) >= 8:
             rms, of_noise = (float(np.sqrt(np.mean(v**2))) for v in (z, bare))
             yield Row(f"rms of z: {what}", "deviations that hold", 1.0, rms, 0.2, "goal of this project", "statement",

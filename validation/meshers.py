@@ -140,17 +140,17 @@ def _rows(found: list[Meshed]) -> Iterator[Row]:
                   0.0, "a count", measure="absolute")  # fmt: skip
         for m in (wild, gen):
             yield zero(f"{name}: volume error, {m.mesher}", "CAD", m.volume_error, 1e-3,
-                      "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge")  # fmt: skip
+                       "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge")  # fmt: skip
             yield zero(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", m.force_error,
-                      0.03, "the error bar of such meshes, 1 to 3 % (error_bars)")  # fmt: skip
+                       0.03, "the error bar of such meshes, 1 to 3 % (error_bars)")  # fmt: skip
         yield at_most(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
-                  gen.seconds / wild.seconds, "a statement", "statement")  # fmt: skip
+                      gen.seconds / wild.seconds, "a statement", "statement")  # fmt: skip
         yield at_least(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
-                  gen.min_dihedral_deg / wild.min_dihedral_deg, "a claim", "statement")  # fmt: skip
+                       gen.min_dihedral_deg / wild.min_dihedral_deg, "a claim", "statement")  # fmt: skip
         for key, what in (("force_error", "force"), ("gauge_error", "gauge")):
             ratio = getattr(gen, key) / getattr(wild, key)
             yield at_most(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio,
-                      "a statement", "statement")  # fmt: skip
+                          "a statement", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Meshed]) -> None:

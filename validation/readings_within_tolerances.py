@@ -147,15 +147,15 @@ def _rows(found: list[Judged], kind_of_all: Literal["verification", "statement"]
             ):
                 inside = float(np.mean([one.inside for one in chosen]))
                 yield at_least(f"share of 90 % sets that contain mu: {name}, {part}, {len(chosen)} readings",
-                          "0.9 if stated rightly", 0.85, inside,
-                          "where the sensor saturates, an error of the reading looks like another mu",
-                          kind)  # fmt: skip
+                               "0.9 if stated rightly", 0.85, inside,
+                               "where the sensor saturates, an error of the reading looks like another mu",
+                               kind)  # fmt: skip
             share = float(np.mean([one.status in ("ok", "coarse") for one in some]))
             yield at_most(f"share of readings that determine mu: {name}", "no reference", 1.0, share,
-                      "the others say above, below, blind or ambiguous", "statement")  # fmt: skip
+                          "the others say above, below, blind or ambiguous", "statement")  # fmt: skip
             wrong = float(np.mean([one.status in ("outside", "contradiction") for one in some]))
             yield at_most(f"share of readings called out of range or contradictory: {name}", "p = 0.001", 0.02, wrong,
-                      "all are presses of a sensor within its tolerances")  # fmt: skip
+                          "all are presses of a sensor within its tolerances")  # fmt: skip
 
 
 def _honest(name: str, some: list[Judged], kind: Literal["verification", "statement"]) -> Iterator[Row]:

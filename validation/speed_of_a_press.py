@@ -5,7 +5,7 @@ viscosity of the sensor". No relaxation of a silicone was found with its numbers
 by 2, 5 or 10 % in each decade of time, by a Prony series from 1 ms to 1000 s. The finger of Fig. 9 (nu = 0.49 at once)
 is calibrated by presses of 10 s and read in presses of 0.1 to 1000 s: at the same depth and at the same force; with all
 moduli relaxing, and in the section with the shear modulus alone, where Poisson's ratio grows. The section has the
-paper's gauge, the finger 20 mm wide the gauge that design_search.py finds best, at x = 6 mm and 85 degrees.
+paper's gauge, the finger 20 mm wide the gauge that finger_search.py finds best, at x = 6 mm and 85 degrees.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ little, which falls with a/h, unless they are mirror images.  For unlike bodies 
 
 The finger is a block on its base; the object is that of [effects.elastic_object], the lower half of a cylinder held on
 its cut.  It has its own mesh, 1.3 times coarser than the finger's, with nodes in other places.  Both bodies are 100 and
-200 a thick, and the values are extrapolated linearly in a/h to 0, as in press_line.  NAFEMS CGS-1
+200 a thick, and the values are extrapolated linearly in a/h to 0, as in press_with_friction.  NAFEMS CGS-1
 (validation/REFERENCES.md, 6.4) is pressed with the same effect.
 """
 

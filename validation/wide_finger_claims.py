@@ -22,7 +22,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
-from . import fig03_forces, fig04_zones, fig05_strains_depth, fig06_forces_mu, fig07_strains_mu, fig12_gauge_angles
+from . import fig9_strains, half_cylinder_forces, half_cylinder_strains
 from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
@@ -74,7 +74,7 @@ def run(quick: bool) -> Result:
     """Quick: a coarse mesh and few increments."""
     x = np.linspace(0.0, 48.0, COUNT)
     size = 6.0 if quick else 2.5
-    gauges = [*line(x, fig9_finger(), BELOW_FIG9), *fig12_gauge_angles.gauges()]
+    gauges = [*line(x, fig9_finger(), BELOW_FIG9), *fig9_strains.gauges()]
     small = fig9(NU, "solid", size if quick else 1.5, gauges)
     mesh = MeshOptions(size, 3.0 * size, "swept")
     large = build(LargeDeformation().apply(replace(small.model, mesh=mesh)))
@@ -115,11 +115,11 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
             0.02, abs(ten["friction_sum_N"] / friction[MUS.index(0.25)] - 1.0), '"sufficiently small"', 0.0, "at most",
         ),
         # small contacts have few points; the mirror symmetry that is used makes the sum of f_t zero
-        *(row for row in fig03_forces.statements(here, depths[-1:]) if "sum of f_t" not in row.what),
-        *fig04_zones.statements(here, depths[0], depths[-1]),
-        *fig05_strains_depth.statements(here, found.early, found.strain[MUS.index(0.25)]),
-        *fig06_forces_mu.statements(here, mus, force, friction),
-        *fig07_strains_mu.statements(here, whole, mirrored, middle.a),
+        *(row for row in half_cylinder_forces.statements_depths(here, depths[-1:]) if "sum of f_t" not in row.what),
+        *half_cylinder_forces.statements_zones(here, depths[0], depths[-1]),
+        *half_cylinder_strains.statements_depths(here, found.early, found.strain[MUS.index(0.25)]),
+        *half_cylinder_forces.statements_mus(here, mus, force, friction),
+        *half_cylinder_strains.statements_mus(here, whole, mirrored, middle.a),
         said(
             f"ratio .5 changes little: change of gamma_xy over the largest gamma_xy, {here}", "Fig. 8", 0.05,
             kinetic / np.abs(shear[MUS.index(0.25)]).max(), "5 % would be seen in a figure", 0.0, "at most",
@@ -140,7 +140,7 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
             f"the edge slips at large mu: slip zone at mu = 1 over a, {here}", "Sec. III-B", 0.02,
             (mus[-1].a - mus[-1].c) / mus[-1].a, "one of 50 points", 0.0, "at least",
         ),
-        *fig12_gauge_angles.statements(here, NU, np.array(MUS), read),
+        *fig9_strains.statements(here, NU, np.array(MUS), read),
     ]  # fmt: skip
 
 
