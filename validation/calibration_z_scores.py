@@ -145,8 +145,9 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
             if len(z_mu) > 10:
                 yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
-            yield at_least(f"share of 90 % sets that contain the true mu: {what}", "mu drawn evenly", 0.9, share,
-                           "systematic errors are stated by their size, so more may be covered", "statement")  # fmt: skip
+            why = "systematic errors are stated by their size, so more may be covered"
+            what_share = f"share of 90 % sets that contain the true mu: {what}"
+            yield at_least(what_share, "mu drawn evenly", 0.9, share, why, "statement")
             worst = float(np.abs([r.z_without for r in some]).max())
             yield at_least(f"largest z of the strain without the tolerance of the increments: {what}", "no reference",
                            3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
