@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import ellipk
 
-from validation import _spence, press_line, press_sphere, viscous_sphere
+from validation import _spence, press_with_friction, viscous_sphere
 
 
 def _eta(nu: float) -> float:
@@ -35,13 +35,13 @@ def test_stick_zone_without_coupling(nu: float, mu: float, stick: float) -> None
 def test_press_of_a_cylinder_with_friction(nu: float) -> None:
     """2.1, mu = 0.25, and 2.5; `_spence.py` itself is exact to about 1e-4 of its values."""
     found = _spence.line(nu, 0.25)
-    force, friction, dissipation = press_line.INTEGRALS[nu]
-    assert found.stick == pytest.approx(press_line.C_OVER_A[nu, 0.25], abs=2e-5)
+    force, friction, dissipation = press_with_friction.INTEGRALS_LINE[nu]
+    assert found.stick == pytest.approx(press_with_friction.C_OVER_A_LINE[nu, 0.25], abs=2e-5)
     assert found.force == pytest.approx(force, rel=1e-4)
     assert found.friction == pytest.approx(friction, rel=1e-3)
     assert found.dissipation == pytest.approx(dissipation, rel=2e-3)  # three digits are given
     if nu:
-        assert np.abs(found.shear - press_line.CURVE).max() < 2e-4
+        assert np.abs(found.shear - press_with_friction.CURVE).max() < 2e-4
         slower = _spence.line(nu, 0.175)
         assert slower.stick == pytest.approx(0.263, abs=5e-4)
         assert slower.friction == pytest.approx(0.0773, abs=5e-5)
@@ -51,7 +51,7 @@ def test_press_of_a_cylinder_with_friction(nu: float) -> None:
 def test_full_stick(nu: float) -> None:
     """2.3."""
     line = 1.0 / quad(lambda a: np.sin(a) * _stuck(np.sin(a), nu), 0.0, np.pi / 2.0, limit=400)[0]
-    assert line == pytest.approx(press_line.FULL_STICK[nu], abs=1e-6)
+    assert line == pytest.approx(press_with_friction.FULL_STICK_LINE[nu], abs=1e-6)
 
     def beyond(t: float) -> float:
         return float(quad(lambda w: w**2 / np.sqrt(1.0 - (t * w) ** 2), 0.0, 1.0)[0])  # w = 1/x
@@ -59,7 +59,7 @@ def test_full_stick(nu: float) -> None:
     grown = np.pi * _eta(nu)
     lifted = 0.5 - 2.0 / np.pi * np.cosh(grown) * quad(lambda t: _stuck(t, nu) * beyond(t), 0.0, 1.0, limit=200)[0]
     sphere = np.cosh(grown) * grown / np.sinh(grown) * np.sqrt(4.0 * lifted)
-    assert sphere == pytest.approx(press_sphere.FULL_STICK[nu], abs=1e-6)
+    assert sphere == pytest.approx(press_with_friction.FULL_STICK_SPHERE[nu], abs=1e-6)
 
 
 @pytest.mark.parametrize(("time", "force"), viscous_sphere.TABLE.items())

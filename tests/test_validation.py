@@ -13,13 +13,13 @@ STUDIES = studies()
 
 SLOW = (
     "error_bars", "calibration_z_scores", "ssnv503", "strain_to_friction", "paper_mesh", "press_release",
-    "fig11_shear_mu", "fig07_strains_mu", "gallery", "triangulated_objects", "twisted_sphere", "increment_size",
-    "object_curvature", "turned_scene", "hard_cases", "foil_at_large_deformation",
-    "embedded_gauge_study", "design_search", "action_reaction", "rolling_cylinder", "hard_large_deformation",
+    "fig9_strains", "half_cylinder_strains", "gallery", "triangulated_objects", "twisted_sphere", "increment_errors",
+    "object_curvature", "turned_scenes", "hard_cases", "fig14_readings",
+    "embedded_gauge_study", "finger_search", "action_reaction", "rolling_cylinder", "hard_large_deformation",
     "meshers", "readings_within_tolerances", "friction_in_3d", "scaling", "advice_against_truth", "cost_of_accuracy",
-    "hertz_line", "bonded_layer", "fig14_measured", "wide_finger_claims", "gelsight_mini", "effects_by_need",
+    "hertz", "bonded", "wide_finger_claims", "gelsight_mini", "effects_by_need",
     "cost_forecast", "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does",
-    "default_bars", "identify_z_scores", "increment_orders", "truth_cube", "random_presses", "effects_of_keys",
+    "default_bars", "identify_z_scores", "truth_cube", "random_presses", "effects_of_keys",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 

@@ -23,7 +23,8 @@ from tests.contact_cases import half_plane, violation
 from tests.models import fig9, half_cylinder
 from validation import _exact_path
 from validation._exact_path import Event, exact_press, follow
-from validation._increments import imbalance, pressed
+from validation._increments import imbalance
+from validation._press import under
 
 
 def problem_of(compliance: np.ndarray, before: ContactState, motion: np.ndarray, mu: float) -> ContactProblem:
@@ -173,7 +174,7 @@ def test_increments_approach_the_path_at_second_order() -> None:
     exact = exact_press(problem)[-1]
     errors = []
     for steps in (20, 160):
-        end = pressed(problem, Coulomb(0.15), steps)[-1]
+        end = under(problem, Coulomb(0.15), steps)[-1]
         errors.append(np.abs(end.meshed_state.contact.force - exact.meshed_state.contact.force).max())
     assert np.log(errors[0] / errors[1]) / np.log(8.0) > 1.6  # points close one by one
 

@@ -34,7 +34,7 @@ def validate(
     Without names, all studies with outdated results run. Studies that measure time (cost_of_accuracy, scaling,
     beside_calculix) run in full only if they are named.
 
-    Example: python -m validation press_line --quick
+    Example: python -m validation press_with_friction --quick
 
     Parameters
     ----------

@@ -13,6 +13,8 @@ from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOpti
 from finger3d.mechanics.readings.reading import Marker, Taxel
 from finger3d.objects import Cylinder, Plane, Sphere
 
+from ._press import fig9_finger
+
 MUS = (0.125, 0.5)
 SWEPT_MUS = (0.1, 0.125, 0.25, 0.5, 1.0)
 """Of swept solids: where stick ends along the width, and with it the error of friction, depends on it."""
@@ -70,7 +72,7 @@ def cases(quick: bool) -> list[Case]:
     near = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
     far = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
     half = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
-    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    fig9 = fig9_finger()
     if quick:
         return [
             Case("half cylinder", _model(half, 0.4, "plane-strain", 1.0, near), (0.4, 0.2), 0.1, 5.0),

@@ -95,8 +95,7 @@ def best_of(
     Rounds go over all cases in turn, so that a busy minute of the machine does not fall on one case alone.  Times are
     what stands under "seconds" and "processor_seconds", dicts; peaks under "peak_MB", of which the largest is kept.
     """
-    found: dict[Any, dict[str, Any]] = {}
-    wanted: dict[Any, int] = {}
+    found, wanted = {}, {}
     turn, left = 0, list(cases)
     while left:
         for case in left:

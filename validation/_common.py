@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
@@ -26,7 +27,6 @@ from finger3d.mechanics.discretise.contact_geometry import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose, vertical_frame
 
-Float = NDArray[np.float64]
 Field = Callable[[Float], Float]
 
 _DEGREE = 6  # integrates the square of a quadratic element's error, which is cubic, exactly
@@ -249,10 +249,7 @@ def convergence(
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel(xlabel)
-    axes.set_ylabel(ylabel)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
 
 
 def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Float:

@@ -25,13 +25,10 @@ _FLOOR = 1e-5
 def draw(figure: Any, lines: Sequence[Line]) -> None:
     """Draw six panels from the lines of the study's table."""
     figure.set_size_inches(15.0, 8.8)
-    figure.set_layout_engine("constrained")
     panels = figure.subplots(2, 3).ravel()
     runs = [line for line in lines if line["kind"] == "run"]
     for axes, panel in zip(panels, (_elements, _numbers, _grading, _memory, _condensation, _large), strict=True):
         panel(axes, runs)
-        axes.grid(True, which="major", lw=0.4, alpha=0.6)
-        axes.legend(fontsize=8, framealpha=0.9)
 
 
 def _series(
@@ -117,7 +114,5 @@ def _large(axes: Any, runs: Sequence[Line]) -> None:
         _plot(axes, _series(runs, body), "seconds", "error_force", f"{body}, small strain", "o-", color=COLOURS[body])
         large = _series(runs, LARGE[body])
         _plot(axes, large, "seconds", "error_force", f"{body}, large deformation", "v--", color=COLOURS[body])
-    axes.set(
-        title="What does large deformation cost?  Normal force", xlabel="processor time, mesh to last increment (s)"
-    )
-    axes.set(ylabel="error, %")
+    axes.set(title="What does large deformation cost?  Normal force")
+    axes.set(xlabel="processor time, mesh to last increment (s)", ylabel="error, %")

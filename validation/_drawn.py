@@ -14,6 +14,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 
+from ._press import fig9_finger
+
 NEAR = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
 FAR = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
 UNDER = (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0), Gauge("c", 3.0, 6.0, angle=0.3))
@@ -23,7 +25,7 @@ def drawn(count: int, seed: int = 2026) -> Iterator[tuple[str, Model]]:
     """Names and models: eight shapes in turn; nu, mu, plane state, depth and edge length at random."""
     random = np.random.default_rng(seed)
     half = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
-    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    fig9 = fig9_finger()
     block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
     for number in range(count):
         u = random.uniform(size=7)
@@ -56,7 +58,7 @@ def drawn_solids(count: int, seed: int) -> Iterator[tuple[str, Model]]:
     """Names and models of swept solids: four scenes in turn; nu, mu, depth, edge length and object at random."""
     random = np.random.default_rng(seed)
     half = designs()["half_cylinder"](radius_mm=5.0, width_mm=6.0)
-    fig9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
+    fig9 = fig9_finger()
     block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
     for number in range(count):
         u = random.uniform(size=6)

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
@@ -19,8 +20,6 @@ from finger3d.mechanics.path import targets
 
 from ._common import free_motion
 from ._cost import MU, Parts
-
-Float = NDArray[np.float64]
 
 
 class EachIteration:

@@ -471,10 +471,7 @@ def solve_path(problem: Problem, state: State[Float], move: Move, shares: Sequen
     """
     d = state.body.shape[1]
     found = contact_geometry(
-        problem.placed(move.end).distance,
-        problem.surface,
-        axes=problem.axes,
-        object_share=problem.system.object_share,
+        problem.placed(move.end).distance, problem.surface, axes=problem.axes, object_share=problem.system.object_share
     )
     bases = found.bases
     carried = (move.end.displacement - move.start.displacement)[:d]

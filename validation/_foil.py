@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh, quadratic
@@ -23,8 +24,6 @@ from finger3d.mechanics.discretise.foils import discretised_foils
 from finger3d.mechanics.model import Foils, Gauge
 
 from ._common import box, graded, held_at, side_load
-
-Float = NDArray[np.float64]
 
 _FAR = 15.0  # half-size of the body in lengths of the foil
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -20,10 +21,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 
-Float = NDArray[np.float64]
-
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
-DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_line
+DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_with_friction
 _CANDIDATES = -0.2  # share of the depth; keeps the points within 2.2 a, which `a` needs beyond the edge
 
 
@@ -51,9 +50,7 @@ def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_
     """Plane strain, `points` to the half-width; symmetric where the legs are."""
     block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=1.0)
     mesh = MeshOptions(1.0 / points, height / 8.0, "swept")
-    model = Model(
-        block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain",
-    )  # fmt: skip
+    model = Model(block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain")
     return build(model, margin=_CANDIDATES)
 
 

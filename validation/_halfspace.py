@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
@@ -18,8 +18,6 @@ from finger3d.fem.mesh.simplex import quadratic
 from finger3d.objects import Sphere
 
 from ._common import Body, body, box, graded, held_at
-
-Float = NDArray[np.float64]
 
 RADIUS = 100.0  # a/R = 0.01
 _ZONE = 1.15  # half-width of the evenly spaced part, in a

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,8 @@ from finger3d.objects import Plane
 from finger3d.scene import load
 
 from ._common import free_motion
-from ._rows import Row
+from ._press import changed
+from ._rows import Row, at_least, at_most
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
@@ -71,7 +71,7 @@ def _is(
 
 
 def _least(what: str, wanted: float, got: float, reason: str, source: str = ROBUST) -> Row:
-    return Row(what, source, float(wanted), float(got), 0.0, reason, measure="at least")
+    return at_least(what, source, float(wanted), float(got), reason)
 
 
 def one_point(quick: bool) -> Iterator[Row]:
@@ -182,7 +182,7 @@ def again(quick: bool) -> Iterator[Row]:
 
 
 def _with(problem: Problem, **changes: Any) -> Problem:
-    return replace(problem, model=replace(problem.model, **changes))
+    return changed(problem, **changes)
 
 
 def coarse_and_deep(quick: bool) -> Iterator[Row]:
@@ -193,7 +193,7 @@ def coarse_and_deep(quick: bool) -> Iterator[Row]:
         yield _is("depth of 80 % of the height: warned of", 1, _warned(deep, "of the finger's height"))
         tets = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=3.0", "mesh.base_size_mm=5.0")
         cells = tets.summary()["mesh"]["cells"]
-        yield Row("coarse solid: tets", ROBUST, 150, cells, 0, "about a hundred", measure="at most")
+        yield at_most("coarse solid: tets", ROBUST, 150, cells, "about a hundred")
         yield _is(f"solid of {cells} tets: settled", 1, tets.outcome.ok)
         yield _is(f"solid of {cells} tets: warned of", 1, _warned(tets, "too few"))
         fine = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=1.5", "mesh.base_size_mm=3.0")

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.results.history import StepResult
 
 
@@ -22,15 +19,6 @@ class PlainCoulomb(Coulomb):
     def is_defined_by_increments(self) -> bool:
         """True: the place where a point touches is not used."""
         return True
-
-
-def pressed(problem: Problem, law: FrictionLaw, steps: int | None = None) -> list[StepResult]:
-    """Press under a friction law, in that many increments a leg; every increment converges."""
-    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
-    found = list(march(replace(problem, model=replace(problem.model, friction=law, legs=legs))))
-    if not found[-1].outcome.ok:
-        raise AssertionError(f"mu = {law.mu:g}, {steps} increments, {found[-1].target}: {found[-1].outcome}")
-    return found
 
 
 def stored_mJ(problem: Problem, step: StepResult) -> float:

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import j0
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
 
 _NODES = 40
 _FAR = 40.0  # 1 - M(z) is below 1e-15 there

@@ -9,74 +9,56 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d.contact.friction import OPEN, STICK, Coulomb, FrictionLaw
+from finger3d._types import Float
+from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.recovery.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, contact_table
 
+from ._press import fig9_finger
 from ._rows import Measure, Row
-
-Float = NDArray[np.float64]
 
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
 NUS = (0.3, 0.45, 0.49)
 STRESS, STRAIN = "plane stress", "plane strain"
+CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
+"""Plane states and Poisson's ratios of the half cylinder."""
 BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
 PAPER = "Maeno 2004"
 
 
-def half_cylinder(
-    nu: float, plane: str = STRESS, size: float = 0.1, gauges: Sequence[Gauge] = (), mu: float = 0.25, steps: int = 10
-) -> Problem:
+def half_cylinder(nu: float, plane: str = STRESS, size: float = 0.1, gauges: Sequence[Gauge] = ()) -> Problem:
     """Section II: R = 5 mm, E = 1 MPa, pressed 1 mm in 10 increments; plane stress in the paper; 1 mm wide."""
     design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
-    return _built(design, nu, plane, MeshOptions(size, max(0.5, size), "swept"), Leg(1.0, steps=steps), gauges, mu)
+    return _built(design, nu, plane, MeshOptions(size, max(0.5, size), "swept"), gauges, 1.0)
 
 
 def fig9(
-    nu: float, plane: str = STRAIN, size: float = 1.0, gauges: Sequence[Gauge] = (), mu: float = 0.25, steps: int = 10,
-    radius: float = 100.0, edge: float = 36.6,
+    nu: float, plane: str = STRAIN, size: float = 1.0, gauges: Sequence[Gauge] = (), radius: float = 100.0,
+    edge: float = 36.6,
 ) -> Problem:  # fmt: skip
     """Section III: R = 100 mm, H = 36.6 mm, 100 mm long, pressed 10 mm; plane strain in the paper.
 
     A section is 1 mm wide, a solid 20 mm as the finger that was built.
     """
-    width = 20.0 if plane == "solid" else 1.0
-    design = designs()["clipped_cylinder"](
-        radius_mm=radius, half_length_mm=50.0, edge_height_mm=edge, width_mm=width
-    )  # fmt: skip
-    return _built(design, nu, plane, MeshOptions(size, 4.0 * size, "swept"), Leg(10.0, steps=steps), gauges, mu)
+    design = fig9_finger(20.0 if plane == "solid" else 1.0, radius, edge)
+    return _built(design, nu, plane, MeshOptions(size, 4.0 * size, "swept"), gauges, 10.0)
 
 
-def _built(
-    design: Any, nu: float, plane: str, mesh: MeshOptions, leg: Leg, gauges: Sequence[Gauge], mu: float
-) -> Problem:
+def _built(design: Any, nu: float, plane: str, mesh: MeshOptions, gauges: Sequence[Gauge], depth_mm: float) -> Problem:
     domain: Any = plane.replace(" ", "-")
-    model = Model(
-        design, Isotropic(1.0, nu), mesh, (leg,), friction=Coulomb(mu), gauges=tuple(gauges), domain=domain
-    )  # fmt: skip
-    return build(model)
-
-
-def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[StepResult]:
-    """Frames under another friction and in other steps; the condensation is shared."""
-    law = Coulomb(friction) if isinstance(friction, int | float) else friction
-    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
-    frames = list(march(replace(problem, model=replace(problem.model, friction=law, legs=legs))))
-    if not frames[-1].outcome.ok:
-        raise AssertionError(f"mu = {law.mu:g}, {frames[-1].target}: {frames[-1].outcome}")
-    return frames
+    legs, law = (Leg(depth_mm, steps=10),), Coulomb(0.25)
+    return build(Model(design, Isotropic(1.0, nu), mesh, legs, friction=law, gauges=tuple(gauges), domain=domain))
 
 
 @dataclass(frozen=True)
@@ -192,9 +174,3 @@ def said(
 ) -> Row:
     """A statement of the paper, measured; `where` is its section or figure."""
     return Row(what, f"{PAPER}, {where}", wanted, float(got), tolerance, reason, "statement", measure)
-
-
-def columns(names: str, rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
-    """A table of a study from its lines; five digits keep the files small."""
-    short = [[float(f"{v:.5g}") if isinstance(v, float) else v for v in row] for row in rows]
-    return dict(zip(names.split(), map(list, zip(*short, strict=True)), strict=True))

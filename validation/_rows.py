@@ -78,6 +78,25 @@ class Row:
         return {k: getattr(self, k) for k in COLUMNS}
 
 
+def at_most(
+    what: str, reference: str, bound: float, got: float, reason: str = "a bound", kind: Kind = "verification"
+) -> Row:
+    """Return a row of a number that must not exceed a bound."""
+    return Row(what, reference, bound, got, 0.0, reason, kind, "at most")
+
+
+def at_least(
+    what: str, reference: str, bound: float, got: float, reason: str = "a bound", kind: Kind = "verification"
+) -> Row:
+    """Return a row of a number that must not fall below a bound."""
+    return Row(what, reference, bound, got, 0.0, reason, kind, "at least")
+
+
+def zero(what: str, reference: str, got: float, tolerance: float, reason: str, kind: Kind = "verification") -> Row:
+    """Return a row of a number that should be zero."""
+    return Row(what, reference, 0.0, got, tolerance, reason, kind, "absolute")
+
+
 class Settled(NamedTuple):
     """Increments of all histories of a study: how many converged, of how many, and their largest residual."""
 
@@ -118,6 +137,29 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
+def together(size: tuple[float, float], **parts: Result) -> Result:
+    """Return the result of a study of several parts: their rows, and tables and figures one below the other.
+
+    Parameters
+    ----------
+    size : of the whole figure, inches
+    """
+
+    def draw(figure: Any) -> None:
+        figure.set_size_inches(*size)
+        for part, panel in zip(parts.values(), figure.subfigures(len(parts), 1), strict=True):
+            part.figure(panel)
+
+    lines = [
+        {"part": name, **dict(zip(part.table, line, strict=True))}
+        for name, part in parts.items()
+        for line in zip(*part.table.values(), strict=True)
+    ]
+    names = dict.fromkeys(name for line in lines for name in line)
+    table = {name: [line.get(name, "") for line in lines] for name in names}
+    return Result(tuple(row for part in parts.values() for row in part.rows), table, draw)
+
+
 def number(value: float) -> str:
     """Format a number with five significant digits."""
     if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:
@@ -154,6 +196,17 @@ def score(rows: Sequence[Row]) -> str:
             f"{sum(row.within for row in others)} of {len(others)} {'other ' if by_paper else ''}statements hold"
         )
     return ", ".join(parts)
+
+
+def exact_columns(names: str, lines: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
+    """Return the table of a study from the names of its columns and its lines."""
+    return dict(zip(names.split(), map(list, zip(*lines, strict=True)), strict=True))
+
+
+def columns(names: str, lines: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
+    """Return the table of a study with numbers of five digits, which keep the files small."""
+    short = [[float(f"{v:.5g}") if isinstance(v, float) else v for v in line] for line in lines]
+    return exact_columns(names, short)
 
 
 def committed(name: str) -> list[dict[str, str]]:

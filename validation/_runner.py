@@ -218,14 +218,28 @@ def _keep(out: Path, study: Study, result: Result, stamp: str, seconds: float) -
 
 
 def draw(figure: Callable[[Any], None], path: Path) -> None:
-    """Let a study draw on a fresh Figure, and save that without a display."""
+    """Let a study draw on a fresh Figure, add what all figures have, and save it without a display."""
+    from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    canvas = FigureCanvasAgg(Figure(figsize=(10.0, 4.5), layout="constrained", dpi=110))
-    figure(canvas.figure)
-    with atomic(path) as temporary:
-        canvas.figure.savefig(temporary)
+    with rc_context({"axes.titlesize": 10.0, "legend.fontsize": 8.0}):
+        canvas = FigureCanvasAgg(Figure(figsize=(10.0, 4.5), layout="constrained", dpi=110))
+        figure(canvas.figure)
+        _finish(canvas.figure)
+        with atomic(path) as temporary:
+            canvas.figure.savefig(temporary)
+
+
+def _finish(figure: Any) -> None:
+    """Add a grid under curves, and legends to a figure, or a part of one, that has none."""
+    for part in figure.subfigs or (figure,):
+        has_legend = part.legends or any(axes.get_legend() for axes in part.axes)
+        for axes in part.axes:
+            if axes.lines and not axes.images and all(drawn.get_array() is None for drawn in axes.collections):
+                axes.grid(alpha=0.3)
+            if not has_legend and axes.get_legend_handles_labels()[0]:
+                axes.legend()
 
 
 def _place(out: Path, study: Study) -> Path:
@@ -256,9 +270,7 @@ def kept_settled(out: Path, study: Study) -> Settled | None:
 
 def _row(kept: TreeView) -> Row:
     wanted, got, tolerance = (float(kept[k]) for k in ("wanted", "got", "tolerance"))
-    return Row(
-        kept["what"], kept["reference"], wanted, got, tolerance, kept["reason"], kept["kind"], kept["measure"]
-    )  # fmt: skip
+    return Row(kept["what"], kept["reference"], wanted, got, tolerance, kept["reason"], kept["kind"], kept["measure"])
 
 
 _TITLE = """# Verification and validation

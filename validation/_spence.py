@@ -17,10 +17,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-Float = NDArray[np.float64]
+from finger3d._types import Float
 
 _NODES = (96, 192, 384)
 

@@ -12,16 +12,16 @@ force of the increment; where friction turns during an increment it leaves an er
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -29,9 +29,9 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult
 
 from ._common import rate
-from ._rows import Result, Row
+from ._press import changed, fig9_finger
+from ._rows import Result, Row, exact_columns, zero
 
-Float = NDArray[np.float64]
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
 _ROUND = "round-off; 2e-13 or less measured"
 SIZES = {"plane-strain": 2.0, "solid": 8.0}
@@ -39,15 +39,14 @@ SIZES = {"plane-strain": 2.0, "solid": 8.0}
 
 def finger(domain: Any, nu: float) -> Problem:
     """The whole finger, ready for any path that presses 10 mm at first."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh = MeshOptions(SIZES[domain], 2.0 * SIZES[domain], "swept")
-    return build(Model(body, Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
+    return build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
 
 
 def along(problem: Problem, steps: int, mu: float, slide: float) -> list[StepResult]:
     """Frames of a press, and a slide if there is one, of `steps` increments each."""
     legs = (Leg(10.0, steps=steps),) + ((Leg(10.0, slide_x_mm=slide, steps=steps),) if slide else ())
-    return list(march(replace(problem, model=replace(problem.model, legs=legs, friction=Coulomb(mu)))))
+    return list(march(changed(problem, legs=legs, friction=Coulomb(mu))))
 
 
 @dataclass(frozen=True)
@@ -97,8 +96,7 @@ def least_loss(frames: list[StepResult]) -> float:
 
 def run(quick: bool) -> Result:
     """Section and solid, compressible and not; ever more increments."""
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     curves: dict[str, dict[str, tuple[Float, Float]]] = {"mu = 0.25": {}, "mu = 0": {}}
     for domain in ("plane-strain", "solid"):
         worst = dict.fromkeys(("force", "moment", "loss", "net"), 0.0)
@@ -117,16 +115,14 @@ def run(quick: bool) -> Result:
             ("loss", "energy that friction gives back at a point in an increment, over the most it takes"),
             ("net", "net friction of the press before the slide, over its force"),
         ):
-            rows.append(Row(f"{what}, {name}, largest", _ALWAYS, 0.0, worst[key], 1e-10, _ROUND, measure="absolute"))
+            rows.append(zero(f"{what}, {name}, largest", _ALWAYS, worst[key], 1e-10, _ROUND))
         rows += _energy(problem, f"{name}, nu = {nu:g}", quick, curves, table)
-    names = ("case", "mu", "increments_per_leg", "work_less_stored_and_lost")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "case mu increments_per_leg work_less_stored_and_lost"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
-def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> list[Row]:
+def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[tuple[Any, ...]]) -> Iterator[Row]:
     """Rows of the work's balance, with friction also of its rate."""
-    rows = []
     for mu, counts, slide in ((0.25, (20, 40, 80), 15.0), (0.0, (5, 10, 20, 40), 0.0)):
         found = [balance(problem, along(problem, n, mu, slide)[-1]).work for n in counts]
         steps = 1.0 / np.array(counts)
@@ -136,17 +132,16 @@ def _energy(problem: Problem, name: str, quick: bool, curves: Any, table: list[t
         if mu == 0.0:
             worst = float(np.abs(found).max())
             what = f"work less stored and lost, over the work, {kind}, {counts[0]} to {counts[-1]} increments, largest"
-            rows.append(Row(what, _ALWAYS, 0.0, worst, 1e-10, "round-off", measure="absolute"))
+            yield zero(what, _ALWAYS, worst, 1e-10, "round-off")
             continue
         what = f"work over stored and lost, {kind}, {counts[-1]} increments a leg"
-        rows.append(
-            Row(what, _ALWAYS, 1.0, 1.0 / (1.0 - found[-1]), 1e-3, "second order; 0.03 % or less measured with so many")
+        yield Row(
+            what, _ALWAYS, 1.0, 1.0 / (1.0 - found[-1]), 1e-3, "second order; 0.03 % or less measured with so many"
         )
         why = "points change state within an increment; more than the first order is seen"
         got = rate(steps[-3:], found[-3:])
         source = "friction under the mean normal force"
-        rows.append(Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least"))
-    return rows
+        yield Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least")
 
 
 def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None:
@@ -157,10 +152,7 @@ def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None
         if mu != "mu = 0":
             steps, errors = list(both.values())[-1]  # of the solid
             axes.loglog(steps, 2.0 * errors[-1] * (steps / steps[-1]) ** 2, "k--", label="second order")
-        axes.set_xlabel("1 / increments of a leg")
-        axes.set_ylabel("work not stored or dissipated, over the work")
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.3)
+        axes.set(xlabel="1 / increments of a leg", ylabel="work not stored or dissipated, over the work")
         ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
         axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
         axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}")

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
@@ -29,10 +29,8 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
 from finger3d.sensor import Calibration, estimate
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
-Float = NDArray[np.float64]
 Steps = int | Literal["auto"]
 
 NOISE, RANGE = 1.5e-4, (0.05, 1.2)
@@ -80,8 +78,7 @@ def run(quick: bool) -> Result:
     """Quick: one nu, three gauges, 10 increments."""
     random = np.random.default_rng(20261123)
     nus, counts, size = ((0.45,), (10,), 0.3) if quick else ((0.3, 0.49), (10, 20, 40, "auto"), 0.1)
-    found: list[Reading] = []
-    bare: dict[tuple[float, float, int], Float] = {}
+    found, bare = [], {}
     for nu in nus:
         mus = np.sort(random.uniform(*RANGE, 5 if quick else 12))
         for steps in counts if nu == nus[-1] else counts[:3]:  # chosen increments take longest, and once is enough
@@ -148,24 +145,19 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
             if len(z_mu) > 10:
                 yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
-            yield Row(
-                f"share of 90 % sets that contain the true mu: {what}", "mu drawn evenly", 0.9, share, 0.0,
-                "systematic errors are stated by their size, so more may be covered", "statement", "at least",
-            )  # fmt: skip
+            why = "systematic errors are stated by their size, so more may be covered"
+            what_share = f"share of 90 % sets that contain the true mu: {what}"
+            yield at_least(what_share, "mu drawn evenly", 0.9, share, why, "statement")
             worst = float(np.abs([r.z_without for r in some]).max())
-            yield Row(
-                f"largest z of the strain without the tolerance of the increments: {what}", "no reference", 3.0, worst,
-                0.0, "a reading off by more than three standard deviations", "statement", "at least",
-            )  # fmt: skip
+            yield at_least(f"largest z of the strain without the tolerance of the increments: {what}", "no reference",
+                           3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
 
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
     """Yield two rows: the stated errors are not too small, and they are not much too large."""
     why = "all readings of a body share one error of that body"
-    yield Row(what, "1 if the errors are right", 1.3, _rms(z), 0.0, why, "sensitivity", "at most")
-    yield Row(
-        f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), 0.0, why, "statement", "at least"
-    )
+    yield at_most(what, "1 if the errors are right", 1.3, _rms(z), why, "sensitivity")
+    yield at_least(f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), why, "statement")
 
 
 def _rms(z: Float) -> float:
@@ -179,16 +171,14 @@ def _compared(nu: float, size: float) -> Row:
     stated = np.array([increment_error(strains[b], strains[b // 2], 0.5) for b in LEVELS[1:]])
     off = np.array([np.abs(strains[b] - strains[640]) for b in LEVELS[1:]])
     big = off > 0.1 * NOISE
-    return Row(
+    return at_least(
         "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
-        "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), 0.0, "nine in ten", "statement",
-        "at least",
-    )  # fmt: skip
+        "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), "nine in ten",
+        "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Reading]) -> None:
     figure.set_size_inches(12.0, 4.8)
-    figure.set_layout_engine("constrained")
     left, right = figure.subplots(1, 2)
     cases = list(dict.fromkeys((r.steps, r.mesh) for r in found))
     for k, (steps, mesh) in enumerate(cases):
@@ -212,4 +202,4 @@ def _draw(figure: Any, found: list[Reading]) -> None:
     right.axhspan(-1.0, 1.0, color="#dddddd", lw=0, zorder=0, label="one standard deviation")
     right.set(xlabel="true mu", ylabel="z of the strain", title="The same errors over mu")
     for axes in (left, right):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8, frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False)

@@ -13,6 +13,7 @@ the trapezoidal rule.
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,16 +23,14 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
 from . import _halfplane, _halfspace
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, exact_columns, zero
 
 NU, MU = 0.5, 0.25
 DEPTH = float(_halfplane.depth(1.0, _halfplane.DEPTH_OF_BLOCK))
 SHARES = (0.5, 1.0, 1.4)  # of mu times the depth: slides of the cylinder
 JOHNSON_2D = "Cattaneo 1938; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.1"
 JOHNSON_3D = "Mindlin and Deresiewicz 1953; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.2"
-COLUMNS = (
-    "dim points_per_a increments s a_mm c_over_a c_over_a_exact W_over_exact loop_over_exact shift_over_exact".split()
-)
+COLUMNS = "dim points_per_a increments s a_mm c_over_a c_over_a_exact W_over_exact loop_over_exact shift_over_exact"
 
 
 def line_loss(s: float, force: float) -> float:
@@ -127,15 +126,12 @@ def run(quick: bool) -> Result:
     runs = [(points, 10) for points in meshes] + [(fine, count) for count in (5, 20) if not quick]
     table = [row for points, count in runs for row in cylinder(points, count)]
     table += [row for points in solid for row in ball(points, height, 10)]
-    rows = _line_rows(table, fine) + _ball_rows(table, solid[-1])
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(
-        tuple(rows), columns, lambda figure: _draw(figure, {k: np.array(v) for k, v in columns.items()}, fine)
-    )
+    rows = (*_line_rows(table, fine), *_ball_rows(table, solid[-1]))
+    columns = exact_columns(COLUMNS, table)
+    return Result(rows, columns, lambda figure: _draw(figure, {k: np.array(v) for k, v in columns.items()}, fine))
 
 
-def _line_rows(table: list[tuple[float, ...]], fine: int) -> list[Row]:
-    rows = []
+def _line_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
     wide = 0.03 if fine >= 40 else 0.1
     why = "first order in the point spacing; 0.3 % or less measured at 40 points to a"
     most = max(r[2] for r in table if r[:2] == (2, fine))
@@ -143,41 +139,38 @@ def _line_rows(table: list[tuple[float, ...]], fine: int) -> list[Row]:
         here = f"cylinder, s = {s:.3f}, {points:g} points to a, {count:g} increments"
         if count == 10:
             near = f"half a point spacing, a/{points:g}"
-            rows.append(Row(f"c/a, {here}", JOHNSON_2D, exact, c, 0.5 / points, near, measure="absolute"))
-            rows.append(Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_2D, 1.0, lost, wide, why))
+            yield Row(f"c/a, {here}", JOHNSON_2D, exact, c, 0.5 / points, near, measure="absolute")
+            yield Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_2D, 1.0, lost, wide, why)
         if count == most:
-            rows.append(Row(f"area of the loop over the exact one, {here}", JOHNSON_2D, 1.0, area, wide, why))
+            yield Row(f"area of the loop over the exact one, {here}", JOHNSON_2D, 1.0, area, wide, why)
     if most == 20:
         few, many = ([r for r in table if r[:3] == (2, fine, n)] for n in (5, most))
         for k, name in ((5, "c/a"), (7, "work lost in a cycle over the exact one")):
             change = max(abs(one[k] - other[k]) for one, other in zip(few, many, strict=True))
             what = f"{name}, cylinder: largest change from 5 to {most} increments"
             why = "a hundredth of what the mesh leaves"
-            rows.append(Row(what, "a limit that few increments reach", 0.0, change, 3e-5, why, measure="absolute"))
+            yield zero(what, "a limit that few increments reach", change, 3e-5, why)
         first, last = (max(abs(r[7] - 1.0) for r in table if r[:3] == (2, n, 10)) for n in (10, fine))
         falls = float(np.log(first / last) / np.log(fine / 10))
         what = "rate at which the error of the work lost falls with the mesh, cylinder"
-        rows.append(Row(what, "first order in the spacing, like c", 1.0, falls, 0.0, "a bound", measure="at least"))
+        yield at_least(what, "first order in the spacing, like c", 1.0, falls)
         gaps = [max(abs(r[8] - r[7]) for r in table if r[:3] == (2, fine, n)) for n in (5, 20)]
         falls = float(np.log(gaps[0] / gaps[1]) / np.log(4.0))
         what = "rate at which the area of the loop nears the work lost with the increments, cylinder"
-        rows.append(Row(what, "trapezoidal rule: 2", 2.0, falls, 0.2, "from two halvings", measure="at least"))
-    return rows
+        yield Row(what, "trapezoidal rule: 2", 2.0, falls, 0.2, "from two halvings", measure="at least")
 
 
-def _ball_rows(table: list[tuple[float, ...]], fine: int) -> list[Row]:
-    rows = []
+def _ball_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
     for _, points, _, s, _, c, exact, lost, area, shift in [r for r in table if r[:2] == (3, fine)]:
         here = f"ball, s = {s:.3f}, {points:g} points to a"
         why = "the formula neglects slip across the load; 0.4 % measured at 8 points to a"
-        rows.append(Row(f"slide over the exact one, {here}", JOHNSON_3D, 1.0, shift, 0.03, why))
+        yield Row(f"slide over the exact one, {here}", JOHNSON_3D, 1.0, shift, 0.03, why)
         near = f"one point spacing, a/{points:g}"
-        rows.append(Row(f"c/a, {here}", JOHNSON_3D, exact, c, 1.0 / points, near, measure="absolute"))
+        yield Row(f"c/a, {here}", JOHNSON_3D, exact, c, 1.0 / points, near, measure="absolute")
         if np.isfinite(lost):
             why = "the formula neglects slip across the load; 0.9 % measured at 8 points to a, and 4 must pass too"
-            rows.append(Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_3D, 1.0, lost, 0.1, why))
-            rows.append(Row(f"area of the loop over the exact one, {here}", JOHNSON_3D, 1.0, area, 0.1, why))
-    return rows
+            yield Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_3D, 1.0, lost, 0.1, why)
+            yield Row(f"area of the loop over the exact one, {here}", JOHNSON_3D, 1.0, area, 0.1, why)
 
 
 def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:
@@ -209,5 +202,3 @@ def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:
     left.set(xlabel="s = Q/(mu P)", ylabel="c/a", title="stick zone")
     middle.set(xlabel="points per a", ylabel="error of the work lost in a cycle, %", title="mesh")
     right.set(xlabel="increments to the peak", ylabel="|loop area - work lost|, % of exact", title="increments")
-    for axes in (left, middle, right):
-        axes.legend(fontsize=7)

@@ -15,16 +15,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
 
 from ._common import box, convergence, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 CORNER = np.pi / 2 + np.arctan2(16.0, 48.0)
 _COOK = "Cook 1974; REFERENCES.md, 5.4"
 _WILLIAMS = "2e of the corner, Williams 1952; REFERENCES.md, 5.3"
@@ -109,9 +108,7 @@ def run(quick: bool) -> Result:
     """Uniform meshes of three and more sizes, one graded, slabs, and linear triangles for contrast."""
     counts = (12, 24, 48) if quick else (16, 32, 64, 128)
     thick = (3, 6, 12) if quick else (8, 16, 32)
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    errors = {}
+    rows, table, errors = [], [], {}
     panels = tuple(p for p in PANELS if not quick or p.nu not in (0.49, 0.4999))
     for panel in panels:
         found = [deflection(square(n), panel) for n in counts]
@@ -142,9 +139,8 @@ def run(quick: bool) -> Result:
                 )
             )
     rows += [_locking(0.3, "at most", 0.06), _locking(0.4999, "at least", 0.25)]
-    names = ("case", "dim", "cells_per_side", "deflection_mm")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors, table))
+    names = "case dim cells_per_side deflection_mm"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, errors, table))
 
 
 def _locking(nu: float, measure: Any, bound: float) -> Row:
@@ -168,8 +164,5 @@ def draw(figure: Any, counts: tuple[int, ...], errors: dict[str, list[float]], t
             right.plot(n, v, line, color=colour, markersize=4.5, label=f"{dim}D, nu = {panel.nu:g}")
         right.axhline(panel.wanted, color=colour, linestyle="--", linewidth=0.8)
     right.set_xscale("log", base=2)
-    right.set_xlabel("cells along a side")
-    right.set_ylabel("deflection at (48, 52), mm (dashed: published)")
+    right.set(xlabel="cells along a side", ylabel="deflection at (48, 52), mm (dashed: published)")
     right.set_xticks(ticks := sorted({t[2] for t in table}), [str(n) for n in ticks])
-    right.legend(fontsize=7, ncol=2)
-    right.grid(alpha=0.3)

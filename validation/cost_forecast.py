@@ -35,8 +35,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.quantities import kinds_of
 
 from ._drawn import drawn, drawn_solids
-from ._paper import columns
-from ._rows import Kind, Result, Row
+from ._rows import Kind, Result, Row, at_least, columns, zero
 
 SEED = 46
 """Another than those of the scenes by which bars were calibrated."""
@@ -131,7 +130,7 @@ def _in_edges(model: Model, factor: float) -> Model:
 
 
 def _rows(lines: list[tuple[Any, ...]], failed: int, quick: bool) -> Iterator[Row]:
-    yield Row("scenes that give no forecast", GOAL, 0.0, float(failed), 0.0, "none", measure="absolute")
+    yield zero("scenes that give no forecast", GOAL, float(failed), 0.0, "none")
     for what in ("unknowns", "seconds"):
         ratios = np.array([line[3] / line[4] for line in lines if line[2] == what])
         yield _within(f"forecast {what}", ratios, SHARE, "statement" if quick and what == "seconds" else "verification")
@@ -141,7 +140,7 @@ def _rows(lines: list[tuple[Any, ...]], failed: int, quick: bool) -> Iterator[Ro
     known = np.isfinite(true)
     inside = float(np.mean(true[known] <= BARS * forecast[known]))
     text = f"share of true errors within {BARS:g} times the forecast, of {known.sum()}"
-    yield Row(text, GOAL, WITHIN, inside, 0.0, "as for error bars", measure="at least")
+    yield at_least(text, GOAL, WITHIN, inside, "as for error bars")
     seen = known & (true > 1e-6)
     yield _median("forecast over true errors", forecast[seen] / true[seen])
     told = np.isfinite(bar) & (bar > 0.0)
@@ -154,7 +153,7 @@ def _rows(lines: list[tuple[Any, ...]], failed: int, quick: bool) -> Iterator[Ro
 def _within(what: str, ratios: Float, share: float, kind: Kind) -> Row:
     within = float(np.mean((ratios >= 1.0 / FACTOR) & (ratios <= FACTOR)))
     text = f"share of {what} within a factor of {FACTOR:g}, of {len(ratios)}"
-    return Row(text, GOAL, share, within, 0.0, "eight of ten", kind, "at least")
+    return at_least(text, GOAL, share, within, "eight of ten", kind)
 
 
 def _median(what: str, ratios: Float) -> Row:
@@ -177,4 +176,3 @@ def _draw(figure: Any, lines: list[tuple[Any, ...]]) -> None:
             label = None if k else "factor 2" if title == "seconds" else "true error of 2 forecasts"
             axes.loglog([low, high], [factor * low, factor * high], "k:", lw=0.8, label=label)
         axes.set(xlabel="real" if title == "seconds" else "true error", ylabel="forecast", title=title)
-        axes.legend(fontsize=8)

@@ -14,8 +14,6 @@ of the load converges as h^(2 e).  A section under a plane has no increments; el
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from typing import Any
@@ -32,7 +30,8 @@ from ._cost_extrapolated import EMPTY, at, constant, extrapolate, memory_mb, rat
 from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
-from ._rows import Result, Row
+from ._press import empty_mesh_cache
+from ._rows import Result, Row, at_least, at_most, zero
 
 BY_NAME = True
 WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
@@ -119,20 +118,10 @@ def run(quick: bool) -> Result:
     made = {body: groups(body, quick) for body in bodies}
     cases = list(dict.fromkeys(c for g in made.values() for cs in g.values() for c in cs))
     cases += [c for c in map(default, bodies) if c not in cases and not quick]
-    with tempfile.TemporaryDirectory(prefix="finger3d_cost_") as cache:
-        # pytetwild meshes are made here, once, and their time counts
-        kept = os.environ.get("FINGER3D_CACHE")
-        os.environ["FINGER3D_CACHE"] = cache
-        try:
-            with Bench(MODULE) as bench:
-                runs = best_of(
-                    bench, "measured", cases, lambda s: 1 if quick else 3 if s < 1.5 else 2 if s < 4.0 else 1
-                )
-                plain, floats = _others(bench, made, quick)
-        finally:
-            os.environ.pop("FINGER3D_CACHE")
-            if kept is not None:
-                os.environ["FINGER3D_CACHE"] = kept
+    # pytetwild meshes are made here, once, and their time counts
+    with empty_mesh_cache(), Bench(MODULE) as bench:
+        runs = best_of(bench, "measured", cases, lambda s: 1 if quick else 3 if s < 1.5 else 2 if s < 4.0 else 1)
+        plain, floats = _others(bench, made, quick)
     return _judged(made, runs, plain, floats, quick)
 
 
@@ -149,11 +138,7 @@ def _others(bench: Bench, made: Mapping[str, Groups], quick: bool) -> tuple[Runs
 
 
 def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, quick: bool) -> Result:
-    rows: list[Row] = []
-    lines: list[dict[str, Any]] = []
-    errors: dict[Case, dict[str, float]] = {}
-    steps: dict[str, dict[str, dict[int, float]]] = {}
-    truths: dict[str, dict[str, Truth]] = {}
+    rows, lines, errors, steps, truths = [], [], {}, {}, {}
     for body, series in made.items():
         truths[body] = {q: truth(series[BEST[body]], runs, q) for q in QUANTITIES}
         ladder = series["steps"][0]
@@ -164,18 +149,16 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
         rows += _truth_rows(body, truths[body], quick)
         if body not in LARGE.values():
             rows += _rate_rows(body, series, runs)
-            rows += _solver_rows(body, series, runs) + _locking_rows(body, series, errors)
+            rows += [*_solver_rows(body, series, runs), *_locking_rows(body, series, errors)]
         if not quick:
             rows += _slower_row(body, series, runs) if body not in LARGE.values() else _large_row(body, series, runs)
             rows += _default_rows(body, runs, errors, truths[body], steps[body])
         lines += [_run_line(c, runs[c], errors[c]) for c in runs if c.body == body]
     advices = [(b, a) for b, series in made.items() for a in _advices(series, runs, errors, truths[b], rates)]
-    rows += _float_rows(floats) + list(_extrapolation_rows(made, runs, errors, truths, rates))
+    rows += [*_float_rows(floats), *_extrapolation_rows(made, runs, errors, truths, rates)]
     holes = sum(a.case is None for _, a in advices)
     if not quick:
-        rows.append(
-            Row("cells of the table without a mesh", "each has one", 0.0, holes, 0.0, "none", measure="absolute")
-        )
+        rows.append(zero("cells of the table without a mesh", "each has one", holes, 0.0, "none"))
     lines += [_advice_line(body, a) for body, a in advices]
     lines += [{"kind": "rate of the error", "quantity": q, "rate": round(power, 3)} for q, power in rates.items()]
     lines += [_plain_line(c, p, runs[c]) for c, p in plain.items()] + [_float_line(c, f) for c, f in floats.items()]
@@ -216,8 +199,8 @@ def _extrapolation_rows(
     ]  # fmt: skip
     if ratios:
         what = f"error extrapolated to the finest mesh over that found there, median of {len(ratios)}"
-        yield Row(what, "no error is larger than its law", 3.0, float(np.median(ratios)), 0.0,
-                  "errors of coarser meshes scatter, and the largest counts", "sensitivity", "at most")  # fmt: skip
+        yield at_most(what, "no error is larger than its law", 3.0, float(np.median(ratios)),
+                      "errors of coarser meshes scatter, and the largest counts", "sensitivity")  # fmt: skip
     for body, series in made.items():
         *coarser, finest = (runs[c] for c in series[BEST[body]])
         dofs, peaks = ([run[key] for run in coarser] for key in ("dofs", "peak_MB"))
@@ -233,16 +216,15 @@ def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row
     far = {"force": 0.002, "friction_sum": 0.02, "gauge_strain": 0.05, "contact_length": 0.05, "stick_length": 0.15}
     why = "levels differ by more than this; a wrong extrapolation would show"
     return [
-        Row(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run", 0.0,
-            truths[q].check, far[q] * (4.0 if quick else 1.0), why, "verification", "absolute")
+        zero(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run",
+            truths[q].check, far[q] * (4.0 if quick else 1.0), why)
         for q in QUANTITIES
         if q not in LENGTHS or not quick
     ]  # fmt: skip
 
 
-def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
+def _rate_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
     """Of the force in the mesh."""
-    rows: list[Row] = []
     wanted = 2.0 * clamped_free(math.pi / 2, 0.3 if body == HALF else 0.49, body == HALF)
     if body != HALF:
         # in a solid the layers across the width are few and whole, so neighbouring levels are no family
@@ -252,16 +234,12 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
         except ValueError:  # no rate fits
             rate = math.nan
         why = "three meshes, and a contact that grows from point to point"
-        rows.append(
-            Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
-                measure="absolute")
-        )  # fmt: skip
-    return rows
+        yield Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
+                  measure="absolute")  # fmt: skip
 
 
-def _solver_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
+def _solver_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
     """SuperLU and one factorisation an iteration, in plain increments, give what PARDISO and the condensation give."""
-    rows = []
     for name, way, limit, keys in (
         ("SuperLU", "condensed", 1e-9, QUANTITIES),
         ("one factorisation an iteration", "plain increments", 1e-6, ("force", "friction_sum", "gauge_strain")),
@@ -271,11 +249,8 @@ def _solver_rows(body: str, series: Groups, runs: Runs) -> list[Row]:
             own = runs[replace(case, solver="pardiso", way=way)]
             worst = max(worst, *(abs(value(runs[case], k) / value(own, k) - 1.0) for k in keys))
         why = "round-off of two factorisations" if limit == 1e-9 else "a step may stop at a residual of 1e-8"
-        rows.append(
-            Row(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", 0.0, worst,
-                limit, why, measure="absolute")
-        )  # fmt: skip
-    return rows
+        yield zero(f"{name} against PARDISO and one condensation, largest difference, {body}", "this code", worst,
+                   limit, why)  # fmt: skip
 
 
 def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -287,9 +262,7 @@ def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
         f"time of {runs[case]['factorizations']} factorisations over that of one condensation, {own['dofs']} unknowns"
     )
     why = "for so small a body the contact solves cost as much as some factorisations"
-    return [
-        Row(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, 0.0, why, "sensitivity", "at least")
-    ]
+    return [at_least(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, why, "sensitivity")]
 
 
 def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -299,7 +272,7 @@ def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
     times = seconds(runs[case]) / seconds(runs[small])
     what = f"time of a press at large deformation over one in small strain, {runs[case]['dofs']} unknowns, {body}"
     why = "ten increments, each a solution of its own, with fewer factorisations than increments"
-    return [Row(what, "a goal of this project", 20.0, times, 0.0, why, "sensitivity", "at most")]
+    return [at_most(what, "a goal of this project", 20.0, times, why, "sensitivity")]
 
 
 def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, float]]) -> list[Row]:
@@ -309,46 +282,38 @@ def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, 
     got = errors[case]["force"]
     here = f"error of the force, linear elements of {case.size:g} mm, {body}"
     if body == HALF:
-        return [Row(f"{here}: no locking at nu = .3", "truth above", 0.01, got, 0.0, "plane stress", measure="at most")]
+        return [at_most(f"{here}: no locking at nu = .3", "truth above", 0.01, got, "plane stress")]
     factor = got / best[case.size]
     return [
-        Row(f"{here}, over that of {BEST[body]} ones: they lock", "Hughes 2000, ch. 4; cook.py", 10.0, factor, 0.0,
-            "volumetric locking at nu = .49", measure="at least")
+        at_least(f"{here}, over that of {BEST[body]} ones: they lock", "Hughes 2000, ch. 4; cook.py", 10.0, factor,
+            "volumetric locking at nu = .49")
     ]  # fmt: skip
 
 
 def _default_rows(
     body: str, runs: Runs, errors: Mapping[Case, Mapping[str, float]], truths: Mapping[str, Truth],
     steps: Mapping[str, Mapping[int, float]],
-) -> list[Row]:  # fmt: skip
+) -> Iterator[Row]:  # fmt: skip
     """Whether the defaults keep what they claim, mesh and increments together."""
     case = default(body)
-    rows = []
     for q, claim in CLAIM[body].items():
         limit = claim * case.size / truths[q].value if q in LENGTHS else claim
         got = errors[case][q] + steps[q][10]
         unit = f"{claim:g} edge length{'s' if claim > 1.0 else ''}" if q in LENGTHS else f"{100 * claim:g} %"
-        rows.append(
-            Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
-                "truth above", abs(limit), got, truths[q].uncertainty,
-                f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")
-        )  # fmt: skip
-    return rows
+        yield Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
+                  "truth above", abs(limit), got, truths[q].uncertainty,
+                  f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")  # fmt: skip
 
 
-def _float_rows(floats: Runs) -> list[Row]:
+def _float_rows(floats: Runs) -> Iterator[Row]:
     """A compliance kept in single precision: what it changes, and how near to the limit of a step it stops."""
-    rows = []
     for case, found in floats.items():
         here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
-        rows += [
-            Row(f"largest change of force, friction sum and strain, {here}", "double precision", 0.0, found["change"],
-                1e-5, "its last digit is 6e-8", "sensitivity", "absolute"),
-            Row(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8", 1e-9,
-                found["residual"], 0.0, "less than a digit below that, which is too close", "sensitivity",
-                "at least"),
-        ]  # fmt: skip
-    return rows
+        yield zero(f"largest change of force, friction sum and strain, {here}", "double precision", found["change"],
+                   1e-5, "its last digit is 6e-8", "sensitivity")  # fmt: skip
+        why = "less than a digit below that, which is too close"
+        yield at_least(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8",
+                       1e-9, found["residual"], why, "sensitivity")  # fmt: skip
 
 
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:

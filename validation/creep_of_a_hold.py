@@ -32,6 +32,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,8 @@ from finger3d.objects import TIME
 from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import changed
+from ._rows import Result, Row, at_least, at_most, columns, zero
 from .held_weights import largest_change
 
 MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
@@ -145,7 +146,7 @@ def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
     problem = build(scene_of(tables).model())
     close, weigh = problem.model.legs
     hold = replace(weigh, steps=increments, duration_s=HOLD_S)
-    held = replace(problem, model=replace(problem.model, legs=(close, weigh, hold)))
+    held = changed(problem, legs=(close, weigh, hold))
     steps = list(march(held))
     assert all(step.outcome.ok and step.pose for step in steps)
     poses = np.array([np.delete(step.pose.coordinates, TIME) for step in steps[3:] if step.pose])
@@ -184,33 +185,30 @@ def _committed() -> list[tuple[Any, ...]]:
     return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
 
 
-def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> list[Row]:
+def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[Row]:
     t = [dict(zip(COLUMNS.split(), line, strict=True)) for line in theirs]
     default, noslip = t[0], t[1]
     soft = [line for line in t if not line["noslip_iterations"]]
     ratios = [line["creep_mm_per_min"] / line["formula_mm_per_min"] for line in soft]
     here = "MuJoCo, default settings"
-    found = [
-        Row("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours, 0.0,
-            "a bound above round-off", measure="at most"),
-        Row("least grip, finger3d (N)", "m g / (2 mu)", LEAST_GRIP, least, 0.01, "bisection to 1 %"),
-        Row(f"least grip, {here}: a fall of {FALLS:g} mm in 1 s (N)", "m g / (2 mu)", LEAST_GRIP,
-            default["least_grip_N"], 0.0, "soft friction creeps before it slips", "sensitivity", "at least"),
-        Row(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], 0.0, "a micron",
-            "sensitivity", "at least"),
-        Row("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}", default["creep_mm_per_min"],
-            abs(noslip["creep_mm_per_min"]), 0.0, "what it is made for", "sensitivity", "at most"),
-        Row(f"creep of MuJoCo over v = R f / b, models without noslip: {len(soft)}, furthest from 1", DOCS, 1.0,
-            ratios[int(np.argmax(np.abs(np.array(ratios) - 1.0)))], 0.01, "overlap and load of all contacts are equal"),
-    ]  # fmt: skip
+    yield at_most("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours,
+                  "a bound above round-off")  # fmt: skip
+    yield Row("least grip, finger3d (N)", "m g / (2 mu)", LEAST_GRIP, least, 0.01, "bisection to 1 %")
+    yield at_least(f"least grip, {here}: a fall of {FALLS:g} mm in 1 s (N)", "m g / (2 mu)", LEAST_GRIP,
+                   default["least_grip_N"], "soft friction creeps before it slips", "sensitivity")  # fmt: skip
+    yield at_least(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], "a micron",
+                   "sensitivity")  # fmt: skip
+    yield at_most("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}",
+                  default["creep_mm_per_min"], abs(noslip["creep_mm_per_min"]), "what it is made for",
+                  "sensitivity")  # fmt: skip
+    yield Row(f"creep of MuJoCo over v = R f / b, models without noslip: {len(soft)}, furthest from 1", DOCS, 1.0,
+              max(ratios, key=lambda ratio: abs(ratio - 1.0)), 0.01,
+              "overlap and load of all contacts are equal")  # fmt: skip
     steps = [line["creep_mm_per_min"] for line in soft if line["time_step_ms"] != default["time_step_ms"]]
     if steps:
         away = max(abs(creep / default["creep_mm_per_min"] - 1.0) for creep in steps)
-        found.append(
-            Row("change of that creep with time steps of 0.5, 1 and 4 ms, largest", f"{DOCS}: none", 0.0, away, 1e-3,
-                "the formula has no time step", "sensitivity", "absolute")
-        )  # fmt: skip
-    return found
+        yield zero("change of that creep with time steps of 0.5, 1 and 4 ms, largest", f"{DOCS}: none", away, 1e-3,
+                   "the formula has no time step", "sensitivity")  # fmt: skip
 
 
 def _label(line: tuple[Any, ...]) -> str:

@@ -44,8 +44,7 @@ from finger3d.mechanics.model import Model
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 from ._runner import studies
 
 OUT = Path(__file__).resolve().parent.parent / "out"
@@ -282,22 +281,17 @@ def _rows(found: list[Compared], failed: int, quick: bool) -> Iterable[Row]:
         f"or fail among the wrong ones; {len(verdicts)} effects", GOAL, RIGHT, right, 0.0, "a bound",
         "verification" if quick else "statement", "at least",
     )  # fmt: skip
-    yield Row(
-        f"share of {len(shares)} numbers whose truth lies within two total bars of mesh and model", GOAL, COVERED,
-        float(np.mean(np.array(shares) <= 2.0)), 0.0, "a bound", measure="at least",
-    )  # fmt: skip
-    yield Row(
+    yield at_least(f"share of {len(shares)} numbers whose truth lies within two total bars of mesh and model", GOAL,
+                   COVERED, float(np.mean(np.array(shares) <= 2.0)))  # fmt: skip
+    yield at_most(
         f"time of a press over that without the judgement, median of the {len(ratios)} with the right effects",
-        GOAL, COST, float(np.median(ratios)), 0.0, "a bound", "statement", "at most",
-    )  # fmt: skip
+        GOAL, COST, float(np.median(ratios)), kind="statement")  # fmt: skip
     for effect, label in LABELS.items():
         here = [v for v in verdicts if v.effect == effect]
         missed, idle = (sum(not v.right and v.used == used for v in here) for used in (False, True))
         text = f"{label}: needed in {sum(v.needed for v in here)} of {len(here)} scenes, missed in {missed}"
-        yield Row(
-            f"{text}, used in vain in {idle}; share decided rightly", GOAL, RIGHT,
-            float(np.mean([v.right for v in here])), 0.0, "that of the sets", "statement", "at least",
-        )  # fmt: skip
+        yield at_least(f"{text}, used in vain in {idle}; share decided rightly", GOAL, RIGHT,
+                       float(np.mean([v.right for v in here])), "that of the sets", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, verdicts: list[Verdict]) -> None:
@@ -322,4 +316,4 @@ def _draw(figure: Any, verdicts: list[Verdict]) -> None:
             line(tolerance, color="#222222", lw=0.8, ls=":")
         axes.set(title=label, xlabel="true change (%)", xlim=(0.7 * low, 1.4 * high), ylim=(0.7 * low, 1.4 * high))
     panels[0].set_ylabel("judged change (%)")
-    panels[0].legend(fontsize=8, loc="upper left")
+    panels[0].legend(loc="upper left")

@@ -28,8 +28,8 @@ from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import changed
+from ._rows import Result, Row, at_least, columns, zero
 
 SEED = 68
 SECTIONS, LARGE_SECTIONS, SOLIDS = 12, 2, 2
@@ -77,7 +77,7 @@ def judged(name: str, scene: Scene) -> Iterator[Judged]:
     steps = body.steps()
     steps[-1].check(name)
     problem = body.problem
-    problem = replace(problem, model=replace(problem.model, legs=with_increments_of(problem.model.legs, len(steps))))
+    problem = changed(problem, legs=with_increments_of(problem.model.legs, len(steps)))
     changes = changes_of(scene, problem.model, {})
     found, _ = effects_on(problem, changes, QUIET)
     own = problem.model.mesh
@@ -109,8 +109,7 @@ def run(quick: bool, seed: int | None = None) -> Result:
 
 
 def _rows(found: list[Judged], failed: int, seed: int) -> Iterator[Row]:
-    yield Row(f"scenes of seed {seed} whose press fails", GOAL, 0.0, float(failed), 0.0, "for the record", "statement",
-              "absolute")  # fmt: skip
+    yield zero(f"scenes of seed {seed} whose press fails", GOAL, float(failed), 0.0, "for the record", "statement")
     smooth = [one for one in found if not one.is_zone and one.counts]
     for number in (n for n in NAMES if not n.endswith("_mm2")):
         if some := [one for one in smooth if one.number == number]:
@@ -124,7 +123,7 @@ def _rows(found: list[Judged], failed: int, seed: int) -> Iterator[Row]:
     yield _share(f"within {BARS:g} times the error: all", within, "verification")
     wrong = [one for one in found if abs(one.effect) > one.error + 1e-6 and one.effect * one.true < 0.0 and one.counts]
     text = f"effects larger than their error with the wrong sign, of {len(found)}"
-    yield Row(text, GOAL, 0.0, float(len(wrong)), 0.0, "none", "statement", "absolute")
+    yield zero(text, GOAL, float(len(wrong)), 0.0, "none", "statement")
 
 
 def _is_close(one: Judged) -> bool:
@@ -133,7 +132,7 @@ def _is_close(one: Judged) -> bool:
 
 def _share(what: str, which: list[bool], kind: Any = "statement") -> Row:
     text = f"share of effects {what}, {len(which)} cases"
-    return Row(text, GOAL, SHARE, float(np.mean(which)), 0.0, "nine of ten", kind, "at least")
+    return at_least(text, GOAL, SHARE, float(np.mean(which)), "nine of ten", kind)
 
 
 def _draw(figure: Any, found: list[Judged]) -> None:
@@ -146,4 +145,3 @@ def _draw(figure: Any, found: list[Judged]) -> None:
         axes.plot([LEAST, 1.0], [LEAST, 1.0], "k-", lw=0.8)
         axes.set(xscale="log", yscale="log", xlabel="on half the edges, over the natural scale", ylabel="effect",
                  title=title)  # fmt: skip
-        axes.legend(fontsize=7)

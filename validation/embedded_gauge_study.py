@@ -14,7 +14,7 @@ described; this one is of a common kind.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,14 +22,13 @@ import numpy as np
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Model
 
 from ._foil import alone, by_mesh, wing
-from ._rows import Result, Row
+from ._press import fig9_finger, under
+from ._rows import Result, Row, exact_columns, zero
 
 FOIL = Effect(3000.0, 0.02, 3.0)
 NU, SLOPE, NOISE = 0.49, 1.5e-3, 1.5e-4
@@ -37,18 +36,15 @@ MUS = (0.06, 0.125, 0.25, 0.4, 0.5, 0.6, 1.0)
 LENGTHS = (1.0, 2.0, 4.0, 10.0)
 DEPTHS = (1.0, 0.5, 0.25)  # of a foil under a free surface, in its lengths
 PAPER, WING = "Maeno 2004, Sec. IV", "Prandtl's equation, Glauert 1926"
-COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_free resolution_read".split()
+COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_free resolution_read"
 
 
 def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
     """The finger with a pair of foils, mirror images of each other."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     turn = math.radians(30.0)
     gauges = (Gauge("g", 36.0, 38.0, 0.0, turn, length), Gauge("m", -36.0, 38.0, 0.0, math.pi - turn, length))
-    model = Model(
-        body, Isotropic(1.0, NU), MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), friction=Coulomb(0.25),
-        gauges=gauges, domain=domain,
-    )  # fmt: skip
+    mesh, legs, law = MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), Coulomb(0.25)
+    model = Model(fig9_finger(), Isotropic(1.0, NU), mesh, legs, friction=law, gauges=gauges, domain=domain)
     return build(FOIL.apply(model))
 
 
@@ -56,22 +52,19 @@ def strains(problem: Problem, mus: tuple[float, ...]) -> np.ndarray:
     """Free strain and what is read (m, 2) at the end of the press for every mu."""
     out = []
     for mu in mus:
-        frames = list(march(replace(problem, model=replace(problem.model, friction=Coulomb(mu)))))
-        if not frames[-1].outcome.ok:
-            raise AssertionError(f"mu = {mu:g}: {frames[-1].outcome}")
-        out.append((frames[-1].gauges["g_free"], frames[-1].gauges["g"]))
+        gauges = under(problem, mu)[-1].gauges
+        out.append((gauges["g_free"], gauges["g"]))
     return np.array(out)
 
 
 def run(quick: bool) -> Result:
     """Quick: two lengths, coarse meshes, no mesh in space."""
-    rows = _plane_rows(quick) + ([] if quick else _space_rows())
+    rows = [*_plane_rows(quick), *(() if quick else _space_rows())]
     mus = MUS[3:6] if quick else MUS
     lengths = (1.0, 4.0) if quick else LENGTHS
     sizes: dict[Domain, float] = {"plane-strain": 4.0, "solid": 5.0} if quick else {"plane-strain": 1.0, "solid": 2.5}
     steps = 10 if quick else 160
-    found: dict[tuple[str, float], np.ndarray] = {}
-    table: list[tuple[Any, ...]] = []
+    found, table = {}, []
     for domain, size in sizes.items():
         for length in lengths:
             value = strains(finger(domain, length, size, steps), mus)
@@ -83,92 +76,63 @@ def run(quick: bool) -> Result:
     for domain, size in sizes.items():
         half = strains(finger(domain, 4.0, size, steps // 2), mus)
         rows.append(_steps_row(domain, found[domain, 4.0], half, mus, steps))
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, found, np.array(mus)))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, found, np.array(mus)))
 
 
-def _plane_rows(quick: bool) -> list[Row]:
-    rows = []
+def _plane_rows(quick: bool) -> Iterator[Row]:
     foil = Foils(3000.0, 0.02, 0.15)  # 3 of 20 mm, on 1 mm
     for length in (1.0, 4.0, 10.0):
         want = wing(length, 9.0, 1.0, NU)
-        rows.append(
-            Row(
-                f"read over free, {length:g} mm, plane strain without end", WING, want,
-                alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
-            )
+        yield Row(
+            f"read over free, {length:g} mm, plane strain without end", WING, want,
+            alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
         )  # fmt: skip
     fine = [by_mesh(4.0, foil, 1.0, NU, 2, n) for n in ((4, 8) if quick else (8, 16))]
-    rows.append(
-        Row(
-            "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
-            2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
-        )
+    yield Row(
+        "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
+        2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
     )  # fmt: skip
     for below in DEPTHS[1:] if quick else DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, NU, 2, n, 4.0 * below) for n in ((4, 8) if quick else (8, 16))]
-        rows.append(
-            Row(
-                f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
-                "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
-                "left out by the effect", "sensitivity",
-            )
+        yield Row(
+            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
+            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
+            "left out by the effect", "sensitivity",
         )  # fmt: skip
-    return rows
 
 
-def _space_rows() -> list[Row]:
-    rows = []
+def _space_rows() -> Iterator[Row]:
     foil = Foils(3000.0, 0.02, 3.0)
     for length in (1.0, 4.0, 10.0):
         meshes = [by_mesh(length, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
-        rows.append(
-            Row(
-                f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
-                2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
-            )
+        yield Row(
+            f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
+            2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
         )  # fmt: skip
     endless = [by_mesh(4.0, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
     for below in DEPTHS:
         near = [by_mesh(4.0, foil, 1.0, 0.3, 3, n, 4.0 * below) for n in (2, 4)]
-        rows.append(
-            Row(
-                f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
-                "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
-                "left out by the effect", "sensitivity",
-            )
+        yield Row(
+            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
+            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
+            "left out by the effect", "sensitivity",
         )  # fmt: skip
-    return rows
 
 
-def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> list[Row]:
+def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> Iterator[Row]:
     """The paper against gauges of 4 mm: size of the slope at mu = 0.5, and its sign."""
-    rows = []
     at = mus.index(0.5)
     for domain, name in (("plane-strain", "plane strain"), ("solid", "solid")):
         slopes = np.gradient(found[domain, 4.0], np.array(mus), axis=0)[at]
         for slope, what in zip(slopes, ("free strain", "as a foil of 4 mm reads it"), strict=True):
-            rows.append(
-                Row(
-                    f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER, 0.0,
-                    float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement", "absolute",
-                )
-            )  # fmt: skip
-            rows.append(
-                Row(
-                    f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER, 0.0,
-                    float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement", "absolute",
-                )
-            )  # fmt: skip
+            yield zero(f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER,
+                       float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement")  # fmt: skip
+            yield zero(f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER,
+                       float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement")  # fmt: skip
         strain = found[domain, 4.0][:, 1]
         rising = np.maximum(np.diff(strain), 0.0).sum() / np.abs(np.diff(strain)).sum()
-        rows.append(
-            Row(
-                f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
-                0.0, float(rising), 0.05, "round-off and increments", "statement", "absolute",
-            )
-        )  # fmt: skip
-    return rows
+        yield zero(f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
+                   float(rising), 0.05, "round-off and increments", "statement")  # fmt: skip
 
 
 def _steps_row(domain: str, value: np.ndarray, half: np.ndarray, mus: tuple[float, ...], steps: int) -> Row:

@@ -27,8 +27,7 @@ from finger3d.mechanics.model import Leg, Model
 from ._ccx import program
 from ._cost import SECTION, Case, model_of
 from ._felupe import felupe_press, is_felupe_installed
-from ._paper import columns
-from ._rows import Result, Row, committed
+from ._rows import Result, Row, at_least, columns, committed, zero
 from .beside_calculix import calculix
 
 BY_NAME = True
@@ -117,21 +116,19 @@ def _felupe(size: float) -> tuple[float, float]:
 
 def _rows(lines: list[Line], floors: Mapping[str, float]) -> list[Row]:
     rows = [
-        Row(f"{name}: uncertainty of the truth, relative", "three finest meshes", 0.0, floors[name], 0.02,
-            "errors of a few per cent are judged", measure="absolute")
+        zero(f"{name}: uncertainty of the truth, relative", "three finest meshes", floors[name], 0.02,
+            "errors of a few per cent are judged")
         for name in NUMBERS
     ]  # fmt: skip
     for name in NUMBERS:
         errors = [line[6] for line in lines if (line[0], line[4]) == ("finger3d", name)]
         text = f"{name}: error with edges of {SIZES[0]:g} mm over that of the third finest mesh"
-        rows.append(Row(text, "errors fall with the mesh", 1.0, errors[0] / errors[-3], 0.0, "refined", "verification",
-                        "at least"))  # fmt: skip
+        rows.append(at_least(text, "errors fall with the mesh", 1.0, errors[0] / errors[-3], "refined"))
     return rows
 
 
 def _draw(figure: Any, lines: list[Line], floors: Mapping[str, float]) -> None:
     figure.set_size_inches(7.0, 4.4)
-    figure.set_layout_engine("constrained")
     axes = figure.subplots()
     for (name, label), mark in zip(NUMBERS.items(), ("o-", "s-", "^-"), strict=True):
         some = [(line[3], 100.0 * line[6]) for line in lines if (line[0], line[4]) == ("finger3d", name)]
@@ -142,5 +139,3 @@ def _draw(figure: Any, lines: list[Line], floors: Mapping[str, float]) -> None:
         axes.loglog(*zip(*theirs, strict=True), mark, ms=8, ls="none", label=f"normal force, {peer} (penalty contact)")
     axes.set(xlabel="time from mesh to last increment (s)", ylabel="error (%)",
              title="What an error costs: section of the Fig. 9 finger")  # fmt: skip
-    axes.grid(True, which="major", lw=0.4, alpha=0.6)
-    axes.legend(fontsize=8)

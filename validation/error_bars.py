@@ -37,8 +37,8 @@ from finger3d.mechanics.results.history import StepResult
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import changed
+from ._rows import Result, Row, at_least, at_most, columns
 
 DEPTHS = (1.0, 0.6)
 ENERGIES, READINGS = ("external_work_mJ", "dissipation_mJ"), ("gauge", "marker", "taxel")
@@ -100,7 +100,7 @@ def _runs(model: Model, mus: tuple[float, ...] = MUS) -> Iterator[tuple[float, f
         legs = tuple(replace(leg, depth_mm=share * leg.depth_mm) for leg in model.legs)
         problem = build(replace(model, legs=legs))
         for mu in mus:
-            yield mu, legs[0].depth_mm, replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
+            yield mu, legs[0].depth_mm, changed(problem, friction=Coulomb(mu))
 
 
 def _pressed(problem: Problem) -> tuple[Problem, list[StepResult]]:
@@ -221,9 +221,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
                 continue
             dofs = problem.body.stiffness.upper.shape[0]
             depth = model.legs[0].depth_mm
-            yield Judged(
-                name, part, dofs, model.friction.mu, depth, k, value, bars.get(k, 0.0), abs(value - exact[k])
-            )  # fmt: skip
+            yield Judged(name, part, dofs, model.friction.mu, depth, k, value, bars.get(k, 0.0), abs(value - exact[k]))
 
 
 def run(quick: bool, seed: int | None = None) -> Result:
@@ -265,19 +263,17 @@ def run(quick: bool, seed: int | None = None) -> Result:
     return Result(tuple(rows), columns(COLUMNS, every), lambda figure: _draw(figure, meshes, steps))
 
 
-def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str]) -> list[Row]:
+def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str]) -> Iterator[Row]:
     """The share of every number in each kind of mesh, by the name of the scene; a pool of all would hide one.
 
     Zones of stick are a statement: most of these meshes have fewer than 700 unknowns, where they are of few points.
     """
-    rows = []
     for group in dict.fromkeys(meshes.values()):
         for kind in KINDS:
             here = [j for j in found if j.kind == kind and meshes[j.scene] == group]
             if len(here) >= LEAST:
                 row = _share(here, f"{kind}, by mesh, {group}, {len(here)} cases")
-                rows.append(replace(row, kind="statement") if "stick" in kind else row)
-    return rows
+                yield replace(row, kind="statement") if "stick" in kind else row
 
 
 def _share(here: list[Judged], text: str, slack: float = 1e-9) -> Row:
@@ -285,7 +281,7 @@ def _share(here: list[Judged], text: str, slack: float = 1e-9) -> Row:
     what = f"share of cases within 2 times the estimate: {text}"
     # few points slip, so that the dissipation and the border of stick move by fits
     claimed = 0.85 if LARGE in text and ("stick" in text or "dissipation" in text) else 0.9
-    return Row(what, CLAIM, claimed, inside, 0.0, "a bound", "verification", "at least")
+    return at_least(what, CLAIM, claimed, inside)
 
 
 def _rows(kind: str, found: list[Judged], what: str, slack: float = 1e-9) -> list[Row]:
@@ -296,22 +292,18 @@ def _rows(kind: str, found: list[Judged], what: str, slack: float = 1e-9) -> lis
     text = f"{kind}, {what}, {len(here)} cases"
     return [
         _share(here, text, slack),
-        Row(
-            f"estimate over true error, median: {text}", "a bar that is never wrong tells nothing", 10.0,
-            float(np.median(told)), 0.0, "one decade", "sensitivity", "at most",
-        ),
+        at_most(f"estimate over true error, median: {text}", "a bar that is never wrong tells nothing", 10.0,
+            float(np.median(told)), "one decade", "sensitivity"),
     ]  # fmt: skip
 
 
-def _narrow(found: list[Judged], text: str) -> list[Row]:
+def _narrow(found: list[Judged], text: str) -> Iterator[Row]:
     """Whether the bars of the meshes are as narrow as was aimed at, by the kind of number."""
-    rows = []
     for kind in KINDS:
         if here := [j for j in found if j.kind == kind]:
             median = float(np.median([j.estimate / j.error for j in here if j.error > 1e-6 * abs(j.value)] or [1.0]))
             what = f"estimate over true error, median: {kind}, {text}"
-            rows.append(Row(what, "goal of this project", NARROW, median, 0.0, "the goal", "statement", "at most"))
-    return rows
+            yield at_most(what, "goal of this project", NARROW, median, "the goal", "statement")
 
 
 def _met(kind: str, steps: list[Judged]) -> Row:
@@ -319,7 +311,7 @@ def _met(kind: str, steps: list[Judged]) -> Row:
     here = [j for j in steps if j.kind == kind]
     share = float(np.mean([j.error <= MET[kind] * _scale(j, here) for j in here]))
     what = f"share of automatic presses called met whose true error is below the tolerance: {kind}, {len(here)} cases"
-    return Row(what, f"tolerance {MET[kind]:g}", 0.9, share, 0.0, CLAIM, "statement", "at least")
+    return at_least(what, f"tolerance {MET[kind]:g}", 0.9, share, CLAIM, "statement")
 
 
 def _draw(figure: Any, found: list[Judged], steps: list[Judged]) -> None:
@@ -345,7 +337,7 @@ def _draw(figure: Any, found: list[Judged], steps: list[Judged]) -> None:
         axes.loglog(line, 2.0 * line, color="#222222", lw=1.0, ls="--", label="2 bars")
         axes.set(title=f"{kind.replace('_', ' ')}, {part}", xlim=(1e-5, 2.0), ylim=(1e-6, 2.0))
         axes.set(xlabel="bar, relative", ylabel="true error, relative")
-    panels[0].legend(fontsize=8, loc="upper left")
+    panels[0].legend(loc="upper left")
 
 
 def _scale(judged: Judged, group: list[Judged]) -> float:

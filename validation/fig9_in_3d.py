@@ -13,25 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.results.history import measure
 
-from ._paper import (
-    BELOW_FIG9,
-    MUS,
-    STRAIN,
-    STRESS,
-    Profile,
-    columns,
-    fig9,
-    line,
-    said,
-    strains,
-    under,
-)  # fmt: skip
-from ._rows import Result, Row
-from .fig12_gauge_angles import ANGLES, gauges, statements
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
+from ._rows import Result, Row, columns
+from .fig9_strains import ANGLES, gauges, statements
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)
@@ -42,12 +30,11 @@ def run(quick: bool) -> Result:
     """The solid on swept meshes, and both plane models at the same in-plane sizes."""
     size, count = (4.0, 13) if quick else (1.5, 25)
     nus = (0.49,) if quick else (0.45, 0.49)
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     x = np.linspace(0.0, 48.0, count)
     shear, gauge, middle, numbers, lines = {}, {}, {}, {}, []
     for nu in nus:
         for plane in PLANES:
-            problem = fig9(nu, plane, size, [*line(x, design, BELOW_FIG9), *gauges()])
+            problem = fig9(nu, plane, size, [*line(x, fig9_finger(), BELOW_FIG9), *gauges()])
             frames = [under(problem, mu, STEPS[plane])[-1] for mu in MUS]
             shear[plane, nu] = np.array([strains(f, count)[2] for f in frames])
             gauge[plane, nu] = {t: np.array([f.gauges[f"{BELOW_FIG9}:{t}"] for f in frames]) for t in ANGLES}
@@ -110,7 +97,7 @@ def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict
             at[SOLID] / at[STRAIN], "half of the signal", 0.0, "at least",
         ),
     ]  # fmt: skip
-    return rows + statements("20 mm wide", nu, np.array(MUS), gauge[SOLID, nu])
+    return [*rows, *statements("20 mm wide", nu, np.array(MUS), gauge[SOLID, nu])]
 
 
 def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middle: dict) -> None:
@@ -127,8 +114,7 @@ def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middl
             panels[1, column].plot(x, shear[plane, nu][i], color=colour, lw=1.1)
         for i, angle in enumerate((15, 30, 45, 60)):
             panels[2, column].plot(MUS, gauge[plane, nu][angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
-        panels[0, column].set_title("20 mm wide, z = 0" if plane == SOLID else plane, fontsize=11)
-        panels[0, column].set_xlabel("x (mm)")
+        panels[0, column].set(title="20 mm wide, z = 0" if plane == SOLID else plane, xlabel="x (mm)")
         panels[1, column].set_xlabel("x (mm)")
         panels[2, column].set_xlabel("mu")
         for row in range(3):
@@ -136,5 +122,5 @@ def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middl
     panels[0, 0].set_ylabel("friction along x (MPa)")
     panels[1, 0].set_ylabel("gamma_xy under the surface")
     panels[2, 0].set_ylabel("gauge strain at x = 36")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8, ncols=2)
-    panels[2, 0].legend(title="angle", frameon=False, fontsize=8, ncols=2)
+    panels[0, 0].legend(title="mu", frameon=False, ncols=2)
+    panels[2, 0].legend(title="angle", frameon=False, ncols=2)

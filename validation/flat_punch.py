@@ -13,14 +13,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import body, box, convergence, graded, held_at, mapped, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns, zero
 
-Float = NDArray[np.float64]
 HEIGHT = 200.0  # a = 1 mm, E = 1 MPa
 AWAY = 0.9
 _SOURCE = "Johnson 1985, sec. 2.8; REFERENCES.md, 1.5"
@@ -60,14 +59,12 @@ def errors(h: float, nu: float) -> tuple[float, float, float, float]:
 def run(quick: bool) -> Result:
     """Two Poisson's ratios, three sizes or more."""
     sizes = np.array([0.02, 0.01, 0.0025] if quick else [0.02, 0.01, 0.005, 0.0025, 0.00125])
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves = {}
+    rows, table, curves = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.45):
         found = np.array([errors(h, nu) for h in sizes])
         _, worst, _, half = found[-1]
         what = f"pressure up to 0.9 a over P/(pi sqrt(a^2 - x^2)), nu = {nu:g}, worst point, less 1"
-        rows.append(Row(what, _SOURCE, 0.0, float(worst), 0.02, _TWO, measure="absolute"))
+        rows.append(zero(what, _SOURCE, float(worst), 0.02, _TWO))
         why = "the tolerance of the pressure, of which it is a mean"
         rows.append(
             Row(f"share of the force within a/2, nu = {nu:g}", "arcsin(1/2) 2/pi", 1 / 3, (1 + half) / 3, 0.02, why)
@@ -80,9 +77,8 @@ def run(quick: bool) -> Result:
         curves[f"pressure up to 0.9 a, worst, nu = {nu:g}"] = found[:, 1]
         curves[f"force within a/2, nu = {nu:g}"] = found[:, 3]
         table += [(nu, *e) for e in found]
-    names = ("nu", "corner_element_over_a", "worst_error", "rms_error", "error_of_inner_force")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, found[:, 0], curves))
+    names = "nu corner_element_over_a worst_error rms_error error_of_inner_force"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, found[:, 0], curves))
 
 
 def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
@@ -95,8 +91,4 @@ def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
     right.plot(fine, exact(fine, 2.0), "k--", linewidth=1.0, label="P / (pi sqrt(a^2 - x^2))")
     right.plot(x, p / mean, "o", markersize=4.5, label="nodes, h = 0.01 a")
     right.axvline(AWAY, color="0.6", linewidth=0.8)
-    right.set_ylim(0.0, 4.0)
-    right.set_xlabel("x / a")
-    right.set_ylabel("pressure / mean pressure")
-    right.legend(fontsize=8)
-    right.grid(alpha=0.3)
+    right.set(ylim=(0.0, 4.0), xlabel="x / a", ylabel="pressure / mean pressure")

@@ -35,7 +35,8 @@ from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Sphere
 
-from ._rows import Result, Row
+from ._press import changed, fig9_finger
+from ._rows import Result, Row, at_least, zero
 
 E, PRONY = 1.0, ((0.5, 1.0),)
 RAMP, HELD = 1.0, 40.0  # s
@@ -46,12 +47,9 @@ CONTROL = "REFERENCES.md, 7.3"
 
 def finger(size: float, material: Isotropic, mu: float) -> Model:
     """The section of Fig. 9; the depth of the leg meshes the contact."""
-    design = designs()["clipped_cylinder"](
-        radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0
-    )  # fmt: skip
     gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
     mesh = MeshOptions(size, 8.0, "swept")
-    return Model(design, material, mesh, (Leg(6.0),), friction=Coulomb(mu), gauges=gauges, domain="plane-strain")
+    return Model(fig9_finger(), material, mesh, (Leg(6.0),), friction=Coulomb(mu), gauges=gauges, domain="plane-strain")
 
 
 def block(size: float, material: Isotropic, mu: float) -> Model:
@@ -64,7 +62,7 @@ def block(size: float, material: Isotropic, mu: float) -> Model:
 def history(problem: Problem, legs: tuple[Leg, ...]) -> list[Tree]:
     """What is measured after every increment."""
     out = []
-    for frame in march(replace(problem, model=replace(problem.model, legs=legs))):
+    for frame in march(changed(problem, legs=legs)):
         assert frame.outcome.ok, frame.outcome
         out.append(measure(problem.points, frame))
     return out
@@ -98,8 +96,7 @@ def column(steps: list[Tree], name: str) -> Float:
 def run(quick: bool) -> Result:
     """Two bodies under a cycle of force, and a viscous one under a held force."""
     count = 4 if quick else 10
-    rows: list[Row] = []
-    cycles = {}
+    rows, cycles = [], {}
     for name, model, depth in (
         ("finger, plane strain", finger(2.0 if quick else 1.0, Isotropic(E, 0.45), 0.25), 5.0),
         ("ball on a block", block(0.4 if quick else 0.25, Isotropic(E, 0.3), 0.05), 0.3),
@@ -108,11 +105,11 @@ def run(quick: bool) -> Result:
         force = history(problem, (Leg(depth, steps=4),))[-1]["normal_force_N"]
         cycles[name] = _cycle(problem, depth, force, count)
         rows += _cycle_rows(name, problem, cycles[name], count, force)
-        smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+        smooth = changed(problem, friction=Coulomb(0.0))
         free = _cycle(smooth, depth, force, count)
         rows.append(
-            Row(f"depth on the way down less that on the way up, over it, mu = 0, {name}", "unique", 0.0,
-                float(_loop(free, count).max()), 1e-8, "the contact's residual", measure="absolute")
+            zero(f"depth on the way down less that on the way up, over it, mu = 0, {name}", "unique",
+                float(_loop(free, count).max()), 1e-8, "the contact's residual")
         )  # fmt: skip
     found, curve = _creep(quick)
     rows += found
@@ -144,14 +141,13 @@ def _cycle_rows(name: str, problem: Problem, steps: list[Tree], count: int, forc
     found = column(steps, "normal_force_N")
     top, end = (difference(steps[k], again[k], height) for k in (count - 1, -1))
     return [
-        Row(f"largest error of the force over it, {name}", CONTROL, 0.0, float((np.abs(found - wanted) / wanted).max()),
-            1e-10, "the tolerance of prescribed forces", measure="absolute"),
-        Row(f"largest difference of any quantity from the press by depths, at the largest force, {name}", SAME, 0.0,
-            top, 2e-5, "the first increment begins in shares of a depth known to a thousandth", measure="absolute"),
-        Row(f"the same after the way down, {name}", SAME, 0.0, end, 2e-5, "as before", measure="absolute"),
-        Row(f"depth on the way down less that on the way up, over it, largest, {name}",
-            "Spence 1975, Turner 1979", 1e-6, float(_loop(steps, count).max()), 0.0,
-            "friction is not reversible: far above the residual", measure="at least"),
+        zero(f"largest error of the force over it, {name}", CONTROL, float((np.abs(found - wanted) / wanted).max()),
+            1e-10, "the tolerance of prescribed forces"),
+        zero(f"largest difference of any quantity from the press by depths, at the largest force, {name}", SAME, top,
+            2e-5, "the first increment begins in shares of a depth known to a thousandth"),
+        zero(f"the same after the way down, {name}", SAME, end, 2e-5, "as before"),
+        at_least(f"depth on the way down less that on the way up, over it, largest, {name}", "Spence 1975, Turner 1979",
+            1e-6, float(_loop(steps, count).max()), "friction is not reversible: far above the residual"),
     ]  # fmt: skip
 
 
@@ -166,8 +162,7 @@ def creep(t: float) -> float:
 
 def _creep(quick: bool) -> tuple[list[Row], dict[str, Any]]:
     size, per_second = (4.0, 4) if quick else (1.5, 16)
-    rows: list[Row] = []
-    curve: dict[str, Any] = {}
+    rows, curve = [], {}
     nu = 0.45
     shear, bulk = E / (2.0 * (1.0 + nu)), E / (3.0 * (1.0 - 2.0 * nu))
     long = 9.0 * bulk * 0.5 * shear / (3.0 * bulk + 0.5 * shear), (3.0 * bulk - shear) / (6.0 * bulk + shear)
@@ -203,11 +198,11 @@ def _creep_rows(model: Model, steps: list[Tree], per_second: int, force: float) 
     early = int(np.argmin(np.abs(time - RAMP - 4.0)))
     held = column(steps, "normal_force_N")[per_second:]
     return [
-        Row("elastic force at the depth over F J, up to 4 s of the hold, largest error", CREEP, 0.0,
+        zero("elastic force at the depth over F J, up to 4 s of the hold, largest error", CREEP,
             float(away[: early + 1].max()), 0.25 / per_second**2,
-            "second order in the increment: the elastic force is linear within it", measure="absolute"),
-        Row("largest error of the held force over it", CONTROL, 0.0, float(np.abs(held / force - 1.0).max()), 1e-9,
-            "the tolerance of prescribed forces", measure="absolute"),
+            "second order in the increment: the elastic force is linear within it"),
+        zero("largest error of the held force over it", CONTROL, float(np.abs(held / force - 1.0).max()), 1e-9,
+            "the tolerance of prescribed forces"),
         Row("least increase of the depth in an increment of the hold, mm", "creep", 0.0,
             float(np.diff(depth[per_second - 1 :]).min()), 1e-8, "it grows all the time", measure="at least"),
     ]  # fmt: skip
@@ -227,6 +222,3 @@ def _draw(figure: Any, cycles: dict[str, list[Tree]], count: int, curve: dict[st
     right.plot(curve["time"], curve["depth"], "o-", ms=2, label="held by force")
     right.axhline(curve["end"], color="k", lw=0.8, label="elastic, relaxed modulus")
     right.set(xlabel="time (s)", ylabel="depth (mm), finger without friction", ylim=(0.0, 1.1 * curve["end"]))
-    for axes, where in ((left, "upper left"), (middle, "best"), (right, "lower right")):
-        axes.legend(fontsize=7, loc=where)
-        axes.grid(alpha=0.3)

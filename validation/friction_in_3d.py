@@ -12,13 +12,13 @@ and increments, which computing removes; mu is known to lie between 0.05 and 1, 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.optimise.gauge_fields import GaugeFields
@@ -26,16 +26,14 @@ from finger3d.analyses.optimise.gauge_search import Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import fig9_finger
+from ._rows import Result, Row, at_least, at_most, columns
 
-Float = NDArray[np.float64]
 Domain = Literal["solid", "plane-strain"]
 
 NOISE, LIMIT = 1.5e-4, 0.1
@@ -57,17 +55,14 @@ Spread = dict[tuple[Domain, str, str, str], Float]
 
 def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
     """Return the finger without readings."""
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
-    found = Model(
-        design, Isotropic(1.0, 0.49), MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),), domain=domain
-    )  # fmt: skip
+    mesh, legs = MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),)
+    found = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, domain=domain)
     return LargeDeformation().apply(found) if large else found
 
 
 def run(quick: bool) -> Result:
     """Quick: the section in small strain, with one and two gauges."""
-    spread: Spread = {}
-    placed: list[tuple[Any, ...]] = []
+    spread, placed = {}, []
     for domain, sizes in (QUICK if quick else SIZES).items():
         for measure in (SMALL,) if quick else (SMALL, LARGE):
             large = measure == LARGE
@@ -148,29 +143,26 @@ def _sd(joint: Calibration) -> Float:
     return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + 12.0 / (MUS[-1] - MUS[0]) ** 2))
 
 
-def _rows(spread: Spread) -> list[Row]:
-    rows = []
+def _rows(spread: Spread) -> Iterator[Row]:
     for (domain, measure, name, read), sd in spread.items():
         at = float(np.interp(0.5, MUS, sd))
         what = f"standard deviation of mu = 0.5: {NAMES[domain]}, {measure}, {name}, {read}"
-        rows.append(Row(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, 0.0, "the paper's claim", "statement", "at most"))
+        yield at_most(what, "Maeno 2004, Sec. IV: 0.1", LIMIT, at, "the paper's claim", "statement")
         share = float(np.mean(sd <= LIMIT))
         what = f"share of mu = 0.05 to 1 that is found within 0.1: {NAMES[domain]}, {measure}, {name}, {read}"
-        rows.append(Row(what, "no reference", 0.5, share, 0.0, "half of the range", "statement", "at least"))
+        yield at_least(what, "no reference", 0.5, share, "half of the range", "statement")
     for domain, measure in dict.fromkeys((key[0], key[1]) for key in spread):
         mean = [float(sd.mean()) for key, sd in spread.items()
                 if key[:2] == (domain, measure) and "best" in key[2] and key[3] == FREE]  # fmt: skip
         worst = max(b / a for a, b in zip(mean, mean[1:], strict=False))
         what = f"mean standard deviation of mu with a gauge more, over that before: {NAMES[domain]}, {measure}"
-        rows.append(Row(what, "more readings tell more", 1.05, worst, 0.0, "placed with the error of the mesh, judged "
-                        "without", "sensitivity", "at most"))  # fmt: skip
-    return rows
+        yield at_most(what, "more readings tell more", 1.05, worst,
+                      "placed with the error of the mesh, judged " "without", "sensitivity")  # fmt: skip
 
 
 def _draw(figure: Any, spread: Spread) -> None:
     cases = list(dict.fromkeys((key[0], key[1]) for key in spread))
     figure.set_size_inches(5.2 * len(cases), 5.0)
-    figure.set_layout_engine("constrained")
     panels = np.atleast_1d(figure.subplots(1, len(cases), sharey=True))
     colours = {PAPER: "#b2182b", MARKERS: "#1b7837"}
     blues = dict(zip((n for n in dict.fromkeys(key[2] for key in spread) if "best" in n),
@@ -184,7 +176,6 @@ def _draw(figure: Any, spread: Spread) -> None:
         axes.axhline(LIMIT, color="#222222", lw=0.8)
         axes.text(0.06, LIMIT * 1.08, "the paper's 0.1", fontsize=8)
         axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(2e-3, 0.4))
-        axes.grid(alpha=0.3)
     panels[0].set_ylabel("standard deviation of mu")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)

@@ -31,8 +31,7 @@ from finger3d.mechanics.model import Leg, Model
 
 from ._ccx import printed_forces, program, solve
 from ._felupe import felupe_press, is_felupe_installed
-from ._paper import columns
-from ._rows import Result, Row, committed
+from ._rows import Result, Row, at_most, columns, committed
 from .hard_cases import DEPTH, MU, finger
 
 STIFFER = 100.0
@@ -119,17 +118,16 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
     here = f"{total} increments at mu = 0 to 1e6"
 
     def least(peer: str, what: str, tried: Sequence[float]) -> Row:
-        return Row(f"least share of the press that {peer} does, {what}, {np.isfinite(tried).sum()} values of mu",
-                   "finger3d: 1", 1.0, float(np.nanmin(tried)), 0.0, "a bound", "sensitivity", "at most")  # fmt: skip
+        return at_most(f"least share of the press that {peer} does, {what}, {np.isfinite(tried).sum()} values of mu",
+                       "finger3d: 1", 1.0, float(np.nanmin(tried)), kind="sensitivity")  # fmt: skip
 
     rows = [
         Row(f"increments that settle, finger3d, of {here}", "hard_cases", total, settled, 0.0, "all"),
-        Row(f"the same by the paper's rule, of {here}", "hard_cases, finger3d", settled, paper, 0.0, "a bound",
-            "sensitivity", "at most"),
+        at_most(f"the same by the paper's rule, of {here}", "hard_cases, finger3d", settled, paper, kind="sensitivity"),
         least("CalculiX", "stick slope of its deck", table["calculix_share"]),
         least("FElupe", "its own stick slope", table["felupe_share"]),
-        Row("creep of a hold in a minute, finger3d (mm)", "creep_of_a_hold", 1e-12, creeps["finger3d"], 0.0,
-            "a bound above round-off", measure="at most"),
+        at_most("creep of a hold in a minute, finger3d (mm)", "creep_of_a_hold", 1e-12, creeps["finger3d"],
+            "a bound above round-off"),
     ]  # fmt: skip
     for peer in ("CalculiX", "FElupe"):
         tried = table[f"{peer.lower()}_stiff_share"]
@@ -152,14 +150,13 @@ def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) ->
     ):
         left.plot(names, 100.0 * share, style, ms=size, label=label)
     left.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
-    left.legend(fontsize=8, loc="upper left")
-    left.set_title("increments that settle; peers: share of the press", fontsize=10)
+    left.set_title("increments that settle; peers: share of the press")
     values = np.maximum(list(creeps.values()), 1e-16)
     bars = right.bar(list(creeps), values, color=["C0"] + ["C4"] * (len(creeps) - 1))
     right.bar_label(bars, [_told(v) for v in creeps.values()], fontsize=8)
     right.set(yscale="log", ylim=(1e-16, 1e5), ylabel="creep in a minute (mm)")
     right.tick_params(axis="x", labelsize=8)
-    right.set_title("object of 45 g held with 12 N, mu = 1", fontsize=10)
+    right.set_title("object of 45 g held with 12 N, mu = 1")
     total, settled, paper = (int(t[k].sum()) for k in ("increments", "settled", "paper_settled"))
     figure.supxlabel(
         f"finger3d settles {settled} of {total} increments, the paper's rule {paper} up to its first cycles", fontsize=9

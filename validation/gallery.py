@@ -15,13 +15,12 @@ and the soft ball with Hertz's solution for both moduli and both radii (1.3).  F
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -30,9 +29,9 @@ from finger3d.mechanics.results.history import measure
 from finger3d.scene import load
 
 from . import _layer
-from ._rows import Result, Row
+from ._press import changed
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 SCENES = Path(__file__).resolve().parents[1] / "geometries"
 LAYER = "bonded layer; REFERENCES.md, 1.1 and 1.7"
 HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1 and 1.3"
@@ -65,7 +64,7 @@ def force(problem: Problem, frames: list[Any]) -> float:
 
 def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[float, float]:
     """Force without friction over Hertz's at the same contact radius, and that radius (mm), at the end."""
-    smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    smooth = changed(problem, friction=Coulomb(0.0))
     f = _marched(smooth)[-1].state.force[:, 0]
     square = problem.surface.average @ np.sum(problem.surface.samples[:, [0, 2]] ** 2, axis=1)
     a = float(np.sqrt(2.5 * (f @ square[problem.symmetry.image_of]) / f.sum()))
@@ -74,10 +73,7 @@ def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[fl
 
 def run(quick: bool) -> Result:
     """Every scene on two meshes; two of them against theory."""
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, tuple[Float, Float]] = {}
-    round_ones: dict[str, Problem] = {}
+    rows, table, curves, round_ones = [], [], {}, {}
     for name in ("edge", "wavy_plate") if quick else SIZES:
         size = SIZES[name] * (2.0 if quick else 1.0)
         own = pressed(name, f"mesh.size_mm={size:g}")
@@ -98,9 +94,8 @@ def run(quick: bool) -> Result:
         curves[name] = depths, np.array([force(own[0], own[1][: k + 1]) for k in range(len(depths))])
     if not quick:
         rows += _theory_rows(**round_ones)
-    columns = "scene size_mm other_mesh force_N other_force_N other_force_sd_N".split()
-    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), kept, lambda figure: _draw(figure, curves))
+    columns = "scene size_mm other_mesh force_N other_force_N other_force_sd_N"
+    return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, curves))
 
 
 def round_by_parabola(q: float) -> float:
@@ -137,5 +132,3 @@ def _draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
         pressing = np.flatnonzero(np.diff(depth, prepend=0.0) > 0.0)  # a slide stands still at its depth
         axes.plot([0.0, *depth[pressing]], [0.0, *values[pressing]], "o-", ms=4, label=name.replace("_", " "))
     axes.set(xlabel="depth, mm", ylabel="normal force, N")
-    axes.grid(alpha=0.3)
-    axes.legend()

@@ -13,17 +13,18 @@ of volume, for which CalculiX takes nu = 0.475.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 
-from ._paper import Float, columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 SOURCE = "Helmut et al. 2024; REFERENCES.md, 9.1"
 DEPTHS, FORCES = np.array([0.5, 1.0, 1.5, 2.0]), np.array([1.6503, 5.9641, 13.5257, 23.2532])
@@ -32,10 +33,7 @@ SHARE = 0.03
 FITS = 0.05
 """Largest distance from a force, relative, of a model that is said to fit."""
 C10, CCX_NU = 0.0725, 0.475
-LAWS: dict[str, dict[str, Any]] = {
-    "neo-Hookean": {},
-    "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02},
-}
+LAWS: dict[str, dict[str, Any]] = {"neo-Hookean": {}, "Yeoh": {"law": "yeoh", "c2_over_c1": -0.1, "c3_over_c1": 0.02}}
 MUS, NUS = (0.02, 0.1, 0.3, 1.0), (0.45, 0.47, 0.49)
 E, ZERO = "material.E_MPa", "depth_offset_mm"
 FREE = {E: (0.05, 3.0), ZERO: (-0.3, 0.3)}
@@ -133,37 +131,28 @@ def _covariance(slopes: Float) -> Float:
     return np.linalg.inv(scaled.T @ scaled)
 
 
-def _rows(models: list[Model], best: Model) -> list[Row]:
+def _rows(models: list[Model], best: Model) -> Iterator[Row]:
     """What fits, what the forces tell, and the prediction."""
     fitting = [m for m in models if m.misfit <= FITS]
     told = f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}, E = {best.E:.3f} MPa"
-    rows = [
-        Row(
-            f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS, best.misfit,
-            0.0, "a block for a gel with a rounded rim; force and zero without published errors", "validation",
-            "at most",
-        ),
-        Row(
-            "models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models), 0.0,
-            "if the forces told nothing but modulus and zero", "statement", "at least",
-        ),
-    ]  # fmt: skip
+    yield at_most(f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS,
+                  best.misfit, "a block for a gel with a rounded rim; force and zero without published errors",
+                  "validation")  # fmt: skip
+    yield at_least("models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models),
+                   "if the forces told nothing but modulus and zero", "statement")  # fmt: skip
     for name, values in {"friction coefficient": [m.mu for m in fitting], "Young's modulus": [m.E for m in fitting],
                          "Poisson's ratio": [m.nu for m in fitting]}.items():  # fmt: skip
         ratio = max(values, default=np.nan) / min(values, default=np.nan)
-        rows.append(Row(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
-                        1.1, ratio, 0.0, "10 %", "statement", "at most"))  # fmt: skip
+        yield at_most(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
+                      1.1, ratio, "10 %", "statement")  # fmt: skip
     # of all models: which of them fit is known only with the fourth force
     band = [m.predicted + sign * 2.0 * m.predicted_sd for m in models for sign in (-1.0, 1.0)]
     outside = max(min(band) - FORCES[3], FORCES[3] - max(band), 0.0)
-    rows.append(
-        Row(
-            f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
-            f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
-            "two standard deviations about every model", "validation", "absolute",
-        )
+    yield Row(
+        f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
+        f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
+        "two standard deviations about every model", "validation", "absolute",
     )  # fmt: skip
-    return rows
 
 
 def _checks(best: Model, finer: Model, size: float) -> list[Row]:
@@ -196,8 +185,8 @@ def _draw(figure: Any, models: list[Model], best: Model) -> None:
     left.plot(*best.curve, color="#2166ac", lw=1.6, label=f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}")
     left.errorbar(DEPTHS, FORCES, SHARE * FORCES, fmt="ko", ms=5, capsize=3, label="measured, 3 %")
     left.set(xlabel="depth (mm)", ylabel="normal force (N)", xlim=(0.0, 2.2), ylim=(0.0, 30.0))
-    left.set_title("models that fit within 5 %", fontsize=10)
-    left.legend(frameon=False, fontsize=8)
+    left.set_title("models that fit within 5 %")
+    left.legend(frameon=False)
     for i, law in enumerate(dict.fromkeys(m.law for m in models)):
         for j, nu in enumerate(dict.fromkeys(m.nu for m in models)):
             own = [m for m in models if m.law == law and m.nu == nu]
@@ -211,5 +200,5 @@ def _draw(figure: Any, models: list[Model], best: Model) -> None:
     middle.legend(fontsize=6.5, frameon=False, ncols=2)
     right.axhline(FORCES[3], color="k", lw=1.0)
     right.set(xlabel="Young's modulus that is identified (MPa)", ylabel="force at 2 mm from the first three (N)")
-    right.set_title("with two standard deviations; line: measured", fontsize=10)
+    right.set_title("with two standard deviations; line: measured")
     right.legend(fontsize=6.5, frameon=False, ncols=2)

@@ -29,8 +29,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, MeshOptions, Model
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
 UNIFORM = Path(__file__).with_name("results") / "cost_of_accuracy_table.csv"
@@ -149,26 +148,21 @@ def _rows(found: list[Mesh]) -> Iterator[Row]:
         equal = [mesh for mesh in some if mesh.way != "graded"]
         for mesh in (mesh for mesh in some if mesh.way == "graded"):
             name = f"{goal}, {domain}, {mesh.dofs} unknowns"
-            yield Row(
-                f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
-                mesh.error / mesh.told, 0.0, "two error bars", measure="at most",
-            )  # fmt: skip
+            yield at_most(f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
+                          mesh.error / mesh.told, "two error bars")  # fmt: skip
             # an error may be small by chance: the bar of the graded mesh counts, and no finer mesh may exceed it
             large = [other.dofs for other in equal if other.error > max(mesh.error, mesh.told)]
             enough = [other.dofs for other in equal if other.dofs > max(large, default=0)]
             ratio = min(enough, default=equal[-1].dofs) / mesh.dofs
-            yield Row(
+            yield at_least(
                 f"unknowns of {equal[0].way} for an error below its bar, over those of the graded mesh: {name}",
-                "goal of this project", WANTED, ratio, 0.0, "the finest of them where none suffices",
-                "statement", "at least",
-            )  # fmt: skip
+                "goal of this project", WANTED, ratio, "the finest of them where none suffices",
+                "statement")  # fmt: skip
             if not any(np.isnan(other.told) for other in equal):
                 enough = [other.dofs for other in equal if other.told <= mesh.told]
-                yield Row(
-                    f"unknowns of {equal[0].way} with as small a bar, over those of the graded mesh: {name}",
-                    "goal of this project", WANTED, min(enough, default=equal[-1].dofs) / mesh.dofs, 0.0,
-                    "the finest of them where none has", "statement", "at least",
-                )  # fmt: skip
+                yield at_least(f"unknowns of {equal[0].way} with as small a bar, over those of the graded mesh: {name}",
+                               "goal of this project", WANTED, min(enough, default=equal[-1].dofs) / mesh.dofs,
+                               "the finest of them where none has", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Mesh]) -> None:
@@ -176,7 +170,6 @@ def _draw(figure: Any, found: list[Mesh]) -> None:
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
     figure.set_size_inches(5.4 * across, 4.2 * down)
-    figure.set_layout_engine("constrained")
     panels = np.ravel(figure.subplots(down, across, squeeze=False))
     titles = {GOAL: "normal force", GAUGE: "strain of the gauge"}
     for axes, (domain, goal) in zip(panels, pairs, strict=True):
@@ -191,6 +184,3 @@ def _draw(figure: Any, found: list[Mesh]) -> None:
                             label="its error bar")  # fmt: skip
         axes.set(title=f"{titles[goal]}, {'section' if domain != 'solid' else 'solid 20 mm wide'}")
         axes.set(xlabel="unknowns", ylabel="error, %", xlim=(3e2, 6e5))
-        axes.grid(True, which="major", lw=0.4)
-    for axes in (panels[0], panels[-1]):
-        axes.legend(fontsize=8)

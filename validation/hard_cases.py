@@ -36,7 +36,7 @@ from finger3d.objects import ObjectPose
 
 from . import _hard
 from ._common import free_motion
-from ._rows import Result, Row, Settled
+from ._rows import Result, Row, Settled, at_least, at_most, zero
 
 DEPTH = 10.0
 NU = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5)
@@ -66,10 +66,7 @@ class Grid:
 def grids(quick: bool) -> tuple[Grid, ...]:
     """The two grids, thinned to what matters most where it must be quick."""
     if quick:
-        return (
-            Grid(2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]),
-            Grid(3, (0.49,), (0.25,), (2,), (10.0,)),
-        )
+        return (Grid(2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]), Grid(3, (0.49,), (0.25,), (2,), (10.0,)))
     return Grid(2, NU, MU, STEPS, SIZES[2]), Grid(3, (0.0, 0.3, 0.49, 0.5), (0.0, 0.25, 1.0, 1e6), (1, 10), SIZES[3])
 
 
@@ -194,18 +191,17 @@ def _grid_rows(dim: int, columns: dict[str, list[Any]], counts: tuple[list[float
     literal, cycled = (float(t[k].sum()) for k in ("paper_settled", "paper_cycled"))
 
     def bound(what: str, most: float, got: float, reference: str = ROBUST) -> Row:
-        return Row(f"{here}: {what}", reference, most, float(got), 0.0, "a bound", measure="at most")
+        return at_most(f"{here}: {what}", reference, most, float(got))
 
     return [
-        Row(f"{here}: unsettled", ROBUST, 0, total - settled, 0, "none", measure="absolute"),
+        zero(f"{here}: unsettled", ROBUST, total - settled, 0, "none"),
         bound("largest residual", 1e-8, t["residual"].max(), CRITERION),
         bound("largest violation, computed apart", 1e-8, t["violation"].max(), CRITERION),
         bound("median iterations a part", 10, float(np.median(iterations)), "goal of this project"),
         Row(f"{here}: mu <= .25, least share that slips after the slide", ROBUST, 1, slid.min(), 0, "full slip"),
-        Row(f"{here}: settled by the paper's rule", "settled by finger3d", settled, literal, 0, "a bound",
-            "sensitivity", "at most"),
-        Row(f"{here}: histories that the paper's rule ends in a cycle", ROBUST, 1, cycled, 0, "states repeat",
-            "sensitivity", "at least"),
+        at_most(f"{here}: settled by the paper's rule", "settled by finger3d", settled, literal, kind="sensitivity"),
+        at_least(f"{here}: histories that the paper's rule ends in a cycle", ROBUST, 1, cycled, "states repeat",
+            "sensitivity"),
     ]  # fmt: skip
 
 
@@ -230,4 +226,3 @@ def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
     right.set(xlabel="mu", ylabel="settled increments, %", ylim=(0, 105))
     for axes in (left, middle, right):
         axes.tick_params(axis="x", rotation=45)
-        axes.legend(fontsize=7, loc="lower center")

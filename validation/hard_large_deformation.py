@@ -43,7 +43,7 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
-from ._rows import Result, Row, Settled, settled
+from ._rows import Result, Row, Settled, at_least, at_most, settled
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -272,13 +272,13 @@ def run(quick: bool) -> Result:
         "balls": list(balls(1 if quick else len(BALLS))),
     }
     table = _table(found)
-    rows = _settling([f for *_, f in found["coarse"]]) + _penetration(found)
+    rows = (*_settling([f for *_, f in found["coarse"]]), *_penetration(found))
     counts = [Settled(f.converged, f.increments, f.residual) for scenes in found.values() for *_, f in scenes]
-    return Result(tuple(rows), table, lambda figure: _draw(figure, table), settled(counts))
+    return Result(rows, table, lambda figure: _draw(figure, table), settled(counts))
 
 
 def _bound(what: str, most: float, got: float, reason: str, reference: str = ROBUST) -> Row:
-    return Row(what, reference, float(most), float(got), 0.0, reason, measure="at most")
+    return at_most(what, reference, float(most), float(got), reason)
 
 
 def _settling(found: Sequence[Found]) -> list[Row]:
@@ -289,12 +289,12 @@ def _settling(found: Sequence[Found]) -> list[Row]:
     return [
         _bound(f"{here}: share unsettled", 0.02, len(unsettled) / len(found), "sharp corners that fold without end"),
         _bound(f"{here}: unsettled without cause or cure", 0, sum(not _cured(f) for f in unsettled), "none"),
-        Row(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
-            float(sum(not f.folds for f in unsettled)), 0.0, "none", "statement", "at most"),
+        at_most(f"{here}: unsettled where no sharp edge of the finger folds", GOAL, 0.0,
+            float(sum(not f.folds for f in unsettled)), "none", "statement"),
         _bound(f"{here}: scenes with a point inside the object that is not in contact", 0,
                sum(not f.outside for f in found), "none"),
-        Row(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
-            min(f.least_volume for f in found), 0.0, "no cell inverted", measure="at least"),
+        at_least(f"{here}: smallest ratio of volumes at any quadrature point", ROBUST, 0.0,
+            min(f.least_volume for f in found), "no cell inverted"),
         _bound(f"{here}: factorisations of an increment", 3.0, sum(f.factorizations for f in found) / increments, GOAL,
                GOAL),
     ]  # fmt: skip
@@ -305,30 +305,28 @@ def _cured(found: Found) -> bool:
     return "try" in found.says and "mm" in found.says and "\n" not in found.says
 
 
-def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> list[Row]:
+def _penetration(found: dict[str, list[tuple[int, Model, Found]]]) -> Iterator[Row]:
     """How deep the object is between the contact points, over the depth."""
-    rows = []
     for mesh in ("coarse", "default"):
         for kind, solid in (("sections", False), ("solids", True)):
             here = [f for _, model, f in found[mesh] if (model.domain == "solid") == solid]
             if here:
-                rows.append(Row(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
-                                max(f.penetration for f in here), 0.0, "largest at sharp edges of finger and object",
-                                "statement", "at most"))  # fmt: skip
+                yield at_most(f"{len(here)} {kind} on {mesh} meshes: largest penetration over the depth", GOAL, 0.01,
+                              max(f.penetration for f in here), "largest at sharp edges of finger and object",
+                              "statement")  # fmt: skip
     what = "on default meshes, deepest away from sharp edges: largest penetration over the depth"
     for kind, some in (("sections", found["default"]), ("solids under balls", found["balls"])):
         smooth = [
             f for _, model, f in some if not f.at_sharp_edge and (model.domain == "solid") == (kind != "sections")
         ]
         if smooth:
-            rows.append(_bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
-                               GOAL))  # fmt: skip
+            yield _bound(f"{len(smooth)} {kind} {what}", 0.01, max(f.penetration for f in smooth), "a hundredth",
+                         GOAL)  # fmt: skip
     ended = [f for *_, f in found["default"] if not f.settled]
     here = f"{len(found['default'])} presses on default meshes"
-    rows.append(_bound(f"{here}: share that ends early", 0.02, len(ended) / len(found["default"]),
-                       "the finer, the sooner sharp edges fold", GOAL))  # fmt: skip
-    rows.append(_bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none"))
-    return rows
+    yield _bound(f"{here}: share that ends early", 0.02, len(ended) / len(found["default"]),
+                 "the finer, the sooner sharp edges fold", GOAL)  # fmt: skip
+    yield _bound(f"{here}: ends early without cause or cure", 0, sum(not _cured(f) for f in ended), "none")
 
 
 def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[Any]]:
@@ -365,5 +363,3 @@ def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     right.axvline(1.0, color="k", lw=0.8, ls=":")
     left.set(xlabel="edge length at the contact (mm)", ylabel="largest penetration, % of the depth")
     right.set(xlabel="largest penetration, % of the depth", ylabel="share of the scenes, %", xscale="log")
-    for axes in (left, right):
-        axes.legend(fontsize=7)

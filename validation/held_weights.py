@@ -35,7 +35,6 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -45,8 +44,8 @@ from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import changed, fig9_finger
+from ._rows import Result, Row, at_least, at_most, columns, zero
 
 DEPTH, STEPS, DEVIATIONS, LIMIT = 10.0, 4, 3.0, 0.1
 BELOW = 0.999  # of the least normal force: slips
@@ -86,10 +85,9 @@ class Lift:
 
 def model(domain: Domain, size: float) -> Model:
     """The finger of docs/tutorials/hold.py."""
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
     mesh = MeshOptions(size, 4.0 * size, "swept")
-    return Model(design, Isotropic(1.0, 0.49), mesh, (Leg(DEPTH),), gauges=gauges, domain=domain)
+    return Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(DEPTH),), gauges=gauges, domain=domain)
 
 
 def held(domain: Domain, size: float) -> Problem:
@@ -100,7 +98,7 @@ def held(domain: Domain, size: float) -> Problem:
 
 def pressed(problem: Problem, mu: float, legs: tuple[Leg, ...]) -> list[StepResult]:
     """All increments of a path."""
-    return list(march(replace(problem, model=replace(problem.model, friction=Coulomb(mu), legs=legs))))
+    return list(march(changed(problem, friction=Coulomb(mu), legs=legs)))
 
 
 def lifting(normal: float, load: float) -> tuple[Leg, Leg]:
@@ -202,31 +200,27 @@ def _rows(lifts: list[Lift], said: Float) -> list[Row]:
     alone = np.array([x.single / x.least for x in lifts if math.isfinite(x.single)])
     here = f"{len(acted)} of {len(lifts)} objects whose mu the gauge determines"
     return [
-        Row(f"share lifted without slip, {here}", "one-sided, 3 standard deviations", 0.99, float(safe), 0.0,
-            "normal distribution: 0.9987", measure="at least"),
-        Row(f"lifts whose outcome is not Coulomb's, {here}", COULOMB, 0.0, float(wrong), 0.0, "none",
-            measure="absolute"),
-        Row(f"normal force over the least, median, {here}", GOAL, 1.3, float(np.median(ratios)), 0.0, "a bound",
-            measure="at most"),
-        Row(f"normal force over the least, largest, {here}", GOAL, 1.3, float(ratios.max()), 0.0, "a bound",
-            measure="at most"),
-        Row(f"normal force over the least by one reading, largest, {len(alone)} objects", GOAL, 1.3,
-            float(alone.max()), 0.0, "a bound", "statement", "at most"),
-        Row(f"share held with at most 1.3 times the least by one reading, {len(alone)} objects", GOAL, 1.0,
-            float(np.mean(alone <= 1.3)), 0.0, "every one", "statement", "at least"),
-        Row(f"objects held at {BELOW:g} of the least force, of {len(lifts)}", COULOMB, 0.0,
-            float(np.isnan(said).sum()), 0.0, "none", measure="absolute"),
+        at_least(f"share lifted without slip, {here}", "one-sided, 3 standard deviations", 0.99, float(safe),
+            "normal distribution: 0.9987"),
+        zero(f"lifts whose outcome is not Coulomb's, {here}", COULOMB, float(wrong), 0.0, "none"),
+        at_most(f"normal force over the least, median, {here}", GOAL, 1.3, float(np.median(ratios))),
+        at_most(f"normal force over the least, largest, {here}", GOAL, 1.3, float(ratios.max())),
+        at_most(f"normal force over the least by one reading, largest, {len(alone)} objects", GOAL, 1.3,
+            float(alone.max()), kind="statement"),
+        at_least(f"share held with at most 1.3 times the least by one reading, {len(alone)} objects", GOAL, 1.0,
+            float(np.mean(alone <= 1.3)), "every one", "statement"),
+        zero(f"objects held at {BELOW:g} of the least force, of {len(lifts)}", COULOMB, float(np.isnan(said).sum()),
+            0.0, "none"),
         Row("largest force that these can hold, as told, over mu N, furthest from 1", COULOMB, 1.0,
             float(said[np.argmax(np.abs(said - 1.0))]), 1e-8, "nine digits are told"),
     ]  # fmt: skip
 
 
 def _creep_row(name: str, count: int, mm: float) -> Row:
-    return Row(
+    return at_most(
         f"largest change of any pose, gap, slip or displacement in a hold of {count} increments, {name} (mm)",
-        "a contact that sticks does not creep", 1e-12, mm, 0.0,
-        "a bound; round-off of the displacements, of about 2 mm, is 4e-16 mm", measure="at most",
-    )  # fmt: skip
+        "a contact that sticks does not creep", 1e-12, mm,
+        "a bound; round-off of the displacements, of about 2 mm, is 4e-16 mm")  # fmt: skip
 
 
 def _draw(figure: Any, lifts: list[Lift]) -> None:
@@ -249,5 +243,4 @@ def _draw(figure: Any, lifts: list[Lift]) -> None:
     if slips.any():
         left.plot(mu[slips], ratio[slips], "rx", ms=10, label="slips")
     left.set_ylabel("normal force over the least")
-    left.legend(fontsize=8)
     figure.colorbar(drawn, ax=right, pad=0.01).ax.set_title("noise,\n1e-3", fontsize=8)

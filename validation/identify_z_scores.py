@@ -23,8 +23,7 @@ from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 from finger3d.io import write_csv
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.02, 1.0), "material.nu": (0.3, 0.495)}
 CASES, IF_QUICK = {"plane-strain": 80, "solid": 20, "drawn": 24}, {"plane-strain": 12, "drawn": 6}
@@ -143,12 +142,12 @@ def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
         z, bare = (np.array([getattr(f, which) for f in some]) for which in ("z", "z_of_noise"))
         what = f"{name}, {len(some)} values"
         # a posterior that is flat up to a bound, or has two maxima, has longer tails
-        yield Row(f"largest |z|: {what}", "normally distributed errors", 4.0, float(np.abs(z).max()), 0.0,
-                  "one in 16 000 is beyond", "statement", "at most")  # fmt: skip
+        yield at_most(f"largest |z|: {what}", "normally distributed errors", 4.0, float(np.abs(z).max()),
+                      "one in 16 000 is beyond", "statement")  # fmt: skip
         if len(some) >= 8:
             share = float(np.mean(np.abs(z) <= 2.0))
-            yield Row(f"share within two stated deviations: {what}", "0.954 if errors are normally distributed", 0.9,
-                      share, 0.0, "bars of nine in ten; readings bend with mu", measure="at least")  # fmt: skip
+            yield at_least(f"share within two stated deviations: {what}", "0.954 if errors are normally distributed",
+                           0.9, share, "bars of nine in ten; readings bend with mu")  # fmt: skip
         if len(some) >= 8:
             rms, of_noise = (float(np.sqrt(np.mean(v**2))) for v in (z, bare))
             yield Row(f"rms of z: {what}", "deviations that hold", 1.0, rms, 0.2, "goal of this project", "statement",
@@ -172,4 +171,3 @@ def _draw(figure: Any, found: list[Fitted]) -> None:
         axes.axhline(1.0, color="k", lw=0.8)
         axes.set(xscale="log", yscale="log", xlabel="noise over the largest value", title=title, ylim=(1e-3, None))
     left.set_ylabel("|identified - true| / standard deviation")
-    right.legend(fontsize=7)

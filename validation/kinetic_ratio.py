@@ -13,6 +13,7 @@ depend on the mesh and on the increments; the table shows how much.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,11 @@ from finger3d.mechanics.discretise.problem import Problem
 
 from ._halfplane import compliance, line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Kind, Result, Row
+from ._rows import Kind, Result, Row, at_least, exact_columns
 
 NU, STATIC = 0.3, 0.25
 SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"
-COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations".split()
+COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations"
 Key = tuple[str, float, int, int]
 
 
@@ -61,39 +62,33 @@ def run(quick: bool) -> Result:
                     found[branch, ratio, points, count] = numbers(problem, law, count)
     rows = _rows(found, meshes, counts, ratios)
     table = [(*k, *v) for k, v in found.items()]
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, found, meshes, counts))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, found, meshes, counts))
 
 
-def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -> list[Row]:
+def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -> Iterator[Row]:
     fine, many = meshes[-1], counts[-1]
     got = found["keep", 0.7, fine, many]
     here = f"{fine} points to a, {many} increments"
     near = f"half a point spacing, a/{fine}"
-    rows = [
-        Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "0.3 % measured at this mesh"),
-        Row(f"keep, ratio .7: c/a, {here}", SOURCE, 0.263, got[2], 0.5 / fine, near, measure="absolute"),
-    ]
+    yield Row(f"keep, ratio .7: int_0^a q/P, {here}", SOURCE, 0.0773, got[0], 0.03, "0.3 % measured at this mesh")
+    yield Row(f"keep, ratio .7: c/a, {here}", SOURCE, 0.263, got[2], 0.5 / fine, near, measure="absolute")
     for ratio in ratios:
         one, two = found["one coefficient", ratio, fine, many], found["keep", ratio, fine, many]
         alike = f"over that of one coefficient mu_k, ratio {ratio:g}"
-        rows.append(Row(f"keep: int_0^a q/P {alike}", "Coulomb, mu_k alone", 1.0, two[0] / one[0], 1e-9, "same states"))
-        rows.append(Row(f"keep: dissipation {alike}", "Coulomb, mu_k alone", 1.0, two[1] / one[1], 1e-9, "same states"))
+        yield Row(f"keep: int_0^a q/P {alike}", "Coulomb, mu_k alone", 1.0, two[0] / one[0], 1e-9, "same states")
+        yield Row(f"keep: dissipation {alike}", "Coulomb, mu_k alone", 1.0, two[1] / one[1], 1e-9, "same states")
     literal = found["paper", 0.7, fine, many]
     kind: Kind = "sensitivity"
     away = abs(literal[2] - 0.263)
     what = f"paper, ratio .7: distance of c/a from the exact one, {here}"
-    rows.append(Row(what, SOURCE, 0.1, away, 0.0, "a bound: this rule does not converge to it", kind, "at least"))
+    yield at_least(what, SOURCE, 0.1, away, "a bound: this rule does not converge to it", kind)
     values = [found["paper", 0.7, fine, n][2] for n in counts]
     what = f"paper, ratio .7: change of c/a from {counts[0]} to {many} increments, {fine} points to a"
     why = "a bound: the result depends on the increments"
-    rows.append(
-        Row(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), 0.0, why, kind, "at least")
-    )
+    yield at_least(what, "no unique solution; REFERENCES.md, 2.5", 0.1, float(np.ptp(values)), why, kind)
     what = f"paper, ratio .7: int_0^a q/P over the exact one, {here}"
     why = "4 % measured; not to be relied on"
-    rows.append(Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind))
-    return rows
+    yield Row(what, SOURCE, 1.0, literal[0] / 0.0773, 0.1, why, kind)
 
 
 def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -> None:
@@ -109,4 +104,3 @@ def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -
         ax.set(xlabel="increments", ylabel=label)
     best = found["keep", 0.7, meshes[-1], counts[-1]]
     figure.suptitle(f"mu_k/mu_s = .7; keep: error of int q/P {100 * abs(best[0] / 0.0773 - 1):.1f} %")
-    axes[0].legend(fontsize=7)

@@ -16,14 +16,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import box, convergence, error_norms, held_at, mapped, rate, side_load, solve
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 _LAME = "Lame 1852; REFERENCES.md, 5.6"
 KINDS = ("displacement, L2", "gradient, L2", "u(a)")
 SOURCES = ("Ciarlet and Raviart 1972", "Ciarlet and Raviart 1972", "twice the energy's norm")
@@ -79,8 +78,7 @@ def errors(dim: int, count: int, nu: float, plane_stress: bool) -> tuple[float, 
 def run(quick: bool) -> Result:
     """Three sizes and more of the section, three of the slice."""
     counts = {2: (4, 8, 16), 3: (2, 4, 8)} if quick else {2: (8, 16, 32, 64), 3: (4, 8, 16)}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     curves: dict[int, dict[str, Float]] = {2: {}, 3: {}}
     for dim in (2, 3):
         slopes = []
@@ -102,9 +100,8 @@ def run(quick: bool) -> Result:
             rows.append(
                 Row(what, source, theory, got, 0.1, "rate of the limit; a higher one passes", measure="at least")
             )
-    names = ("dim", "nu", "plane_stress", "cells_per_side", "displacement_L2", "gradient_L2", "widening_mm")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, curves))
+    names = "dim nu plane_stress cells_per_side displacement_L2 gradient_L2 widening_mm"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, curves))
 
 
 def draw(figure: Any, counts: dict[int, tuple[int, ...]], curves: dict[int, dict[str, Float]]) -> None:

@@ -20,22 +20,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 
-from ._rows import Result, Row
-
-Float = NDArray[np.float64]
+from ._press import changed, converged, fig9_finger
+from ._rows import Result, Row, at_least, exact_columns, zero
 
 RADIUS, E, NU, MU = 100.0, 1.0, 0.45, 0.25
 DEPTH, WAY = 2.0, 30.0  # mm; WAY is about the mean way of the plane over the contact
@@ -76,11 +72,8 @@ class Sliding:
 
 def model(width: float, size: float) -> Model:
     """The finger of Fig. 9 with another width."""
-    design = designs()["clipped_cylinder"](
-        radius_mm=RADIUS, half_length_mm=50.0, edge_height_mm=36.6, width_mm=width
-    )  # fmt: skip
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=5.0, slide_z_mm=5.0, turn_y=1.0))
-    return Model(design, Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
+    return Model(fig9_finger(width), Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
 
 
 def centres(problem: Problem, width: float, across: tuple[float, ...]) -> list[float]:
@@ -105,8 +98,7 @@ def slid(problem: Problem, centre: float, steps: int) -> Sliding:
 
 
 def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -> StepResult:
-    frames = list(march(replace(problem, model=replace(problem.model, legs=legs, object=plane or Plane()))))
-    assert all(frame.outcome.ok for frame in frames)
+    frames = converged(changed(problem, legs=legs, object=plane or Plane()))
     return frames[-1]
 
 
@@ -156,8 +148,7 @@ def run(quick: bool) -> Result:
     """The limit surface at two widths, and the largest torque at others."""
     size, steps = (4.0, 40) if quick else (3.0, 100)
     across = ACROSS[::3] if quick else ACROSS
-    rows: list[Row] = []
-    table: list[tuple[float, ...]] = []
+    rows, table = [], []
     for width in (20.0, 40.0):
         problem = build(model(width, size))
         found = [slid(problem, c, steps) for c in centres(problem, width, across)]
@@ -172,20 +163,20 @@ def run(quick: bool) -> Result:
         table.append((width, 0.0, one.normal, one.largest / MU / one.normal, *one.pair, *one.pair, one.stuck))
     ratio = [next(r[3] for r in table if r[0] == width) for width in (20.0, 40.0)]
     rows.append(
-        Row("M_max/(mu P) at 40 mm over that at 20 mm", "at a width of 20 mm", 1.0, ratio[1] / ratio[0], 0.0,
-            "it grows with the width", measure="at least")
+        at_least("M_max/(mu P) at 40 mm over that at 20 mm", "at a width of 20 mm", 1.0, ratio[1] / ratio[0],
+            "it grows with the width")
     )  # fmt: skip
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=WAY, steps=steps))
     section = build(replace(model(20.0, size), legs=legs, domain="plane-strain"))
     last = measure(section.points, _last(section, legs))
     rows += [
-        Row("torque about the press axis, plane strain, slid, N mm", "statics", 0.0, last["moment_y_Nmm"], 0.0,
-            "a section has no z", measure="absolute"),
+        zero("torque about the press axis, plane strain, slid, N mm", "statics", last["moment_y_Nmm"], 0.0,
+            "a section has no z"),
         Row("F/mu P, plane strain, slid", "Coulomb", 1.0, last["force_x_N"] / MU / last["normal_force_N"], 1e-8,
             "the solver's residual"),
     ]  # fmt: skip
-    columns = "width_mm centre_mm normal_force_N mean_distance_mm F M rigid_F rigid_M stuck_points".split()
-    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    columns = "width_mm centre_mm normal_force_N mean_distance_mm F M rigid_F rigid_M stuck_points"
+    data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
 
 
@@ -201,20 +192,18 @@ def _rows(found: list[Sliding], width: float, size: float) -> list[Row]:
         Row(f"F/mu P of a pure slide, {at}", "Coulomb", 1.0, slide.pair[0], 1e-8, "the solver's residual"),
         Row(f"M/M_max of a pure twist, {at}", GOYAL, math.cos(twist.step / 2.0), twist.pair[1], 1e-3,
             "friction opposes the chord of an increment's turn t, hence cos(t/2); forces act at the centroids of hats"),
-        Row(f"largest error of F over mu P, {len(found)} centres, {at}", GOYAL, 0.0, force, 1e-4, left,
-            measure="absolute"),
-        Row(f"largest error of M over M_max, {len(found)} centres, {at}", GOYAL, 0.0, torque, 1e-4, left,
-            measure="absolute"),
+        zero(f"largest error of F over mu P, {len(found)} centres, {at}", GOYAL, force, 1e-4, left),
+        zero(f"largest error of M over M_max, {len(found)} centres, {at}", GOYAL, torque, 1e-4, left),
         Row(f"largest power over that of rigid sliding, {at}", GOYAL, 1.0, max(s.power for s in found), 1e-8,
             "no other friction dissipates more; the solver's residual", measure="at most"),
         Row(f"least power over that of rigid sliding, {at}", GOYAL, 1.0, min(s.power for s in found), 1e-5,
             "of the second order in errors of the direction", measure="at least"),
-        Row(f"points that stick, of all {len(found)} centres, {at}", "full sliding", 0.0,
-            float(sum(s.stuck for s in found)), 1.0, "the one in the middle of a twist", measure="absolute"),
+        zero(f"points that stick, of all {len(found)} centres, {at}", "full sliding",
+            float(sum(s.stuck for s in found)), 1.0, "the one in the middle of a twist"),
         Row(f"M_max/(mu P), mm, {at}", "Hertz's line contact", hertz, twist.largest / MU / twist.normal, 0.05,
             "lower pressure towards free ends, points that end the contact", kind="statement"),
-        Row(f"deviation from the ellipse where it is largest, {at}", HOWE, 0.0, max(deviation, key=abs), 0.1,
-            "an approximation, whose size this row states", kind="statement", measure="absolute"),
+        zero(f"deviation from the ellipse where it is largest, {at}", HOWE, max(deviation, key=abs), 0.1,
+            "an approximation, whose size this row states", "statement"),
     ]  # fmt: skip
 
 
@@ -229,8 +218,8 @@ def _beside(problem: Problem, centre: float) -> list[Row]:
     names = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
     away = max(abs(one[name] - other[name]) / max(abs(one[name]), one["normal_force_N"]) for name in names)
     return [
-        Row("largest difference of forces and moments between a slide with a turn and a turn about the centre, over P",
-            "kinematics", 0.0, away, 1e-8, "the solver's residual", measure="absolute")
+        zero("largest difference of forces and moments between a slide with a turn and a turn about the centre, over P",
+            "kinematics", away, 1e-8, "the solver's residual")
     ]  # fmt: skip
 
 
@@ -246,7 +235,6 @@ def _draw(figure: Any, data: dict[str, list[float]]) -> None:
         left.plot(*rigid, colour, lw=1.0, label=f"{own_width:g} mm wide, rigid sliding")
         left.plot(*found, colour + "o", mfc="none", label=f"{own_width:g} mm wide, found")
     left.set(xlabel="F / (mu P)", ylabel="M / M_max", xlim=(0.0, 1.05), ylim=(0.0, 1.05), aspect="equal")
-    left.legend(fontsize=8, loc="lower left")
     twists = sorted((k for k, c in enumerate(data["centre_mm"]) if c == 0.0), key=lambda k: data["width_mm"][k])
     names = ("width_mm", "mean_distance_mm", "normal_force_N")
     width, distance, force = ([data[name][k] for k in twists] for name in names)
@@ -254,6 +242,3 @@ def _draw(figure: Any, data: dict[str, list[float]]) -> None:
                label="Hertz's line contact")  # fmt: skip
     right.plot(width, distance, "C2o", label="found")
     right.set(xlabel="width (mm)", ylabel="M_max / (mu P) (mm)", xlim=(0.0, None), ylim=(0.0, None))
-    right.legend(fontsize=8, loc="lower right")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)

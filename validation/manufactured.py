@@ -12,15 +12,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 PI = np.pi
 NUS = (0.3, 0.49, 0.4999, 0.5)
 _SOURCE = "Ciarlet 1978; Boffi, Brezzi, Fortin 2013; REFERENCES.md, 5.2"
@@ -103,9 +102,8 @@ def run(quick: bool) -> Result:
         why = "a constant that grew with nu would mean locking; the error of the pressure contributes a little"
         rows.append(Row(what, "no locking", 1.0, float(growth), 0.05, why, measure="at most"))
     flat = [(d, nu, n, *values) for (d, nu), e in found.items() for n, values in zip(counts[d], e, strict=True)]
-    names = ("dim", "nu", "cells_per_side", "displacement_L2", "gradient_L2", "pressure_L2")
-    table = dict(zip(names, map(list, zip(*flat, strict=True)), strict=True))
-    return Result(tuple(rows), table, lambda f: draw(f, found, counts))
+    names = "dim nu cells_per_side displacement_L2 gradient_L2 pressure_L2"
+    return Result(tuple(rows), exact_columns(names, flat), lambda f: draw(f, found, counts))
 
 
 def draw(figure: Any, found: dict[tuple[int, float], Float], counts: dict[int, tuple[int, ...]]) -> None:

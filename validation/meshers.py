@@ -7,10 +7,8 @@ netgen's with half of them.
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,8 +21,8 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.scene import parse
 
-from ._paper import columns
-from ._rows import Result, Row
+from ._press import empty_mesh_cache
+from ._rows import Result, Row, at_least, at_most, columns, zero
 
 MESHERS = ("ftetwild", "netgen")
 COMMON = {"material": {"E_MPa": 1.0, "nu": 0.45}, "friction": {"mu": 0.25}, "object": {"shape": "plane"}}
@@ -104,15 +102,15 @@ def run(quick: bool) -> Result:
             if quick and name != "STEP":
                 continue
             fine = Body(SMALL, body.depth, body.sizes, body.gauge, {}) if name == "STEP" else body
-            truth = _pressed(fine.scene("netgen" if name == "hemisphere" else "swept", 0.5), Path(folder) / "truth")[1]
-            found += [_meshed(name, body, mesher, truth, Path(folder)) for mesher in MESHERS]
+            truth = _pressed(fine.scene("netgen" if name == "hemisphere" else "swept", 0.5))[1]
+            found += [_meshed(name, body, mesher, truth) for mesher in MESHERS]
     lines = [tuple(vars(m).values()) for m in found]
     names = "body mesher cells seconds different_meshes min_dihedral_deg volume_error force_error gauge_error"
     return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
 
 
-def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float], folder: Path) -> Meshed:
-    runs = [_pressed(body.scene(mesher), folder / f"{name}-{mesher}-{i}", press=i == 0) for i in range(3)]
+def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float]) -> Meshed:
+    runs = [_pressed(body.scene(mesher), press=i == 0) for i in range(3)]
     report, numbers = runs[0]
     error = {key: abs(numbers[key] / truth[key] - 1.0) for key in ("normal_force_N", "gauge_g")}
     return Meshed(
@@ -128,25 +126,11 @@ def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float], folder:
     )
 
 
-def _pressed(scene: Any, cache: Path, press: bool = True) -> tuple[Any, dict[str, float]]:
+def _pressed(scene: Any, press: bool = True) -> tuple[Any, dict[str, float]]:
     """Return the report on the mesh, made anew, and the numbers after the press."""
-    with _mesh_cache(cache):
+    with empty_mesh_cache():
         problem = build(scene.model())
     return problem.body.report, press_numbers(problem, list(march(problem))[-1]) if press else {}
-
-
-@contextmanager
-def _mesh_cache(folder: Path) -> Iterator[None]:
-    """Keep meshes in a folder for a while."""
-    before = os.environ.get("FINGER3D_CACHE")
-    os.environ["FINGER3D_CACHE"] = str(folder)
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["FINGER3D_CACHE"]
-        else:
-            os.environ["FINGER3D_CACHE"] = before
 
 
 def _rows(found: list[Meshed]) -> Iterator[Row]:
@@ -155,23 +139,22 @@ def _rows(found: list[Meshed]) -> Iterator[Row]:
         yield Row(f"{name}: different meshes of three by netgen", "the same program and input", 1, gen.different_meshes,
                   0.0, "a count", measure="absolute")  # fmt: skip
         for m in (wild, gen):
-            yield Row(f"{name}: volume error, {m.mesher}", "CAD", 0.0, m.volume_error, 1e-3,
-                      "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge", measure="absolute")  # fmt: skip
-            yield Row(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", 0.0, m.force_error,
-                      0.03, "the error bar of such meshes, 1 to 3 % (error_bars)", measure="absolute")  # fmt: skip
-        yield Row(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
-                  gen.seconds / wild.seconds, 0.0, "a statement", "statement", "at most")  # fmt: skip
-        yield Row(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
-                  gen.min_dihedral_deg / wild.min_dihedral_deg, 0.0, "a claim", "statement", "at least")  # fmt: skip
+            yield zero(f"{name}: volume error, {m.mesher}", "CAD", m.volume_error, 1e-3,
+                       "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge")  # fmt: skip
+            yield zero(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", m.force_error,
+                       0.03, "the error bar of such meshes, 1 to 3 % (error_bars)")  # fmt: skip
+        yield at_most(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
+                      gen.seconds / wild.seconds, "a statement", "statement")  # fmt: skip
+        yield at_least(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
+                       gen.min_dihedral_deg / wild.min_dihedral_deg, "a claim", "statement")  # fmt: skip
         for key, what in (("force_error", "force"), ("gauge_error", "gauge")):
             ratio = getattr(gen, key) / getattr(wild, key)
-            yield Row(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio, 0.0,
-                      "a statement", "statement", "at most")  # fmt: skip
+            yield at_most(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio,
+                          "a statement", "statement")  # fmt: skip
 
 
 def _draw(figure: Any, found: list[Meshed]) -> None:
     figure.set_size_inches(12.0, 3.6)
-    figure.set_layout_engine("constrained")
     names = list(dict.fromkeys(m.body for m in found))
     shown = (("seconds", 1.0, "time, s"), ("min_dihedral_deg", 1.0, "least dihedral angle, degrees"),
              ("force_error", 100.0, "error of force, %"), ("gauge_error", 100.0, "error of gauge, %"))  # fmt: skip
@@ -182,4 +165,4 @@ def _draw(figure: Any, found: list[Meshed]) -> None:
         axes.set_yticks(np.arange(len(names)), names)
         axes.set_xlabel(title)
         axes.invert_yaxis()
-    figure.axes[0].legend(fontsize=8)
+    figure.axes[0].legend()

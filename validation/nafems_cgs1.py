@@ -17,15 +17,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 R, SIDE, FORCE = 50.0, 200.0, 35e3
 NU = 0.3
 MODULUS = 1.0 / ((1.0 - NU**2) / 210e3 + (1.0 - NU**2) / 70e3)
@@ -101,8 +100,7 @@ def run(quick: bool) -> Result:
     loads = FORCE * np.linspace(0.7, 1.0, 8)
     hertz = [float(np.sqrt(4.0 * load * R / (np.pi * MODULUS))) for load in loads]
     a, p0 = hertz[-1], 2.0 * FORCE / (np.pi * hertz[-1])
-    table: list[tuple[Any, ...]] = []
-    levels = []
+    table, levels = [], []
     for n in counts:
         both = pair(n)
         x = both.surface.points[:, 0]
@@ -124,9 +122,10 @@ def run(quick: bool) -> Result:
     why = "8 loads sample the position of the edge between two points; a higher rate passes"
     got = rate(1.0 / np.array(counts), errors)
     rows.append(Row("rate of the pressure in L2, parabola", "square-root edge", 1.0, got, 0.1, why, measure="at least"))
-    names = ("gap", "points_per_a", "half_width_mm", "peak_MPa")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors, (x, circle), (a, p0)))
+    names = "gap points_per_a half_width_mm peak_MPa"
+    return Result(
+        tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, errors, (x, circle), (a, p0))
+    )
 
 
 def _away(x: Float, p: Float, limit: tuple[float, float]) -> float:
@@ -146,8 +145,4 @@ def draw(
     x = np.linspace(0.0, 8.0, 1001)
     right.plot(x, hertz[1] * np.sqrt(np.maximum(0.0, 1.0 - (x / hertz[0]) ** 2)), "k--", linewidth=1.0, label="Hertz")
     right.plot(*finest, "o", markersize=4.0, label=f"circle, {counts[-1]} points to a")
-    right.set_xlim(0.0, 8.0)
-    right.set_xlabel("x, mm")
-    right.set_ylabel("pressure, MPa")
-    right.legend()
-    right.grid(alpha=0.3)
+    right.set(xlim=(0.0, 8.0), xlabel="x, mm", ylabel="pressure, MPa")

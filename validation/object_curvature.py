@@ -13,6 +13,7 @@ strain more than friction does, so its calibration must be made on the object's 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -21,15 +22,14 @@ from scipy.optimize import brentq
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, RigidObject
 
-from ._rows import Result, Row
+from ._press import converged, fig9_finger
+from ._rows import Result, Row, at_least
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
 TRUE = 0.25
@@ -39,9 +39,8 @@ HALVED = "the same with edges twice as long"
 
 def finger(obj: RigidObject, size: float, solid: bool = False) -> Problem:
     """The Fig. 9 finger under an object, deep enough for the force on any of them."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     model = Model(
-        body, Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
+        fig9_finger(), Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
         gauges=(GAUGE,), domain="solid" if solid else "plane-strain",
     )  # fmt: skip
     return build(model)
@@ -52,8 +51,7 @@ def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, flo
 
     def pressed(depth: float) -> dict[str, Any]:
         model = replace(problem.model, friction=Coulomb(mu), legs=(Leg(depth, steps=steps),))
-        *_, frame = march(replace(problem, model=model))
-        assert frame.outcome.ok
+        frame = converged(replace(problem, model=model))[-1]
         return measure(problem.points, frame)
 
     depth = brentq(lambda d: pressed(d)["normal_force_N"] - FORCE, 2.0, 14.0, rtol=1e-6)
@@ -105,7 +103,7 @@ def _is_monotonic(curve: np.ndarray) -> bool:
     return bool((change > -1e-6 * np.ptp(curve)).all())
 
 
-def _solid_rows(sizes: tuple[float, ...], steps: int) -> list[Row]:
+def _solid_rows(sizes: tuple[float, ...], steps: int) -> Iterator[Row]:
     """In 3D: what a bar of radius 100 mm does to the strain, over all that mu does to it on a plane."""
     found = []
     for size in sizes:
@@ -115,14 +113,11 @@ def _solid_rows(sizes: tuple[float, ...], steps: int) -> list[Row]:
     shape, friction = found[-1]
     what = "3D: strain on a bar of radius 100 mm less that on a plane, over the range of mu 0 to 1 on the plane"
     why = "more than 1: the gauge tells the shape, not mu"
-    rows = [Row(what, "no reference", 1.0, abs(shape) / friction, 0.0, why, "sensitivity", "at least")]
+    yield at_least(what, "no reference", 1.0, abs(shape) / friction, why, "sensitivity")
     if len(found) > 1:
         what = "3D: strain on a bar of radius 100 mm less that on a plane, 1e-3"
-        rows.append(
-            Row(what, f"the same at {sizes[0]:g} mm", 1e3 * found[0][0], 1e3 * shape, 0.25,
-                "sign and size; the gauge lies 4 mm under the surface", "sensitivity")
-        )  # fmt: skip
-    return rows
+        yield Row(what, f"the same at {sizes[0]:g} mm", 1e3 * found[0][0], 1e3 * shape, 0.25,
+                  "sign and size; the gauge lies 4 mm under the surface", "sensitivity")  # fmt: skip
 
 
 def _measured(
@@ -150,12 +145,8 @@ def _draw(figure: Any, mus: np.ndarray, curve: np.ndarray, found: dict[float, An
             [TRUE], [1e3 * found[radius][1]], "s", color=(shade, 0.3, 1.0 - shade), label=f"bar, R = {radius:g} mm"
         )
     left.set(xlabel="mu", ylabel="strain of g36, 1e-3", title="200 N over 20 mm, plane strain")
-    left.legend(fontsize=8)
     right.plot([100.0 / r for r in kept], [read[r] for r in kept], "s-", label="with the plane's calibration")
     right.plot([0.0], [TRUE], "ko", label="plane")
     right.axhline(TRUE, color="k", ls="--", lw=1.0, label="true")
     right.set(xlabel="100 mm / radius of the bar (the finger's is 100 mm)", ylabel="mu read", ylim=(0.0, None))
     right.set_title("a sensor that knows the force, not the shape")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    right.legend(fontsize=8)

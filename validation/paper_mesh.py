@@ -30,8 +30,9 @@ from finger3d.fem.surface.traces import strain_row
 from finger3d.geometry.registry import designs
 from finger3d.meshing.structured.grid import Sizes, rows, triangulate
 
-from ._paper import MUS, STRAIN, STRESS, Profile, columns, half_cylinder, line_r5, said, strains, under
-from ._rows import Result, Row
+from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
+from ._press import under
+from ._rows import Result, Row, columns
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.45), (STRAIN, 0.49))
 RULES = {"swap": maeno_active_set, "projection": solve_increment}
@@ -194,7 +195,7 @@ def _draw(figure: Any, x: np.ndarray, found: dict[Any, Any]) -> None:
             top.plot(where[here, 0], traction[here, 0], mark, color="#222222", mfc="none", ms=6)
             middle.plot(where[here, 0], traction[here, 1], mark, color="#c0392b", mfc="none", ms=6)
             low.plot(x, body.shear(steps[-1].state, x), mark, color="#2c5d8f", mfc="none", ms=6)
-        top.set_title(f"{plane}, nu = {nu:g}", fontsize=10)
+        top.set_title(f"{plane}, nu = {nu:g}")
         low.set_xlabel("x (mm)")
         for axes in (middle, low):
             axes.axhline(0.0, color="#999999", lw=0.7)

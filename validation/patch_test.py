@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Elasticity, Isotropic
@@ -24,9 +23,8 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._common import body, body_load, cube, held_at, shuffled, solve
-from ._rows import Result, Row
+from ._rows import Result, exact_columns, zero
 
-Float = NDArray[np.float64]
 _PATCH = "Irons and Razzaque 1972; REFERENCES.md, 5.1"
 _CONTACT = "Crisfield 2000; REFERENCES.md, 5.1"
 _ROUND = "round-off of some thousand unknowns"
@@ -117,16 +115,13 @@ def run(quick: bool) -> Result:
         errors = [measure(patch(dim, n)) for n in counts[dim]]
         table += [(name, dim, n, e) for n, e in zip(counts[dim], errors, strict=True)]
         source = _CONTACT if "press" in name.split(",")[0] else _PATCH
-        rows.append(
-            Row(f"{name}, {dim}D: largest error", source, 0.0, max(errors), tolerance, reason, measure="absolute")
-        )
+        rows.append(zero(f"{name}, {dim}D: largest error", source, max(errors), tolerance, reason))
     paths = [("swept", "plane-strain"), ("swept", "solid")] + ([] if quick else [("ftetwild", "solid")])
     for mesher, domain in paths:
         what = f"flat press of a fixed block, nu = 0, mu = 0.25, {domain}, {mesher} (relative pressure): largest error"
-        rows.append(Row(what, _CONTACT, 0.0, fixed_block(mesher, domain), 1e-10, _PRESS, measure="absolute"))
-    names = ("case", "dim", "cells_per_side", "error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, table))
+        rows.append(zero(what, _CONTACT, fixed_block(mesher, domain), 1e-10, _PRESS))
+    names = "case dim cells_per_side error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, table))
 
 
 def draw(figure: Any, table: list[tuple[str, int, int, float]]) -> None:
@@ -138,9 +133,5 @@ def draw(figure: Any, table: list[tuple[str, int, int, float]]) -> None:
         axes.axhline(1e-12, color="k", linestyle="--", linewidth=1.0)
         axes.set_xticks(n, [f"{v:g}" for v in n])
         axes.set_xticks([], minor=True)
-        axes.set_xlabel("cells along a side")
-        axes.set_title(f"{dim}D: errors are round-off (dashed: 1e-12)")
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=7, loc="upper left")
-        axes.set_ylim(1e-17, 1e-2)
+        axes.set(xlabel="cells along a side", title=f"{dim}D: errors are round-off (dashed: 1e-12)", ylim=(1e-17, 1e-2))
     figure.axes[0].set_ylabel("largest error (mm, or relative pressure)")

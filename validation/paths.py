@@ -12,7 +12,7 @@ the way, also at coefficients of friction so large that forces jump, and the wor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,9 +27,10 @@ from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult, measure
 
 from ._exact_path import exact_press
-from ._increments import PlainCoulomb, imbalance, pressed
-from ._paper import STRAIN, STRESS, columns, fig9, half_cylinder
-from ._rows import Result, Row
+from ._increments import PlainCoulomb, imbalance
+from ._paper import STRAIN, STRESS, fig9, half_cylinder
+from ._press import changed, under
+from ._rows import Result, Row, at_least, columns, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
 GRID_NU, GRID_MU = (0.0, 0.3, 0.49, 0.5), (0.0, 0.06, 0.25, 1.0, 3.0, 10.0, 1e3, 1e6)
@@ -54,15 +55,14 @@ def run(quick: bool) -> Result:
     sections = {f"Fig. 9, {size:g} mm": fig9(0.49, STRAIN, size, [GAUGE]) for size in sizes}
     if not quick:
         sections[HALF] = half_cylinder(0.3, STRESS, 0.1)
-    errors: dict[tuple[str, float, str, int], dict[str, float]] = {}
-    automatic: list[tuple[Any, ...]] = []
+    errors, automatic = {}, []
     for name, section in sections.items():
         for mu in MUS[1::2] if quick else MUS:
             problem = _under(section, mu, section.model.legs, 1)
             exact = _numbers(problem, exact_press(problem)[-1])
             for kind, law in ((PLAIN, PlainCoulomb(mu)), (OWN, Coulomb(mu))):
                 for count in counts:
-                    errors[name, mu, kind, count] = _errors(exact, _numbers(problem, pressed(problem, law, count)[-1]))
+                    errors[name, mu, kind, count] = _errors(exact, _numbers(problem, under(problem, law, count)[-1]))
             automatic += [(name, mu, *line) for line in _automatic(problem, exact)]
     rows = [row for name, mu in dict.fromkeys(key[:2] for key in errors) for row in _rates(errors, name, mu, counts)]
     rows += _known(automatic)
@@ -77,7 +77,7 @@ def run(quick: bool) -> Result:
 
 def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | str) -> Problem:
     counted: Any = tuple(replace(leg, steps=steps) for leg in legs)  # type: ignore[arg-type]
-    return replace(section, model=replace(section.model, friction=Coulomb(mu), legs=counted))
+    return changed(section, friction=Coulomb(mu), legs=counted)
 
 
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:
@@ -91,17 +91,15 @@ def _errors(exact: dict[str, float], numbers: dict[str, float]) -> dict[str, flo
     return {name: abs(numbers[name] - exact[name]) / abs(scale[name]) for name in exact}
 
 
-def _rates(errors: dict[Any, dict[str, float]], name: str, mu: float, counts: Sequence[int]) -> list[Row]:
+def _rates(errors: dict[Any, dict[str, float]], name: str, mu: float, counts: Sequence[int]) -> Iterator[Row]:
     """Rates at which the worst error falls from the fewest to the most increments."""
-    rows = []
     for kind, order in ORDER.items():
         few, most = (max(errors[name, mu, kind, count].values()) for count in (counts[0], counts[-1]))
         rate = float(np.log(few / max(most, 1e-15)) / np.log(counts[-1] / counts[0]))
         what = f"rate at which {kind} increments near the path, {name}, mu = {mu:g}"
         # in the half cylinder points slip one way and then the other within an increment
         sort = "statement" if kind == OWN and name == HALF else "verification"
-        rows.append(Row(what, f"order {order:g}", order, rate, 0.4, "points close one by one", sort, "at least"))
-    return rows
+        yield Row(what, f"order {order:g}", order, rate, 0.4, "points close one by one", sort, "at least")
 
 
 def _automatic(problem: Problem, exact: dict[str, float]) -> list[tuple[Any, ...]]:
@@ -120,10 +118,9 @@ def _known(automatic: list[tuple[Any, ...]]) -> list[Row]:
     within, covered = [true <= WITHIN * told for *_, true, told, _ in automatic], [e <= b for *_, e, _, b in automatic]
     what = f"share of {len(within)} errors of automatic increments within"
     return [
-        Row(f"{what} the bar of mesh and increments", GOAL, SHARE, float(np.mean(covered)), 0.0, "a bound",
-            measure="at least"),
-        Row(f"{what} {WITHIN:g} estimates of the increments alone", GOAL, SHARE, float(np.mean(within)), 0.0, "a bound",
-            "statement", "at least"),
+        at_least(f"{what} the bar of mesh and increments", GOAL, SHARE, float(np.mean(covered))),
+        at_least(f"{what} {WITHIN:g} estimates of the increments alone", GOAL, SHARE, float(np.mean(within)),
+            kind="statement"),
     ]  # fmt: skip
 
 
@@ -153,9 +150,9 @@ def _grid_rows(grid: Sequence[tuple[Any, ...]]) -> list[Row]:
     here = f"{len(grid)} histories, mu up to {max(line[1] for line in grid):g}"
     apart, balance = (max(line[k] for line in grid) for k in (2, 3))
     what = f"{here}: largest change of a number at the end of a leg with the results on the way, relative"
-    rows = [Row(what, SAME, 0.0, apart, 1e-9, "round-off", measure="absolute")]
+    rows = [zero(what, SAME, apart, 1e-9, "round-off")]
     what = f"{here}: work less stored energy less dissipation, over the work"
-    return [*rows, Row(what, "first law", 0.0, balance, 1e-9, "round-off", measure="absolute")]
+    return [*rows, zero(what, "first law", balance, 1e-9, "round-off")]
 
 
 def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tuple[Any, ...]]) -> None:

@@ -12,14 +12,14 @@ extrapolated with that rate, as the root mean square over 5 depths.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -27,9 +27,9 @@ from finger3d.mechanics.results.history import measure
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
-from ._rows import Result, Row
+from ._press import fig9_finger
+from ._rows import Result, Row, exact_columns, zero
 
-Float = NDArray[np.float64]
 STEPS = 5
 _WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
 _HALF = "the corners of the base leave an error of order h^1.2; 0.2 % or less measured"
@@ -37,9 +37,8 @@ _HALF = "the corners of the base leave an error of order h^1.2; 0.2 % or less me
 
 def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list[dict[str, Any]]:
     """Numbers of every increment."""
-    finger = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
-    problem = build(Model(finger, Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
+    problem = build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
     frames = list(march(problem))
     if len(frames) < STEPS or not frames[-1].outcome.ok:
         return [{"normal_force_N": np.nan, "friction_sum_N": np.nan}] * STEPS
@@ -55,9 +54,7 @@ def run(quick: bool) -> Result:
     """Sections and held solids of three sizes and more, mirror images, two meshers."""
     flat = (4.0, 2.0, 1.0) if quick else (4.0, 2.0, 1.0, 0.5, 0.25)
     deep = (8.0, 6.0, 4.0) if quick else (8.0, 4.0, 2.0)
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[float, dict[str, tuple[Float, Float]]] = {}
+    rows, table, curves = [], [], {}
     for nu in (0.3, 0.49):
         theory = 2.0 * clamped_free(np.pi / 2, nu)
         sections = [forces(s, nu, domain="plane-strain") for s in flat]
@@ -87,23 +84,18 @@ def run(quick: bool) -> Result:
         rows.append(
             Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, "order h^1.2 on either mesh; 0.2 % measured")
         )
-    names = ("body", "nu", "size_mm", "force_N", "rms_error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "body nu size_mm force_N rms_error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
-def _mirrors(size: float) -> list[Row]:
+def _mirrors(size: float) -> Iterator[Row]:
     """Whole and both halves against the quarter, which is the mirror image of nothing."""
     quarter = press(size, 0.49, symmetry=("x", "z"))[-1]
-    rows = []
     for name, planes in (("half by x", ("x",)), ("half by z", ("z",)), ("whole", ())):
         other = press(size, 0.49, symmetry=planes)[-1]
         away = max(abs(other[k] / quarter[k] - 1.0) for k in ("normal_force_N", "friction_sum_N", "dissipation_mJ"))
         what = f"{name} against quarter: force, friction sum, dissipation, largest relative difference"
-        rows.append(
-            Row(what, "mirror image", 0.0, away, 1e-9, "the same, up to convergence of contact", measure="absolute")
-        )
-    return rows
+        yield zero(what, "mirror image", away, 1e-9, "the same, up to convergence of contact")
 
 
 def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> None:

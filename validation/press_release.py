@@ -12,6 +12,7 @@ The dissipation during release converges slowly with the mesh (see the table), b
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,12 @@ from finger3d.mechanics.model import Leg
 
 from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, exact_columns, zero
 
 MU = 0.25
 REST = "an elastic body released; REFERENCES.md, 2.7"
 BALANCE = "energy balance of an elastic body; REFERENCES.md, 2.7"
-COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first".split()
+COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first"
 """Work of the cylinder in A P^2, of the ball in P depth."""
 
 
@@ -73,8 +74,7 @@ def run(quick: bool) -> Result:
     """Cylinder: 10, 20, 40 points to a, 100 to 400 increments each way; ball: 6 points to a."""
     counts = (25, 50, 100) if quick else (100, 200, 400)
     meshes = (10, 20) if quick else (10, 20, 40)
-    table, rows = [], []
-    drops = {}
+    table, rows, drops = [], [], {}
     for nu in (0.3,) if quick else (0.3, 0.0):
         for points in meshes:
             problem = line(nu, points, loading(1))
@@ -89,36 +89,29 @@ def run(quick: bool) -> Result:
     rows.append(Row(what, BALANCE, 1.0, table[-1][7], 0.05, "2/N: the error is of first order in 1/N"))
     rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
     what = "rate at which the drop of load that reverses the edge point falls with the mesh, cylinder, nu = 0.3"
-    rows.append(
-        Row(what, "at once: at least first order in the spacing", 1.0, rate, 0.0, "a bound", measure="at least")
-    )
+    rows.append(at_least(what, "at once: at least first order in the spacing", 1.0, rate))
     what = f"drop of load that reverses the edge point, cylinder, nu = 0.3, {meshes[-1]} points to a"
     why = "the drop that moves the edge by a point is 2 spacings/a"
-    rows.append(Row(what, "it reverses at once", 2.0 / meshes[-1], drops[meshes[-1]], 0.0, why, measure="at most"))
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    rows.append(at_most(what, "it reverses at once", 2.0 / meshes[-1], drops[meshes[-1]], why))
+    columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
 
 
-def _cycle_rows(nu: float, table: list[tuple[Any, ...]], counts: tuple[int, ...], found: list[Profile]) -> list[Row]:
+def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: list[Profile]) -> Iterator[Row]:
     at = {r[3]: r for r in table if r[1] == nu and r[2] == 20}
     here = f"cylinder, nu = {nu:g}, 20 points to a"
     few, many = counts[-2], counts[-1]
     rate = float(np.log(abs((at[counts[0]][7] - 1.0) / (at[many][7] - 1.0))) / np.log(many / counts[0]))
     extrapolated = at[many][7] + (at[many][7] - at[few][7]) * few**2 / (many**2 - few**2)
     released = found[2 * many - 1]
-    rows = [
-        Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured"),
-        Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off"),
-        Row(f"force after release, N, {here}", REST, 0.0, released.force, 1e-12, "round-off", measure="absolute"),
-    ]
+    yield Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured")
+    yield Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off")
+    yield zero(f"force after release, N, {here}", REST, released.force, 1e-12, "round-off")
     if many == 400:
         what = f"work over work lost, {here}, extrapolated in 1/N^2 from {few} and {many}"
-        rows.append(Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N"))
+        yield Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N")
         what = f"rate at which the excess of the work falls with N, {here}"
-        rows.append(
-            Row(what, "second order in 1/N", 2.0, rate, 0.5, "points change state one by one", measure="at least")
-        )
-    return rows
+        yield Row(what, "second order in 1/N", 2.0, rate, 0.5, "points change state one by one", measure="at least")
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:
@@ -149,5 +142,3 @@ def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], show
         inside = (profile.x >= 0.0) & (profile.status != OPEN)
         right.plot(profile.x[inside] / shown[0].a, profile.q[inside] / (MU * profile.p[inside]), ".-", label=name)
     right.set(xlabel="x/a", ylabel="q/(mu p)", title="friction reverses at the edge first")
-    for axes in (left, middle, right):
-        axes.legend(fontsize=7)

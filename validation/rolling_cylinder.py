@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
@@ -32,14 +32,12 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.parts import frictional_dissipation
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
-from ._rows import Result, Row
-
-Float = NDArray[np.float64]
+from ._press import changed, converged
+from ._rows import Result, Row, at_most, exact_columns, zero
 
 R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
 BEGIN = -0.5 * WAY
@@ -91,8 +89,7 @@ def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -
 
 def pressed(problem: Problem) -> State[Any]:
     """The state after the press."""
-    *_, frame = march(replace(problem, model=replace(problem.model, legs=problem.model.legs[:1])))
-    assert frame.outcome.ok
+    frame = converged(changed(problem, legs=problem.model.legs[:1]))[-1]
     return frame.meshed_state
 
 
@@ -147,14 +144,13 @@ def run(quick: bool) -> Result:
     other = block(0.3, size, height)
     backwards = travel(other, pressed(other), WAY, -WAY / R, steps)
     rows += [
-        Row("Q/mu P without creep, nu = 0.3", "Johnson 1985, Sec. 8.2", 0.0, backwards.steady / MU, 0.0,
-            "the surface in the contact is compressed: dragged against the travel", measure="at most"),
-        Row("dissipation of rolling without creep over that of sliding as far, nu = 1/2", "mu P times the way", 0.0,
-            found[0.0].dissipation[-1] / (MU * force * WAY), 1e-3, "points slip where the contact ends",
-            measure="absolute"),
-        Row("the same, nu = 0.3", "mu P times the way", 0.01,
-            backwards.dissipation[-1] / float(MU * backwards.normal[-1] * WAY), 0.0,
-            "far below that of sliding", measure="at most"),
+        at_most("Q/mu P without creep, nu = 0.3", "Johnson 1985, Sec. 8.2", 0.0, backwards.steady / MU,
+            "the surface in the contact is compressed: dragged against the travel"),
+        zero("dissipation of rolling without creep over that of sliding as far, nu = 1/2", "mu P times the way",
+            found[0.0].dissipation[-1] / (MU * force * WAY), 1e-3, "points slip where the contact ends"),
+        at_most("the same, nu = 0.3", "mu P times the way", 0.01,
+            backwards.dissipation[-1] / float(MU * backwards.normal[-1] * WAY),
+            "far below that of sliding"),
     ]  # fmt: skip
     rows += _by_legs(other)
     rows += _exact(other, "plane strain", size, count)
@@ -164,8 +160,8 @@ def run(quick: bool) -> Result:
         for creep, one in found.items()
         for line in zip(one.way, one.way / a, one.ratio / MU, one.dissipation / (MU * force), strict=True)
     ]
-    columns = "creep_R_over_mu_a way_mm way_over_a Q_over_mu_P dissipation_over_mu_P_mm".split()
-    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    columns = "creep_R_over_mu_a way_mm way_over_a Q_over_mu_P dissipation_over_mu_P_mm"
+    data = exact_columns(columns, table)
     bent = (backwards.way / a).tolist(), (backwards.ratio / MU).tolist()
     return Result(
         tuple(rows), data, lambda figure: _draw(figure, data, bent, [one.steady / MU for one in found.values()])
@@ -177,23 +173,21 @@ def _by_legs(problem: Problem) -> list[Row]:
     way, steps = 0.4, 8
     angles = [-way * k / steps / R for k in range(1, steps + 1)]
     path = [Leg(DEPTH - R * (1.0 - math.cos(t)), R * (math.sin(t) - t), turn_z=t, steps=1) for t in angles]
-    *_, frame = march(replace(problem, model=replace(problem.model, legs=(*problem.model.legs[:1], *path))))
-    assert frame.outcome.ok
+    frame = converged(changed(problem, legs=(*problem.model.legs[:1], *path)))[-1]
     one = travel(problem, pressed(problem), way, -way / R, steps)
     legs = sums(problem, frame.meshed_state, BEGIN + way)
     away = max(abs(legs[0] - one.normal[-1]), abs(legs[1] - one.tangential[-1]), abs(legs[-1] - one.torque[-1]) / R)
     return [
-        Row("difference of forces over P between legs and increments from the lowest point", "kinematics", 0.0,
-            away / legs[0], 1e-8, "the residual",
-            measure="absolute")
+        zero("difference of forces over P between legs and increments from the lowest point", "kinematics",
+            away / legs[0], 1e-8, "the residual")
     ]  # fmt: skip
 
 
 def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
     """Torque and force of turning, sliding and rolling."""
     mu, way = 0.3, 0.6
-    rough = replace(problem, model=replace(problem.model, friction=Coulomb(mu)))
-    smooth = replace(problem, model=replace(problem.model, friction=Coulomb(0.0)))
+    rough = changed(problem, friction=Coulomb(mu))
+    smooth = changed(problem, friction=Coulomb(0.0))
     start = pressed(rough)
     turned, slid = travel(rough, start, 0.0, -way / R, steps), travel(rough, start, way, 0.0, steps)
     rolled = travel(rough, start, way, -way / R, steps)
@@ -206,22 +200,20 @@ def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
     solid = problem.dim == 3
     aside, across = (1e-4, "points also slip along z, by Poisson's effect") if solid else (1e-8, "the residual")
     rows = [
-        Row("torque over R P without friction", STATICS, 0.0, float(np.abs(free.torque / R / free.normal).max()), flat,
-            bent, measure="absolute"),
+        zero("torque over R P without friction", STATICS, float(np.abs(free.torque / R / free.normal).max()), flat,
+            bent),
         Row("Q/mu P, turned without travel", "Coulomb", -1.0, float(turned.ratio[-1] / mu), aside, across),
         Row("torque/(mu P R), turned without travel", STATICS, -1.0,
             float(turned.torque[-1] / (R * turned.normal[-1] * mu)), flat, bent),
         Row("Q/mu P, slid without a turn", "Coulomb", 1.0, float(slid.ratio[-1] / mu), aside, across),
         Row("sum of friction over mu P, slid without a turn", "Coulomb", 1.0,
             float((slid.friction / slid.normal)[-1] / mu), 1e-8, "the residual"),
-        Row("largest difference of torque/R and Q over P, rolled", STATICS, 0.0,
-            float(np.abs((rolled.torque / R - rolled.tangential) / rolled.normal).max()), flat, bent,
-            measure="absolute"),
+        zero("largest difference of torque/R and Q over P, rolled", STATICS,
+            float(np.abs((rolled.torque / R - rolled.tangential) / rolled.normal).max()), flat, bent),
         Row("dissipation of sliding over the work of F_x", "energy, steady state", 1.0, spent, way / steps,
             "of the first order in the increment, half of it over a, which is 0.5 mm"),
-        Row("dissipation rolled over slid", "rolling does not slip", 0.1,
-            float(rolled.dissipation[-1] / slid.dissipation[-1]), 0.0, "creep and beginning included",
-            measure="at most"),
+        at_most("dissipation rolled over slid", "rolling does not slip", 0.1,
+            float(rolled.dissipation[-1] / slid.dissipation[-1]), "creep and beginning included"),
     ]  # fmt: skip
     return [replace(row, what=f"{row.what}, {name}") for row in rows]
 
@@ -235,11 +227,9 @@ def _draw(figure: Any, data: dict[str, list[float]], bent: tuple[list[float], li
         left.plot([data["way_over_a"][k] for k in own], ratio, lw=1.2, label=f"k R/(mu a) = {creep:g}")
     left.plot(*bent, "k--", lw=1.0, label="0, nu = 0.3")
     left.set(xlabel="way / a", ylabel="Q / (mu P)", ylim=(None, 1.05))
-    left.legend(fontsize=8, ncols=2, loc="upper left", bbox_to_anchor=(0.0, -0.14))
+    left.legend(ncols=2, loc="upper left", bbox_to_anchor=(0.0, -0.14))
     fine = np.linspace(0.0, 1.2, 61)
     right.plot(fine, [carter(float(c)) for c in fine], "k-", lw=0.8, label="Carter")
     right.plot(creeps, ends, "o", label="found, last tenth of the way")
     right.set(xlabel="k R / (mu a)", ylabel="Q / (mu P), steady", ylim=(-0.05, 1.1))
-    right.legend(fontsize=8, loc="lower right")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
+    right.legend(loc="lower right")

@@ -12,7 +12,7 @@ work on the machine changes less than wall time.  The limits of memory and conta
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from finger3d._machine import cores
 
 from ._child import Bench, available_gb, best_of
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]
@@ -44,7 +44,8 @@ def run(quick: bool) -> Result:
     with Bench("_scaling") as bench:
         wanted = lambda s: 1 if quick or s > 8.0 else 2  # noqa: E731
         runs = best_of(bench, "pressed", dict.fromkeys([*unknowns, *rows]), wanted)
-    judged = _memory_rows(runs) + _contact_rows(runs) + _growth_rows(runs, unknowns, quick) + _one_factorisation(runs)
+    judged = [*_memory_rows(runs), *_contact_rows(runs), *_growth_rows(runs, unknowns, quick)]
+    judged += _one_factorisation(runs)
     judged += [] if quick or cores() < 2 else _workers()
     return Result(tuple(judged), _table(runs, unknowns, rows), lambda figure: _draw(figure, runs, unknowns, rows))
 
@@ -57,15 +58,13 @@ def _sizes(quick: bool) -> tuple[list[Size], list[Size]]:
     return unknowns, rows
 
 
-def _memory_rows(runs: Runs) -> list[Row]:
+def _memory_rows(runs: Runs) -> Iterator[Row]:
     """The peak of the smallest run that has as many unknowns as a limit speaks of."""
-    rows = []
     for dofs, limit in LIMITS_MB.items():
         found = sorted((r["dofs"], r["peak_MB"]) for r in runs.values() if r["dofs"] >= dofs)
         if found:
             what = f"peak memory (MB), {found[0][0]} unknowns, all stages and output"
-            rows.append(Row(what, GOAL, limit, found[0][1], 0.0, "a bound", "validation", "at most"))
-    return rows
+            yield at_most(what, GOAL, limit, found[0][1], kind="validation")
 
 
 def _contact_rows(runs: Runs) -> list[Row]:
@@ -75,7 +74,7 @@ def _contact_rows(runs: Runs) -> list[Row]:
     if not found:
         return []
     what = f"contact of ten increments (s), {found[0][0]} rows"
-    return [Row(what, GOAL, limit, found[0][1], 0.0, "a bound", "validation", "at most")]
+    return [at_most(what, GOAL, limit, found[0][1], kind="validation")]
 
 
 def _growth_rows(runs: Runs, unknowns: Sequence[Size], quick: bool) -> list[Row]:
@@ -108,13 +107,13 @@ def _workers() -> list[Row]:
     one, two = (min(times) for times in zip(*tries, strict=True))
     what = f"times faster with two local workers, {BODIES} bodies of 31 446 unknowns"
     why = f"the whole command with its start; {one:.0f} s by one worker, the shortest of {WORKER_TRIES}"
-    return [Row(what, GOAL, 1.7, one / two, 0.0, why, "validation", "at least")]
+    return [at_least(what, GOAL, 1.7, one / two, why, "validation")]
 
 
 def _one_factorisation(runs: Runs) -> list[Row]:
     worst = max(r["factorizations"] for r in runs.values())
     what = "factorisations a press, for every size"
-    return [Row(what, "one condensation serves all increments", 1.0, float(worst), 0.0, "a count", measure="at most")]
+    return [at_most(what, "one condensation serves all increments", 1.0, float(worst), "a count")]
 
 
 def _table(runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> dict[str, Any]:

@@ -22,19 +22,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
-from ._paper import columns
-from ._rows import Result, Row
-
-Float = NDArray[np.float64]
+from ._press import fig9_finger
+from ._rows import Result, Row, at_most, columns
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
 EVEN = "20 mm wide, swept, base edges twice as long"
@@ -88,10 +85,9 @@ Curves = dict[tuple[str, float, float], Curve]
 def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     """Return the strain of the gauge over mu on a mesh."""
     domain, mesher, growth = CASES[case]
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     mesh = MeshOptions(size, growth * size, mesher, gauge_refinement=refinement)
     gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
-    model = Model(design, Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
+    model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
     problem = build(model)
     strain = []
     near: Sequence[Float] = ()
@@ -129,17 +125,13 @@ def _against_finer(found: Curves) -> list[Row]:
     error = {key: c.error(found[half]) for key, c in found.items() if (half := (*key[:2], key[2] / 2.0)) in found}
     what = "largest error of d strain / d mu, mu = .1 to 1, over the largest slope"
     goal = [
-        Row(
-            f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value, 0.0,
-            "the goal", "statement", "at most",
-        )
+        at_most(f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value,
+            "the goal", "statement")
         for (case, refinement, size), value in error.items()
     ]  # fmt: skip
     left = [
-        Row(
-            f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
-            value / error[case, PLAIN, size], 0.0, "half pays for its cells", "statement", "at most",
-        )
+        at_most(f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
+            value / error[case, PLAIN, size], "half pays for its cells", "statement")
         for (case, refinement, size), value in error.items()
         if refinement == REFINED and case != EVEN
     ]  # fmt: skip
@@ -152,11 +144,9 @@ def _between_meshers(found: Curves) -> list[Row]:
         "largest difference of d strain / d mu between swept and fTetWild, over the largest slope, 20 mm wide, 1.4 mm"
     )
     return [
-        Row(
-            f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
-            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), 0.0, "the goal, of each of them",
-            "statement", "at most",
-        )
+        at_most(f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
+            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), "the goal, of each of them",
+            "statement")
         for refinement in (PLAIN, REFINED)
         if (WILD, refinement, 1.4) in found
     ]  # fmt: skip
@@ -168,21 +158,15 @@ def _section(found: Curves) -> list[Row]:
     error = {refinement: found[SECTION, refinement, 1.0].error(finest) for refinement in (PLAIN, REFINED)}
     what = "largest error of d strain / d mu by the finest refined mesh, over the largest slope, section, 1 mm"
     return [
-        Row(
-            f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], 0.0, "the goal", "sensitivity",
-            "at most",
-        ),
-        Row(
-            f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN], 0.0,
-            "edges half as long at the gauge leave a quarter of its error", "sensitivity", "at most",
-        ),
+        at_most(f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], "the goal", "sensitivity"),
+        at_most(f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN],
+            "edges half as long at the gauge leave a quarter of its error", "sensitivity"),
     ]  # fmt: skip
 
 
 def _draw(figure: Any, found: Curves) -> None:
     cases = list(dict.fromkeys(key[0] for key in found))
     figure.set_size_inches(11.0, 3.6 * len(cases))
-    figure.set_layout_engine("constrained")
     panels = figure.subplots(len(cases), 2, sharex=True, sharey="row", squeeze=False)
     for case, row in zip(cases, panels, strict=True):
         row[0].set_ylabel("d strain / d mu, 1e-3")
@@ -197,7 +181,5 @@ def _draw(figure: Any, found: Curves) -> None:
                 continue
             kind = "no refinement" if refinement == PLAIN else f"gauge_refinement = {refinement:g}"
             axes.set_title(f"{case}: {kind}", fontsize=9)
-            axes.grid(alpha=0.3)
-            axes.legend(fontsize=8, frameon=False)
     for axes in panels[-1]:
         axes.set_xlabel("friction coefficient mu")

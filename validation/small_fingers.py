@@ -13,18 +13,20 @@ friction_in_3d.py.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
-from ._paper import Float, columns, said
-from ._rows import Result, Row
+from ._paper import said
+from ._rows import Result, Row, columns
 from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, best_gauges, markers, spreads, with_foils
 
 RADII = (5.0, 10.0)
@@ -72,13 +74,12 @@ def run(quick: bool) -> Result:
     return Result(tuple(_rows(found)), table, lambda figure: _draw(figure, found))
 
 
-def _rows(found: Spread) -> list[Row]:
-    rows = []
+def _rows(found: Spread) -> Iterator[Row]:
     for (radius, measure, name, readings), sd in found.items():
         for mu in JUDGED:
             what = f"standard deviation of mu = {mu:g}, {readings}, {name}, {measure}, R = {radius:g} mm"
             at = float(np.interp(mu, MUS, sd))
-            rows.append(said(what, "Sec. V", LIMIT, at, "the paper's 0.1", 0.0, "at most"))
+            yield said(what, "Sec. V", LIMIT, at, "the paper's 0.1", 0.0, "at most")
     for measure in dict.fromkeys(key[1] for key in found):
         ratios = [
             float(np.mean(found[RADII[0], m, name, readings]) / np.mean(found[RADII[-1], m, name, readings]))
@@ -87,9 +88,8 @@ def _rows(found: Spread) -> list[Row]:
         ]
         if ratios:
             what = f"mean standard deviation of mu, R = 5 over R = 10 mm, least of all readings, {measure}"
-            rows.append(Row(what, "tolerances do not shrink with the finger", 1.0, min(ratios), 0.1,
-                            "places are searched for on a grid", "sensitivity", "at least"))  # fmt: skip
-    return rows
+            yield Row(what, "tolerances do not shrink with the finger", 1.0, min(ratios), 0.1,
+                      "places are searched for on a grid", "sensitivity", "at least")  # fmt: skip
 
 
 def _draw(figure: Any, found: Spread) -> None:
@@ -105,9 +105,7 @@ def _draw(figure: Any, found: Spread) -> None:
                 label = readings if radius == RADII[0] else None
                 axes.semilogy(MUS, sd, color=colour, lw=width, label=label)
         axes.axhline(LIMIT, color="#222222", lw=0.8)
-        axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4))
-        axes.set_title(f"{measure}, {tolerances}", fontsize=10)
-        axes.grid(alpha=0.3)
+        axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4), title=f"{measure}, {tolerances}")
     panels[0].set_ylabel("standard deviation of mu")
     lines = {line.get_label(): line for axes in panels for line in axes.get_legend_handles_labels()[0]}
     title = "thick: R = 5 mm, thin: R = 10 mm"

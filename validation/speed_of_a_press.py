@@ -5,27 +5,29 @@ viscosity of the sensor". No relaxation of a silicone was found with its numbers
 by 2, 5 or 10 % in each decade of time, by a Prony series from 1 ms to 1000 s. The finger of Fig. 9 (nu = 0.49 at once)
 is calibrated by presses of 10 s and read in presses of 0.1 to 1000 s: at the same depth and at the same force; with all
 moduli relaxing, and in the section with the shear modulus alone, where Poisson's ratio grows. The section has the
-paper's gauge, the finger 20 mm wide the gauge that design_search.py finds best, at x = 6 mm and 85 degrees.
+paper's gauge, the finger 20 mm wide the gauge that finger_search.py finds best, at x = 6 mm and 85 degrees.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg
 from finger3d.mechanics.results.history import StepResult
 
-from ._paper import STRAIN, Float, columns, fig9, said, under
-from ._rows import Result, Row
+from ._paper import STRAIN, fig9, said
+from ._press import changed, converged, under
+from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
 """Share of the stress at once that relaxes in every decade."""
@@ -59,8 +61,7 @@ Found = dict[tuple[str, str, bool, float], dict[float, Read]]
 
 def run(quick: bool) -> Result:
     """Quick: the section on a coarse mesh with one rate."""
-    found: Found = {}
-    bodies = {}
+    found, bodies = {}, {}
     for name in (STRAIN,) if quick else (STRAIN, WIDE):
         body = fig9(0.49, "solid" if name == WIDE else STRAIN, 3.0 if quick or name == WIDE else 1.0, [GAUGES[name]])
         bodies[name] = body
@@ -108,9 +109,7 @@ def _extended(value: float, x: Float, y: Float) -> float:
 
 def _pressed(problem: Problem, mu: float) -> StepResult:
     """Last frame of a press."""
-    *_, last = march(replace(problem, model=replace(problem.model, friction=Coulomb(mu))))
-    if not last.outcome.ok:
-        raise AssertionError(f"mu = {mu:g}: {last.outcome}")
+    last = converged(changed(problem, friction=Coulomb(mu)))[-1]
     return last
 
 
@@ -131,19 +130,17 @@ def _rows(case: tuple[str, str, bool, float], reads: dict[float, Read]) -> list[
     ]  # fmt: skip
 
 
-def _checks(name: str, body: Problem, found: Found) -> list[Row]:
+def _checks(name: str, body: Problem, found: Found) -> Iterator[Row]:
     """The force where all moduli relax, from that of an elastic press while contact grows."""
     steps = 80
     elastic = np.array([0.0, *(_force(frame) for frame in under(body, MU, steps))])
     age = 1.0 - (np.arange(steps) + 0.5) / steps  # of the forces of an increment, over the duration
-    rows = []
     for (own, control, bulk, rate), reads in found.items():
         if own == name and control == DEPTH and bulk:
             left = [1.0 - sum(rate * (1.0 - np.exp(-age * time / tau)) for tau in DECADES) for time in DURATIONS]
             wanted, got = (float(f[-1] / f[0]) for f in (left @ np.diff(elastic), [r.force for r in reads.values()]))
-            rows.append(Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
-                            "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", ))  # fmt: skip
-    return rows
+            yield Row(f"force in 1000 s over that in 0.1 s, {100.0 * rate:g} % per decade, {name}",
+                      "Lee and Radok 1960; REFERENCES.md, 4.3", wanted, got, 0.01, "increments", )  # fmt: skip
 
 
 def _draw(figure: Any, found: Found) -> None:
@@ -161,11 +158,11 @@ def _draw(figure: Any, found: Found) -> None:
         axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
         shares = sorted({100.0 * key[3] for key in found if key[0] == model})
         title = f"{', '.join(f'{share:g}' for share in shares)} % per decade{', thin to thick' if shares[1:] else ''}"
-        axes.legend(title=title, title_fontsize=8, frameon=False, fontsize=8)
+        axes.legend(title=title, title_fontsize=8, frameon=False)
     for (name, control, bulk, rate), reads in found.items():
         if name == models[0] and control == DEPTH and bulk:
             panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
                                 label=f"{100.0 * rate:g} % per decade")  # fmt: skip
     panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s",
                    title=f"{models[0]}, all moduli")  # fmt: skip
-    panels[-1].legend(frameon=False, fontsize=8)
+    panels[-1].legend(frameon=False)

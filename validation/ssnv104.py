@@ -15,15 +15,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 R, E, NU = 50.0, 20_000.0, 0.3
 MODULUS = E / (1.0 - NU**2)
 DEPTHS = np.linspace(1.0, 2.0, 12)  # mm, half the approach
@@ -116,12 +115,11 @@ def run(quick: bool) -> Result:
     why = "12 depths sample the position of the edge between points; a higher rate passes"
     got = rate(1.0 / np.array(counts), errors)
     rows.append(Row("rate of the pressure in L2", "square-root edge", 1.0, got, 0.15, why, measure="at least"))
-    names = ("points_per_a", "approach_mm", "force_N", "contact_radius_mm", "peak_MPa", "pressure_L2_error")
+    names = "points_per_a approach_mm force_N contact_radius_mm peak_MPa pressure_L2_error"
     flat = [
         (n, 2.0 * d, *v) for n, level in zip(counts, levels, strict=True) for d, v in zip(DEPTHS, level, strict=True)
     ]
-    columns = dict(zip(names, map(list, zip(*flat, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, counts, errors, levels, true))
+    return Result(tuple(rows), exact_columns(names, flat), lambda figure: draw(figure, counts, errors, levels, true))
 
 
 def draw(figure: Any, counts: tuple[int, ...], errors: list[float], levels: list[Float], true: Float) -> None:
@@ -140,7 +138,4 @@ def draw(figure: Any, counts: tuple[int, ...], errors: list[float], levels: list
         right.plot(2.0 * DEPTHS, level[:, 0] / 1e3, "os^"[counts.index(n)], markersize=4.5, label=f"{n} points to a")
     right.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")
     right.plot(2.0 * DEPTHS, force_at(np.sqrt(R * DEPTHS)) / 1e3, "k:", linewidth=1.0, label="Hertz, half-spaces")
-    right.set_xlabel("approach of the two balls, mm")
-    right.set_ylabel("force, kN")
-    right.legend(fontsize=8)
-    right.grid(alpha=0.3)
+    right.set(xlabel="approach of the two balls, mm", ylabel="force, kN")

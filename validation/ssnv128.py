@@ -10,6 +10,7 @@ the increments are passed to `solve_increment` directly; `free` is the displacem
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, exact_columns, zero
 
 SIDE, LEFT, TOP = 40.0, 150.0, 50.0  # mm, MPa
 PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm
@@ -37,9 +38,7 @@ NEWTON_96 = np.array([28.60, 27.22, 22.87, 19.81, 15.41])  # um
 FRICTIONLESS = 40.62  # um, at x = 0
 SOURCE = "Code_Aster SSNV128; REFERENCES.md, 6.1"
 CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
-COLUMNS = (
-    "cells_per_side increments mu rule ux_0 ux_1.25 ux_5 ux_7.5 ux_11.25 iterations residual settled_increments".split()
-)
+COLUMNS = "cells_per_side increments mu rule ux_0 ux_1.25 ux_5 ux_7.5 ux_11.25 iterations residual settled_increments"
 
 
 class Square:
@@ -95,40 +94,33 @@ def run(quick: bool) -> Result:
         table += [last.load(0.0, 1)[0], row, last.load(1.0, 5, "paper")[0]]
     table += [last.load(1.0, count)[0] for count in (1, 20)]
     rows = _rows(table, meshes, [last.load(1.0, count)[1] for count in (1, 5, 20)])
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, table, last, state))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, table, last, state))
 
 
-def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[ContactState]) -> list[Row]:
+def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[ContactState]) -> Iterator[Row]:
     fine = meshes[-1]
     got = np.array(next(r for r in table if r[:4] == (fine, 5, 1.0, "projection"))[4:9], dtype=float)
-    rows = []
     for k, x in enumerate(PLACES):
-        rows.append(Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain"))
+        yield Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain")
     for k, x in enumerate(PLACES):
         what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "last digit of the reference, and different elements"
-        rows.append(Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why))
+        yield Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why)
     smooth = next(r for r in table if r[:4] == (fine, 1, 0.0, "projection"))[4]
-    rows.append(Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits"))
+    yield Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits")
     force = max(float(np.abs(s.force).max()) for s in states)
     apart = max(float(np.abs(s.force - states[0].force).max()) for s in states) / force
     what = "forces after 1, 5 and 20 increments, largest difference over the largest"
-    rows.append(
-        Row(what, "one solution; REFERENCES.md, 6.1", 0.0, apart, 1e-8, "convergence criterion", measure="absolute")
-    )
+    yield zero(what, "one solution; REFERENCES.md, 6.1", apart, 1e-8, "convergence criterion")
     worst = max(r[10] for r in table if r[3] == "projection")
-    rows.append(Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most"))
+    yield at_most("largest residual", CRITERION, 1e-8, worst)
     values = [next(r for r in table if r[:4] == (n, 5, 1.0, "projection"))[4] for n in meshes]
     steps = np.abs(np.diff(values))
     rate = float(np.log2(steps[0] / steps[-1]) / (len(steps) - 1))
     what, why = "rate at which u_x at 0 mm settles with the mesh", "a bound"
-    rows.append(
-        Row(what, "first order: stress is not smooth where stick ends", 1.0, rate, 0.0, why, measure="at least")
-    )
+    yield at_least(what, "first order: stress is not smooth where stick ends", 1.0, rate, why)
     literal = next(r for r in table if r[:4] == (fine, 5, 1.0, "paper"))
     what = f"increments of 5 that the paper's rule settles, {fine} cells a side"
-    rows.append(Row(what, "the rule repeats states here", 0.0, literal[11], 0.0, "a count", "sensitivity", "absolute"))
-    return rows
+    yield zero(what, "the rule repeats states here", literal[11], 0.0, "a count", "sensitivity")
 
 
 def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: ContactState) -> None:
@@ -149,5 +141,3 @@ def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: Cont
     slips = state.status[order] == SLIP
     right.plot(x[order][slips], np.zeros(slips.sum()), ".", ms=3, label=f"{STATUS_NAMES[SLIP]}s")
     right.set(xlabel="x, mm", ylabel="MPa", title="traction on the foot")
-    for axes in (left, right):
-        axes.legend(fontsize=8)

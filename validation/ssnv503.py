@@ -38,7 +38,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 
 from ._common import cube, side_load
-from ._rows import Result, Row
+from ._rows import Result, Row, at_most, exact_columns, zero
 
 MU, PRESSURE, SPRINGS = 0.3, 0.01, 2e-5  # p/E, and the springs' stiffness over E, of a block of side 1
 TURN = np.pi / 6.0
@@ -48,7 +48,7 @@ FREE = 0.99 * MU * PRESSURE / SPRINGS
 SOURCE = "Code_Aster SSNV503; REFERENCES.md, 6.3"
 ROUND_OFF = "round-off: some hundred times 2e-16 by the factorisation, another number on each processor"
 CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
-COLUMNS = "dim nu shear_over_muN sticking slipping friction_over_muN mean_slip largest_slip iterations residual".split()
+COLUMNS = "dim nu shear_over_muN sticking slipping friction_over_muN mean_slip largest_slip iterations residual"
 """Slips over the block's side."""
 
 
@@ -148,20 +148,20 @@ def run(quick: bool) -> Result:
             )
             own = "a bound: the block's own strain p/E over the glide"
             what = f"mean slip over the glide (1.01 - 1) mu N/springs, {here}"
-            rows.append(Row(what, SOURCE, PRESSURE / glide, mean / glide, 0.0, own, measure="at most"))
+            rows.append(at_most(what, SOURCE, PRESSURE / glide, mean / glide, own))
         if share == 0.99 and nu == 0.0:
-            rows.append(Row(f"points that slip, {here}", SOURCE, 0, slip, 0, "must stick", measure="absolute"))
+            rows.append(zero(f"points that slip, {here}", SOURCE, slip, 0, "must stick"))
             what = f"largest slip over the glide of {FREE:.0f} sides without friction, {here}"
-            rows.append(Row(what, SOURCE, 0.0, largest / FREE, 1e-12, ROUND_OFF, measure="absolute"))
+            rows.append(zero(what, SOURCE, largest / FREE, 1e-12, ROUND_OFF))
         if share == 1.01:
-            rows.append(Row(f"points that stick, {here}", SOURCE, 0, stick, 0, "must slip", measure="absolute"))
+            rows.append(zero(f"points that stick, {here}", SOURCE, stick, 0, "must slip"))
             rows.append(Row(f"friction over mu N, {here}", SOURCE, 1.0, friction, 1e-6, "limit of Coulomb's law"))
             what = f"mean slip over the glide, {here}"
             rows.append(
                 Row(what, "equilibrium", 1.0, mean / glide, PRESSURE / glide, "the block's own strain over the glide")
             )
     worst = max(r[9] for r in table)
-    rows.append(Row("largest residual", CRITERION, 1e-8, worst, 0.0, "a bound", measure="at most"))
+    rows.append(at_most("largest residual", CRITERION, 1e-8, worst))
     curves = {}
     for dim, size in ((2, 0.5), (3, 2.5 if quick else 1.25)):
         curves[dim], slipping = plate(dim, size)
@@ -176,7 +176,7 @@ def run(quick: bool) -> Result:
     rows.append(
         Row(what, "isotropic friction; REFERENCES.md, 7.2", 30.0, curves[3][-1][2], 0.1, why, measure="absolute")
     )
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, curves))
 
 
@@ -194,5 +194,3 @@ def _draw(figure: Any, columns: dict[str, list[Any]], curves: dict[int, list[tup
         right.plot([s for s, _, _ in curve], [q for _, q, _ in curve], "o-", ms=3, label=f"{dim}D, base fixed")
     right.axhline(1.0, color="k", lw=0.8, ls="--")
     right.set(xlabel="slide, mm", ylabel="Q/(mu P)", title="plate sliding on a block")
-    for axes in (left, right):
-        axes.legend(fontsize=8)

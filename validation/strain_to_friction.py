@@ -26,7 +26,6 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.plotting.calibration import resolution_panel, slope_panel
@@ -34,8 +33,9 @@ from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap
 
-from ._paper import columns, said
-from ._rows import Result, Row
+from ._paper import said
+from ._press import fig9_finger
+from ._rows import Result, Row, at_most, columns
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)
@@ -53,19 +53,16 @@ Found = dict[tuple[Domain, str], Calibration]
 
 def model(domain: Domain, sizes: tuple[float, float], length: float, quick: bool = False) -> Model:
     """The finger with its gauge, and the mirror image of it."""
-    body = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, length), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, length))
     leg = Leg(10.0, steps=4 if quick else "auto")
-    return Model(body, Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
+    return Model(fig9_finger(), Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
 
 
 def run(quick: bool) -> Result:
     """Quick: coarse meshes, five values of mu, tolerances of one kind only."""
     mus = (0.02, 0.4, 0.5, 0.6, 1.2) if quick else MUS
     wanted = {**STEPS_ALONE, "gauge_angle_deg": 2.0} if quick else None
-    found: Found = {}
-    maps: dict[Domain, StrainMap] = {}
-    rows: list[Row] = []
+    found, maps, rows = {}, {}, []
     for domain, sizes in (QUICK if quick else SIZES).items():
         free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, {"gauge": NOISE}, LIMIT, wanted)
         found[domain, FREE] = free
@@ -169,7 +166,7 @@ def _left(what: str, c: ReadingCurve) -> list[Row]:
     error = float(c.tolerance_sd(mus)[names.index("increments")].max())
     text = f"error of that change by the increments, over the change, {what}"
     share = error / abs(float(np.diff(c.at(mus))[0]))
-    return [Row(text, "presses of fewer", 0.25, share, 0.0, "that of mu is as much", "statement", "at most")]
+    return [at_most(text, "presses of fewer", 0.25, share, "that of mu is as much", "statement")]
 
 
 def _widths(found: Found) -> list[Row]:
@@ -202,7 +199,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
             axes.plot(c.grid, 1e3 * c.at(c.grid, "fit"), "--", color=colours[domain], lw=1.0, label="its second order")
         axes.set(xlabel="mu", ylabel="strain, 1e-3", title=f"gauge at 30°: {kind}")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False)
     right = panels[0, 2]
     for (domain, kind), calibration in found.items():
         c = calibration.readings[0]
@@ -211,7 +208,7 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         right.semilogy(c.grid, shown, style, color=colours[domain], lw=1.5, label=f"{NAMES[domain]}, {kind}")
     right.plot(0.5, 0.1, "k*", ms=11, label="the paper, measured")
     right.set(xlabel="mu", ylabel="standard deviation of mu", title="from a strain noise of 1.5e-4", ylim=(5e-4, 50.0))
-    right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     for axes, domain in zip(panels[1], NAMES, strict=False):
         slope_panel(figure, axes, maps[domain], TURN, 0.5)
         axes.set_title(f"d strain / d mu, 30°, mu = .5, {NAMES[domain]}")

@@ -19,20 +19,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_touch
 
 from ._common import convergence, rate
-from ._rows import Result, Row
+from ._press import converged
+from ._rows import Result, Row, at_least, exact_columns, zero
 
-Float = NDArray[np.float64]
 RADIUS = 6.0
 CLOSED = "closed form"
 
@@ -86,8 +86,7 @@ def pressed(obj: RigidObject, size: float) -> dict[str, Any]:
         friction=Coulomb(0.3),
     )  # fmt: skip
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     return measure(problem.points, frame)
 
 
@@ -95,9 +94,7 @@ def run(quick: bool) -> Result:
     """Two shapes on three fineness levels; distances from a box."""
     levels = (24, 40, 64) if quick else (32, 64, 128, 256)
     size = 1.0 if quick else 0.4
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, list[float]] = {}
+    rows, table, curves = [], [], {}
     dome = designs()["clipped_cylinder"](20.0, 12.0, 3.0, 8.0)
     for name, make, exact in (
         ("ball", ball, Sphere(0.7, 0.4, radius_mm=RADIUS)),
@@ -136,15 +133,12 @@ def run(quick: bool) -> Result:
                 f"{name}: force with {levels[-1]} sectors, relative to the exact shape's", CLOSED, 1.0,
                 1.0 + errors["force"][-1], 3.0 * sagitta / 0.4, "three sagittas over the depth; P ~ depth^1.5",
             ),
-            Row(
-                f"{name}: first touch on the side of a dome, error, mm", CLOSED, 0.0, errors["first touch"][-1],
-                sagitta, "the sagitta", measure="absolute",
-            ),
+            zero(f"{name}: first touch on the side of a dome, error, mm", CLOSED, errors["first touch"][-1], sagitta,
+                "the sagitta"),
         ]  # fmt: skip
     rows += _distance_rows()
-    columns = "shape sectors triangles height_error_mm first_touch_error_mm force_error".split()
-    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), kept, lambda figure: _draw(figure, edges, curves))
+    columns = "shape sectors triangles height_error_mm first_touch_error_mm force_error"
+    return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, edges, curves))
 
 
 def _distance_rows() -> list[Row]:
@@ -174,18 +168,10 @@ def _distance_rows() -> list[Row]:
     paper = "Baerentzen and Aanaes 2005"
     tip = "share of points around a needle's tip taken for inside"
     return [
-        Row("signed distance from a box, largest error, mm", CLOSED, 0.0, off, 1e-12, "round-off", measure="absolute"),
-        Row("its normal against the distance's slope", "differences", 0.0, turned, 1e-6, "theirs", measure="absolute"),
-        Row(tip, "all lie outside", 0.0, wrong, 0.0, "none", measure="absolute"),
-        Row(
-            "the same by the nearest triangle's normal",
-            paper,
-            0.1,
-            naive,
-            0.0,
-            "the check can fail",
-            measure="at least",
-        ),
+        zero("signed distance from a box, largest error, mm", CLOSED, off, 1e-12, "round-off"),
+        zero("its normal against the distance's slope", "differences", turned, 1e-6, "theirs"),
+        zero(tip, "all lie outside", wrong, 0.0, "none"),
+        at_least("the same by the nearest triangle's normal", paper, 0.1, naive, "the check can fail"),
     ]
 
 

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from finger3d._types import Float
 from finger3d.analyses.press import press
 
-from ._paper import Float, columns
-from ._rows import Result, Row
+from ._rows import Result, Row, at_least, at_most, columns
 
 SOURCE = "Kerdok et al. 2003; REFERENCES.md, 9.2"
 SIZE, NU, NOMINAL = 80.0, 0.499, np.array([0.05, 0.125, 0.1825])
@@ -159,13 +159,15 @@ def _rows(models: list[Compression], best: Compression, data: Float) -> list[Row
     over = np.array([best.fitted(x)[0] for x in data]) / (SIZE * NOMINAL)
     worst = max(misfits.values())
     return [
-        Row(f"root mean square of {data.size} differences, mm, best of {len(models)} coefficients: mu = {best.mu:g}",
-            SOURCE, FITS, misfits[best.mu], 0.0, "steps of 0.19 mm, up to 0.5 mm between the sides", "validation",
-            "at most"),
-        Row("the same of the worst coefficient over that of the best", SOURCE, 1.5, worst / misfits[best.mu], 0.0,
-            "if beads tell friction", "statement", "at least"),
-        Row(f"mu is told within 0.1: half its range, {near[0]:.2f} to {near[-1]:.2f}, of at most {NEAR:g} times that",
-            SOURCE, 0.1, 0.5 * float(near[-1] - near[0]), 0.0, "the resolution of a gauge", "statement", "at most"),
+        at_most(
+            f"root mean square of {data.size} differences, mm, best of {len(models)} coefficients: mu = {best.mu:g}",
+            SOURCE, FITS, misfits[best.mu], "steps of 0.19 mm, up to 0.5 mm between the sides",
+            "validation"),
+        at_least("the same of the worst coefficient over that of the best", SOURCE, 1.5, worst / misfits[best.mu],
+            "if beads tell friction", "statement"),
+        at_most(
+            f"mu is told within 0.1: half its range, {near[0]:.2f} to {near[-1]:.2f}, of at most {NEAR:g} times that",
+            SOURCE, 0.1, 0.5 * float(near[-1] - near[0]), "the resolution of a gauge", "statement"),
         Row("fitted travel of the plate over the published one, of three that furthest from 1", SOURCE, 1.0,
             float(over[np.argmax(np.abs(over - 1.0))]), 0.05, "if the published compression is that of the cube",
             "statement"),
@@ -195,8 +197,8 @@ def _draw(figure: Any, models: list[Compression], best: Compression, data: Float
             axes.plot(data[level, kind], HEIGHTS, "o", color=f"C{level}", ms=5,
                       label=f"published {100 * share:g} %, fitted {100 * travel / SIZE:.1f} %")  # fmt: skip
     left.set(xlabel="movement of the central beads towards the base (mm)", ylabel="height above the base (mm)")
-    left.set_title(f"beads: measured, lines: mu = {best.mu:g}", fontsize=10)
-    left.legend(fontsize=8, frameon=False)
+    left.set_title(f"beads: measured, lines: mu = {best.mu:g}")
+    left.legend(frameon=False)
     middle.set(xlabel="change of the distance of the outer beads (mm)", ylabel="height above the base (mm)")
     right.plot([m.mu for m in models], [m.misfit(data) for m in models], "ko-", ms=4)
     right.set(xlabel="mu of the plate that is assumed", ylabel="root mean square of differences (mm)", ylim=(0.0, None))

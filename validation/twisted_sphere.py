@@ -34,7 +34,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Move, ObjectPose, Sphere
 
-from ._rows import Result, Row
+from ._press import changed
+from ._rows import Result, Row, exact_columns, zero
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
 SHEAR, EFFECTIVE = E / (2.0 * (1.0 + NU)), E / (1.0 - NU**2)
@@ -100,10 +101,7 @@ def partial(problem: Problem, shares: tuple[float, ...]) -> list[tuple[float, fl
     force = float(state.contact.force[:, 0].sum())
     a = radius_of(force)
     unit = MU * 1.5 * force / (math.pi * a**2) / SHEAR
-    rough, formulation = (
-        replace(problem, model=replace(problem.model, friction=Coulomb(MU))),
-        formulation_of(problem.model),
-    )
+    rough, formulation = (changed(problem, friction=Coulomb(MU)), formulation_of(problem.model))
     place, area, out = problem.surface.centroids, problem.surface.area, []
     for share in shares:
         end = ObjectPose(DEPTH, turn_y=unit * turn_of(share))
@@ -138,8 +136,8 @@ def run(quick: bool) -> Result:
         Row(f"stuck share of the contact, mu = 1000, {at}", "it holds", 1.0, share, 1e-12, "every point"),
         Row(f"torque of full slip over 3 pi/16 mu P a, friction while pressed, {at}", "Johnson 1985, Sec. 3.9", 1.0,
             slips[-1][1] / full, 0.25 / edges[-1], "the pressure vanishes where the points end"),
-        Row(f"stuck share in full slip, friction while pressed, {at}", "none but the middle", 0.0, slips[-1][3],
-            1.0 / edges[-1] ** 2, "the middle point cannot slip", measure="absolute"),
+        zero(f"stuck share in full slip, friction while pressed, {at}", "none but the middle", slips[-1][3],
+            1.0 / edges[-1] ** 2, "the middle point cannot slip"),
         Row("closed form of partial slip, c = 0, over 3 pi/16 mu P a", "Johnson 1985, Sec. 3.9", 1.0, torque_of(0.0),
             1e-10, "quadrature"),
         Row("closed form of partial slip, c = 0.999 a, over 16/3 G a^3 t", "Johnson 1985, Sec. 7.6", 1.0,
@@ -164,8 +162,8 @@ def run(quick: bool) -> Result:
             Row("torque that sticks, extrapolated to points without number", "Johnson 1985, Sec. 7.6", 1.0,
                 held[-1] + (held[-1] - held[-3]) * edges[-3] / (edges[-1] - edges[-3]), 0.1, "of first order in 1/n")
         )  # fmt: skip
-    columns = "edges_per_a c_over_a turn_G_over_mu_p0 torque_over_full theory stuck_radius turn_deg".split()
-    data = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
+    columns = "edges_per_a c_over_a turn_G_over_mu_p0 torque_over_full theory stuck_radius turn_deg"
+    data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
 
 
@@ -182,7 +180,5 @@ def _draw(figure: Any, data: dict[str, list[float]]) -> None:
             axes.plot(turn, [data[name][k] for k in own], "o", mfc="none", ms=5, label=f"{count:g} edges to a")
     left.set(ylabel="torque over that of full slip", ylim=(0.0, 1.05))
     right.set(ylabel="stuck radius over that of the contact", ylim=(0.0, 1.05))
-    for axes, where in ((left, "lower right"), (right, "upper right")):
+    for axes in (left, right):
         axes.set(xlabel="turn G / (mu p0)", xlim=(0.0, 2.0))
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8, loc=where)

@@ -8,7 +8,7 @@ little, which falls with a/h, unless they are mirror images.  For unlike bodies 
 
 The finger is a block on its base; the object is that of [effects.elastic_object], the lower half of a cylinder held on
 its cut.  It has its own mesh, 1.3 times coarser than the finger's, with nodes in other places.  Both bodies are 100 and
-200 a thick, and the values are extrapolated linearly in a/h to 0, as in press_line.  NAFEMS CGS-1
+200 a thick, and the values are extrapolated linearly in a/h to 0, as in press_with_friction.  NAFEMS CGS-1
 (validation/REFERENCES.md, 6.4) is pressed with the same effect.
 """
 
@@ -29,7 +29,6 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.elastic_object import ObjectBody
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, vertical_frame
@@ -37,7 +36,8 @@ from finger3d.progress import QUIET
 
 from ._common import held_at, solve
 from ._halfplane import Profile, under
-from ._rows import Result, Row
+from ._press import converged
+from ._rows import Result, Row, exact_columns, zero
 
 SPENCE = "Spence 1975 with Dundurs' beta; REFERENCES.md, 1.3 and 2.1"
 STEPPED = "Spence 1975 with 200 increments; REFERENCES.md, 2.4"
@@ -66,8 +66,8 @@ def line(pair: Any, points: float, size: float, steps: int) -> Problem:
     block = designs()["block"](half_length_mm=size, height_mm=size, width_mm=1.0)
     mesh = MeshOptions(1.0 / points, size / 8.0, "swept")
     model = Model(
-        block, Isotropic(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain",
-    )  # fmt: skip
+        block, Isotropic(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain"
+    )
     return build(Effect(*pair[1]).apply(model), margin=-0.2)
 
 
@@ -84,10 +84,7 @@ def numbers(profiles: list[Profile], pair: Any, size: float) -> np.ndarray:
 def run(quick: bool) -> Result:
     """Pairs at two thicknesses; who is the finger; NAFEMS CGS-1."""
     points, steps = (8, 14) if quick else (30, 200)
-    rows: list[Row] = []
-    found: dict[str, np.ndarray] = {}
-    table: list[tuple[Any, ...]] = []
-    curves: dict[str, Profile] = {}
+    rows, found, table, curves = [], {}, [], {}
     for name, pair in PAIRS.items():
         mu = 0.0 if name == "unlike" else 0.25
         at = []
@@ -106,10 +103,8 @@ def run(quick: bool) -> Result:
             "c/a, the same pair", SPENCE, C_OVER_A, pair[2], 0.5 / points + 0.3 / steps,
             "half a point spacing, and 0.3/N for N increments", measure="absolute",
         ),
-        Row(
-            "int_0^a q/P, bodies alike, mu = .25", "beta = 0; Johnson 1985, sec. 5.1", 0.0, found["alike"][1], 1e-3,
-            "bodies of finite size have friction of the order of a/h", measure="absolute",
-        ),
+        zero("int_0^a q/P, bodies alike, mu = .25", "beta = 0; Johnson 1985, sec. 5.1", found["alike"][1], 1e-3,
+            "bodies of finite size have friction of the order of a/h"),
     ]  # fmt: skip
     if not quick:
         rows.append(
@@ -119,9 +114,8 @@ def run(quick: bool) -> Result:
     rows += _third_law_rows()
     rows += _swapped_rows(quick)
     rows += _nafems_rows(quick)
-    columns = "pair mu thickness_mm P_over_Hertz q_over_P c_over_a D_over_AP2".split()
-    kept = dict(zip(columns, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), kept, lambda figure: _draw(figure, curves))
+    columns = "pair mu thickness_mm P_over_Hertz q_over_P c_over_a D_over_AP2"
+    return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, curves))
 
 
 def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: float = 0.3, **body: float) -> Model:
@@ -135,8 +129,7 @@ def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: fl
 
 def _last(model: Model) -> dict[str, Any]:
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     return measure(problem.points, frame)
 
 
@@ -150,14 +143,9 @@ def _mirror_rows() -> list[Row]:
     plane, limit = (a["normal_force_N"] / b["normal_force_N"] for a, b in ((alike, smooth), (hard, rigid)))
     what = "friction over force of two equal half cylinders"
     return [
-        Row(what, "symmetry", 0.0, share, 1e-4, "an arc on quadratic facets", measure="absolute"),
+        zero(what, "symmetry", share, 1e-4, "an arc on quadratic facets"),
         Row(
-            "their force over that on a smooth plane at half the depth",
-            "symmetry",
-            1.0,
-            plane,
-            1e-5,
-            "chords for arcs",
+            "their force over that on a smooth plane at half the depth", "symmetry", 1.0, plane, 1e-5, "chords for arcs"
         ),
         Row(
             "force with E2 = 1e12 E1 over that of a rigid object", "a rigid object", 1.0, limit, 1e-9, "stiffness ratio"
@@ -187,8 +175,7 @@ def _third_law_rows() -> list[Row]:
     model = Effect(*pair[1]).apply(_half(*pair[0], 0.15, Cylinder(0.4, radius_mm=5.0), 0.8, **block))
     model = replace(model, legs=(Leg(0.8, steps=3), Leg(0.8, slide_x_mm=0.1, steps=2)))
     problem = build(model)
-    *_, frame = march(problem)
-    assert frame.outcome.ok
+    frame = converged(problem)[-1]
     forces = problem.upright_force(frame.meshed_state.contact)
     force = forces.ravel()
     other = ObjectBody(model, 5.0, model.first_contact.contact_box, (), QUIET).mesh().mesh
@@ -208,12 +195,10 @@ def _third_law_rows() -> list[Row]:
     third = "Newton's third law"
     what = f"bases' forces, finger's less object's over finger's, {c} points, dragged"
     return [
-        Row(what, third, 0.0, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "round-off", measure="absolute"),
-        Row(
-            "the surfaces' approach by two whole solutions, over the condensed one, less 1",
-            "the sum of both compliances", 0.0, np.abs(moved - condensed).max() / np.abs(condensed).max(), 1e-10,
-            "round-off of two factorisations", measure="absolute",
-        ),
+        zero(what, third, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "round-off"),
+        zero("the surfaces' approach by two whole solutions, over the condensed one, less 1",
+            "the sum of both compliances", np.abs(moved - condensed).max() / np.abs(condensed).max(), 1e-10,
+            "round-off of two factorisations"),
     ]  # fmt: skip
 
 
@@ -260,5 +245,3 @@ def _draw(figure: Any, curves: dict[str, Profile]) -> None:
     right.set(ylabel="friction on the finger / Hertz's peak", ylim=(-0.25, 0.42))
     for axes in (left, right):
         axes.set(xlabel="x/a", xticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
-        axes.legend(fontsize=8, loc="upper left")
-        axes.grid(alpha=0.3)

@@ -10,13 +10,14 @@ to find the two states of the problem of one point, and says how often.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.law import ContactLaw
@@ -28,8 +29,9 @@ from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import stations
 
 from ._increments import PlainCoulomb
-from ._paper import STRAIN, STRESS, Float, columns, fig9, said
-from ._rows import Result, Row
+from ._paper import STRAIN, STRESS, fig9, said
+from ._press import changed
+from ._rows import Result, Row, at_least, at_most, columns
 
 WIDE = "20 mm wide"
 MODELS = ((STRESS, 0.3), (STRAIN, 0.3), (STRAIN, 0.49), (WIDE, 0.3), (WIDE, 0.49))
@@ -74,7 +76,7 @@ def run(quick: bool) -> Result:
         problem = fig9(nu, "solid" if model == WIDE else model, size)
         for mu in MUS[1:4:2] if quick else MUS:
             for path, legs in PATHS.items():
-                case = replace(problem, model=replace(problem.model, friction=PlainCoulomb(mu), legs=legs))
+                case = changed(problem, friction=PlainCoulomb(mu), legs=legs)
                 start = Searched(model, nu, mu, path, case.coupling())
                 found.append(_search(case, start, 5 if quick else STARTS[model], random))
     rows = [*_rows(found), *_one_point(random, 10 if quick else 100)]
@@ -115,27 +117,23 @@ def _start(force: Float, mu: float, random: np.random.Generator) -> Float:
     return np.column_stack([normal, (share * min(mu, 10.0) * normal)[:, None] * tangents])
 
 
-def _rows(found: Sequence[Searched]) -> list[Row]:
+def _rows(found: Sequence[Searched]) -> Iterator[Row]:
     """The paper's statement for its own range of mu, and what the search found beyond."""
-    rows = []
     for model in dict.fromkeys(s.model for s in found):
         own = [s for s in found if s.model == model]
         for text, some in (("up to 1", [s for s in own if s.mu <= 1.0]), ("above 1", [s for s in own if s.mu > 1.0])):
             tried = sum(s.solved + s.others + s.unsettled for s in some)
             what = f"other solutions of an increment, {tried} random starts, mu {text}, {model}"
             others = sum(s.others for s in some)
-            rows.append(said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most"))
+            yield said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most")
             what = f"random starts that end in no solution, of {tried}, mu {text}, {model}"
             unsettled = sum(s.unsettled for s in some)
-            rows.append(Row(what, "no reference", 0.0, unsettled, 0.0, "the fallbacks start from any forces",
-                            "statement", "at most"))  # fmt: skip
-    return rows
+            yield at_most(what, "no reference", 0.0, unsettled, "the fallbacks start from any forces", "statement")
 
 
-def _one_point(random: np.random.Generator, loads: int) -> list[Row]:
+def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
     """Loads that nearly close a gap of one point, K = [[1, .8], [.8, 2]] (t, n): several solutions above mu = 1.25."""
     compliance = np.linalg.inv(np.array([[2.0, 0.8], [0.8, 1.0]])).reshape(1, 2, 1, 2)
-    rows = []
     for mu, most in ((1.2, 0), (2.0, loads)):
         several = 0
         for gap, slip in random.uniform((0.005, 0.3), (0.03, 0.5), size=(loads, 2)):
@@ -148,12 +146,9 @@ def _one_point(random: np.random.Generator, loads: int) -> list[Row]:
             several += bool(len(forces) and np.ptp(forces, axis=0).max() > DIFFERENT)
         what = f"loads with several solutions found, one point, mu = {mu:g}, of {loads}"
         if most:
-            rows.append(Row(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, 0.0, "the search finds them",
-                            measure="at least"))  # fmt: skip
+            yield at_least(what, "REFERENCES.md, 8.1: some above mu = 1.25", 1, several, "the search finds them")
         else:
-            rows.append(Row(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, 0.0, "the solution is unique",
-                            measure="at most"))  # fmt: skip
-    return rows
+            yield at_most(what, "REFERENCES.md, 8.1: none below mu = 1.25", 0, several, "the solution is unique")
 
 
 def _draw(figure: Any, found: Sequence[Searched]) -> None:
@@ -167,6 +162,5 @@ def _draw(figure: Any, found: Sequence[Searched]) -> None:
             left.plot([s.mu for s in own], shares, style, ms=4, color=f"C{i}", label=f"{model}, nu = {nu:g}, {path}")
             right.loglog([s.mu for s in own], [max(s.apart, 1e-16) for s in own], style, ms=4, color=f"C{i}")
     left.set(xscale="log", xlabel="mu", ylabel="random starts that end in another solution (%)")
-    left.legend(frameon=False, fontsize=7)
     right.axhline(DIFFERENT, color="#222222", lw=0.8)
     right.set(xlabel="mu", ylabel="largest difference of a force over the largest force")

@@ -24,6 +24,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import residue
 
+from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
@@ -42,9 +43,7 @@ from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vert
 
 from . import _rings
 from ._common import box, graded, held_at
-from ._rows import Result, Row
-
-Float = NDArray[np.float64]
+from ._rows import Result, Row, exact_columns, zero
 
 RADIUS = 100.0
 HEIGHT_MM = 50.0
@@ -55,7 +54,7 @@ HELD, RELEASED = 1.5, 0.8  # s; the ball is drawn back for so long
 LEE = "Lee and Radok 1960; REFERENCES.md, 4.1"
 TING = "Ting 1966; REFERENCES.md, 4.2"
 HALF = "0.01 % or less measured on rings of a/100, 0.2 % or less on tetrahedra of a/10"
-COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a".split()
+COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a"
 
 
 @dataclass(frozen=True)
@@ -260,8 +259,7 @@ def run(quick: bool) -> Result:
     """Rings a/100 wide under 100 steps a second; tets of a/4, a/7, a/10 under 20."""
     count, per_second, meshes = (40, 20, (3,)) if quick else (100, 100, (4, 7, 10))
     viscous = Viscoelastic(Relaxation(PRONY, True))
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
+    rows, table = [], []
     body = on_rings(0.3, count)
     k = 4.0 / 3.0 / (1.0 - 0.3**2) * np.sqrt(RADIUS) * DEPTH**1.5
     held, release = long_hold(per_second), ramp_hold_release(per_second)
@@ -279,7 +277,7 @@ def run(quick: bool) -> Result:
     rows.append(Row("rate at which the force settles with the step, 5, 10, 20 a second", "second order",
                     2.0, rate, 0.25, "points come into contact one by one", measure="absolute"))  # fmt: skip
     rows += _tet_rows(meshes, table, quick)
-    columns = dict(zip(COLUMNS, map(list, zip(*table, strict=True)), strict=True))
+    columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, curves, columns))
 
 
@@ -329,10 +327,8 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
                 table.append(("tets", 0.3, bulk, points, per_second, t, p, lee_radok(t, relax), a))
         away = float(np.abs(found[points, True] - convolved(elastic, times) / elastic).max())
         rows.append(
-            Row(
-                f"distance from the convolution of the elastic force, over it, tets a/{points}", LEE, 0.0, away, 1e-10,
-                "round-off: both are linear within an increment", measure="absolute",
-            )
+            zero(f"distance from the convolution of the elastic force, over it, tets a/{points}", LEE, away, 1e-10,
+                "round-off: both are linear within an increment")
         )  # fmt: skip
     for bulk in (True, False):
         for when in (0.4, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 1.5, 4.0):
@@ -360,7 +356,6 @@ def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) ->
         size = [ting(s)[1] if name == "release" and s > HELD else np.sqrt(min(s, 1.0)) for s in t[shown]]
         middle.plot(t[shown], size, "k--", lw=0.9)
     left.set(xlabel="t, s", ylabel="P/k", title="rings (dashed: Lee and Radok, Ting)")
-    left.legend(fontsize=7)
     middle.set(xlabel="t, s", ylabel="a, mm", title="contact radius")
     data = {k: np.array(v) for k, v in columns.items()}
     tets = data["body"] == "tets"
@@ -374,4 +369,3 @@ def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) ->
     for bound in (-0.5, 0.5):
         right.axhline(bound, color="k", ls=":", lw=0.8)
     right.axhline(0.0, color="k", lw=0.6)
-    right.legend(fontsize=7)

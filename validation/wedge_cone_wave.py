@@ -16,9 +16,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -27,9 +27,8 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Wave, Wedge
 
 from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
-from ._rows import Result, Row
+from ._rows import Result, Row, exact_columns
 
-Float = NDArray[np.float64]
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
 MODULUS = 1.0 / (1.0 - NU**2)
 PEAK = np.pi * MODULUS * AMPLITUDE  # p* for a wavelength of 1 mm
@@ -158,35 +157,18 @@ def full_contact(count: int) -> float:
 def run(quick: bool) -> Result:
     """Three sizes of each."""
     studies: dict[str, tuple[Any, tuple[int, ...], str, str]] = {
-        "wedge, plane strain": (
-            wedge,
-            (5, 10, 20) if quick else (5, 10, 20, 40),
-            _JOHNSON,
-            _ONE,
-        ),
+        "wedge, plane strain": (wedge, (5, 10, 20) if quick else (5, 10, 20, 40), _JOHNSON, _ONE),
         "cone, 3D": (
             lambda n: cone(n, 2.2 if quick else 1.6),
             (3, 4, 5) if quick else (4, 6, 8),
             "Sneddon 1965; REFERENCES.md, 1.4",
             _ONE,
         ),
-        "wave, plane strain": (
-            lambda n: wave(n, 2),
-            (10, 20, 40) if quick else (20, 40, 80),
-            _WESTERGAARD,
-            _WAVE,
-        ),
-        "wave, 3D with held faces": (
-            lambda n: wave(n, 3),
-            (6, 10, 14) if quick else (10, 20, 40),
-            _WESTERGAARD,
-            _WAVE,
-        ),
+        "wave, plane strain": (lambda n: wave(n, 2), (10, 20, 40) if quick else (20, 40, 80), _WESTERGAARD, _WAVE),
+        "wave, 3D with held faces": (lambda n: wave(n, 3), (6, 10, 14) if quick else (10, 20, 40), _WESTERGAARD, _WAVE),
     }
     edges = {"wedge, plane strain": 0.5, "wave, plane strain": 1.0}
-    rows: list[Row] = []
-    table: list[tuple[Any, ...]] = []
-    curves = {}
+    rows, table, curves = [], [], {}
     for name, (measure, counts, source, reason) in studies.items():
         levels = [measure(n) for n in counts]
         sizes = 1.0 / np.array(counts)
@@ -213,9 +195,8 @@ def run(quick: bool) -> Result:
     rows.append(Row(what, _JOHNSON, 1.0, own_path(count), 0.01, _ONE))
     got = full_contact(20 if quick else 40)
     rows.append(Row("amplitude of the pressure over p*, all touching, wave", _WESTERGAARD, 1.0, got, 0.01, _WAVE))
-    names = ("case", "points", "force_rms_error", "pressure_L2_error")
-    columns = dict(zip(names, map(list, zip(*table, strict=True)), strict=True))
-    return Result(tuple(rows), columns, lambda figure: draw(figure, curves))
+    names = "case points force_rms_error pressure_L2_error"
+    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
 
 def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
@@ -231,8 +212,6 @@ def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
     left.xaxis.set_minor_formatter(NullFormatter())
     left.set_xlabel("point spacing / a (wave: / half a wavelength)")
     left.set_ylabel("force at equal a, relative error, rms over depths")
-    left.grid(alpha=0.3)
-    left.legend(fontsize=8)
     label = "pressure, relative L2 error, rms over depths"
     for name, slope in (("wedge, plane strain", 0.5), ("wave, plane strain", 1.0)):
         convergence(right, curves[name][0], {name: curves[name][1][:, 1]}, slope, left.get_xlabel(), label)

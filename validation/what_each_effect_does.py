@@ -171,9 +171,8 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_yticks(np.arange(len(QUANTITIES)), names)
         axes.invert_yaxis()
-        axes.set_xlim(-125.0, 225.0)
-        axes.set_xlabel("change by the effect (%)")
-        axes.set_title({"plane-strain": "section, plane strain", "solid": "solid, 20 mm wide"}[domain])
+        axes.set(xlim=(-125.0, 225.0), xlabel="change by the effect (%)")
+        axes.set(title={"plane-strain": "section, plane strain", "solid": "solid, 20 mm wide"}[domain])
         seconds = [found[domain, name]["cpu_seconds"] for name in ("none", *effects)]
         times.barh(range(len(seconds)), seconds, color=["#777777", *(f"C{i}" for i in range(len(effects)))])
         for y, value in enumerate(seconds):
@@ -184,4 +183,4 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
         for panel in (axes, times):
             panel.spines[["top", "right"]].set_visible(False)
     handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", fontsize=8, frameon=False, ncols=3)
+    figure.legend(*handles, loc="outside lower center", frameon=False, ncols=3)

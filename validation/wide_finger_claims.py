@@ -13,18 +13,19 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.contact.friction import TwoCoefficients
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
-from . import fig03_forces, fig04_zones, fig05_strains_depth, fig06_forces_mu, fig07_strains_mu, fig12_gauge_angles
-from ._paper import BELOW_FIG9, MUS, Float, Profile, columns, fig9, line, said, strains, under
-from ._rows import Result, Row
+from . import fig9_strains, half_cylinder_forces, half_cylinder_strains
+from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
+from ._press import fig9_finger, under
+from ._rows import Result, Row, columns
 
 NU, COUNT = 0.49, 25
 ANGLES = (15, 30, 45, 60)
@@ -72,9 +73,9 @@ class Pressed:
 def run(quick: bool) -> Result:
     """Quick: a coarse mesh and few increments."""
     x = np.linspace(0.0, 48.0, COUNT)
-    design = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
     size = 6.0 if quick else 2.5
-    small = fig9(NU, "solid", size if quick else 1.5, [*line(x, design, BELOW_FIG9), *fig12_gauge_angles.gauges()])
+    gauges = [*line(x, fig9_finger(), BELOW_FIG9), *fig9_strains.gauges()]
+    small = fig9(NU, "solid", size if quick else 1.5, gauges)
     mesh = MeshOptions(size, 3.0 * size, "swept")
     large = build(LargeDeformation().apply(replace(small.model, mesh=mesh)))
     found, rows, lines = {}, [], []
@@ -114,11 +115,11 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
             0.02, abs(ten["friction_sum_N"] / friction[MUS.index(0.25)] - 1.0), '"sufficiently small"', 0.0, "at most",
         ),
         # small contacts have few points; the mirror symmetry that is used makes the sum of f_t zero
-        *(row for row in fig03_forces.statements(here, depths[-1:]) if "sum of f_t" not in row.what),
-        *fig04_zones.statements(here, depths[0], depths[-1]),
-        *fig05_strains_depth.statements(here, found.early, found.strain[MUS.index(0.25)]),
-        *fig06_forces_mu.statements(here, mus, force, friction),
-        *fig07_strains_mu.statements(here, whole, mirrored, middle.a),
+        *(row for row in half_cylinder_forces.statements_depths(here, depths[-1:]) if "sum of f_t" not in row.what),
+        *half_cylinder_forces.statements_zones(here, depths[0], depths[-1]),
+        *half_cylinder_strains.statements_depths(here, found.early, found.strain[MUS.index(0.25)]),
+        *half_cylinder_forces.statements_mus(here, mus, force, friction),
+        *half_cylinder_strains.statements_mus(here, whole, mirrored, middle.a),
         said(
             f"ratio .5 changes little: change of gamma_xy over the largest gamma_xy, {here}", "Fig. 8", 0.05,
             kinetic / np.abs(shear[MUS.index(0.25)]).max(), "5 % would be seen in a figure", 0.0, "at most",
@@ -139,7 +140,7 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
             f"the edge slips at large mu: slip zone at mu = 1 over a, {here}", "Sec. III-B", 0.02,
             (mus[-1].a - mus[-1].c) / mus[-1].a, "one of 50 points", 0.0, "at least",
         ),
-        *fig12_gauge_angles.statements(here, NU, np.array(MUS), read),
+        *fig9_strains.statements(here, NU, np.array(MUS), read),
     ]  # fmt: skip
 
 
@@ -165,9 +166,8 @@ def _draw(figure: Any, x: Float, found: dict[str, Pressed]) -> None:
             "gauge at x = 36 mm",
         )
         for panel, title in zip(axes, titles, strict=True):
-            panel.set(xlabel="mu" if panel is axes[3] else "x (mm)")
-            panel.set_title(title, fontsize=10)
+            panel.set(xlabel="mu" if panel is axes[3] else "x (mm)", title=title)
             panel.axhline(0.0, color="#999999", lw=0.7)
         axes[0].set_ylabel("large deformation" if "large" in name else "small strain")
-    panels[0, 0].legend(title="mu", frameon=False, fontsize=8)
-    panels[0, 3].legend(title="angle", frameon=False, fontsize=8)
+    panels[0, 0].legend(title="mu", frameon=False)
+    panels[0, 3].legend(title="angle", frameon=False)

@@ -22,10 +22,10 @@ from finger3d.progress import QUIET, Progress
 
 PENALTY = 200.0
 """Pressure over overlap, times the depth over Young's modulus: the surfaces overlap by less than a percent of the
-depth, which changes the force by less (validation/calculix_export.py); CalculiX diverges far above."""
+depth, which changes the force by less (validation/calculix_forces.py); CalculiX diverges far above."""
 
 STICK_SHARE = 0.4
-"""Stiffness of sticking friction over the penalty, as in validation/calculix_all_faces.py."""
+"""Stiffness of sticking friction over the penalty, as in validation/calculix_forces.py."""
 
 _SAGITTA = 1e-3  # of the facets of the object, over the depth
 _MARGIN = 2.0  # around the finger at rest, in depths of the press: facets of the object beyond it are left out

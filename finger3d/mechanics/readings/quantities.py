@@ -13,7 +13,7 @@ from enum import Enum, auto
 from finger3d.mechanics.readings.columns import Column
 
 ORDER = 1.2
-"""Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded_layer)."""
+"""Order of convergence at the bonded corners of the base for nu = 0.49, the lowest of all (validation/bonded)."""
 
 
 class Kind(Enum):

@@ -1,0 +1,65 @@
+"""The finger of Maeno 2004, Fig. 9, and presses of which every increment must converge."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.geometry.design import Design
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.results.history import StepResult
+
+
+def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm: float = 36.6) -> Design:
+    """Return the clipped cylinder of Fig. 9, 100 mm long; or another radius and height of its edges."""
+    return designs()["clipped_cylinder"](
+        radius_mm=radius_mm, half_length_mm=50.0, edge_height_mm=edge_height_mm, width_mm=width_mm
+    )
+
+
+def changed(problem: Problem, **fields: Any) -> Problem:
+    """Return a problem with other friction, legs or other data of its model; the condensed body is shared."""
+    return replace(problem, model=replace(problem.model, **fields))
+
+
+def converged(problem: Problem, workspace: Workspace | None = None) -> list[StepResult]:
+    """Return the increments of a press.
+
+    Raises
+    ------
+    AssertionError
+        If one of them does not converge.
+    """
+    steps = list(march(problem, workspace=workspace))
+    if not steps[-1].outcome.ok:
+        raise AssertionError(f"mu = {problem.model.friction.mu:g}, {steps[-1].target}: {steps[-1].outcome}")
+    return steps
+
+
+def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[StepResult]:
+    """Return the increments of a press under another friction, and in that many increments a leg."""
+    law = Coulomb(friction) if isinstance(friction, int | float) else friction
+    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
+    return converged(changed(problem, friction=law, legs=legs))
+
+
+@contextmanager
+def empty_mesh_cache() -> Iterator[None]:
+    """Keep meshes in a folder of their own for a while, so that each is made anew once."""
+    before = os.environ.get("FINGER3D_CACHE")
+    with TemporaryDirectory(prefix="finger3d_meshes_") as folder:
+        os.environ["FINGER3D_CACHE"] = folder
+        try:
+            yield
+        finally:
+            del os.environ["FINGER3D_CACHE"]
+            if before is not None:
+                os.environ["FINGER3D_CACHE"] = before

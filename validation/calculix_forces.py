@@ -1,0 +1,402 @@
+"""Do the forces of presses agree with those of CalculiX, an independent code, on the same meshes?
+
+Source: CalculiX 2.20 (Debian: calculix-ccx; validation/REFERENCES.md, 6.5).  First decks that are exported, then
+presses at large deformation with all free faces in contact, then the finger of Fig. 9 as half a section.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import finger3d
+from finger3d.analyses.calculix.deck import Contact
+from finger3d.analyses.calculix.press import press_deck
+from finger3d.contact.friction import Coulomb
+from finger3d.effects.large_deformation import Effect
+from finger3d.fem.laws.material import Isotropic
+from finger3d.geometry.design import Design
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.results.history import measure
+from finger3d.scene import Scene
+
+from ._ccx import printed_forces, program, solve
+from ._ccx import run as run_calculix
+from ._press import converged, fig9_finger
+from ._rows import Result, Row, at_least, together
+
+TOLERANCE, REASON_DECKS = (
+    0.01,
+    "wanted of the deck: 1 %; penalty and multipliers, facets and surface: 0.8 % or less measured",
+)
+LIMIT_S_DECKS = 1200.0
+
+BLOCK = """
+[finger]
+geometry = "block"
+half_length_mm = 10.0
+height_mm = 8.0
+width_mm = 8.0
+"""
+FINGERTIP = """
+[finger]
+geometry = "fingertip"
+radius_mm = 12.0
+half_length_mm = 8.0
+edge_height_mm = 4.0
+width_mm = 8.0
+skin_mm = 1.5
+core_half_length_mm = 3.0
+core_height_mm = 2.0
+[parts.skin]
+E_MPa = 0.5
+nu = 0.4
+[parts.core]
+E_MPa = 20.0
+nu = 0.3
+"""
+REST = """
+[material]
+E_MPa = 1.0
+nu = 0.45
+[friction]
+mu = 0.25
+[mesh]
+mesher = "swept"
+size_mm = 1.5
+base_size_mm = 2.0
+"""
+SECTION = ('model.domain="plane-strain"', "mesh.size_mm=0.4", "mesh.base_size_mm=1.0")
+CYLINDER = 'object={shape="cylinder",radius_mm=10.0}'
+BALL = 'object={shape="sphere",radius_mm=10.0}'
+SLIDE = (
+    "press={leg=[{depth_mm=1.0,steps=4},{depth_mm=1.0,slide_x_mm=0.5,steps=5},{depth_mm=0.5,slide_x_mm=0.5,steps=3}]}"
+)
+PRESS = "press={depth_mm=1.0,steps=5}"
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A press: its name, the finger, keys, and the force (N) along -y that CalculiX 2.20 gave."""
+
+    name: str
+    keys: tuple[str, ...]
+    kept_N: float
+    finger: str = BLOCK
+
+    def scene(self) -> Scene:
+        """The scene."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "scene.toml")
+            path.write_text(self.finger + REST + "[press]\ndepth_mm = 1.0\n", encoding="utf-8")
+            return finger3d.load(path, self.keys)
+
+
+CASES = (
+    Deck("plane strain, cylinder, pressed, slid and half released", (*SECTION, CYLINDER, SLIDE), 4.450849),
+    Deck(
+        "plane strain, rounded wedge",
+        (*SECTION, PRESS, 'object={shape="wedge",angle_deg=20.0,tip_radius_mm=1.0}'),
+        6.737336,
+    ),
+    Deck("plane strain, wave", (*SECTION, PRESS, 'object={shape="wave",wavelength_mm=6.0,amplitude_mm=0.5}'), 20.8933),
+    Deck("plane strain, tilted plane", (*SECTION, PRESS, 'object={shape="plane",tilt_deg=3.0}'), 17.88315),
+    Deck("plane stress, cylinder", ('model.domain="plane-stress"', *SECTION[1:], CYLINDER, PRESS), 8.039136),
+    Deck(
+        "plane strain, cylinder, Mooney-Rivlin",
+        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="mooney-rivlin",c01_share=0.3}'),
+        13.058834,
+    ),
+    Deck(
+        "plane strain, cylinder, Yeoh",
+        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="yeoh",c2_over_c1=0.2,c3_over_c1=0.1}'),
+        13.151518,
+    ),
+    Deck(
+        "plane strain, cylinder, Ogden",
+        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="ogden",terms=[[0.7,2.0],[0.3,-3.0]]}'),
+        13.111784,
+    ),
+    Deck("solid, cylinder", (CYLINDER, PRESS), 8.812384),
+    Deck(
+        "solid, ball, neo-Hookean",
+        (
+            PRESS,
+            'object={shape="sphere",radius_mm=10.0}',
+            "effects.large_deformation={}",
+            "mesh.size_mm=1.0",
+            "mesh.base_size_mm=3.0",
+        ),
+        6.556044,
+    ),
+    Deck(
+        "solid with a skin and a core, plane, neo-Hookean",
+        (PRESS, "effects.large_deformation={}"),
+        12.693952,
+        FINGERTIP,
+    ),
+)
+
+
+def _decks(quick: bool) -> Result:
+    """Does CalculiX find the forces of a press in the deck that `finger3d export --solver calculix` writes of it?
+
+    Sections and solids on a cylinder, a ball, a rounded wedge, a wave and a plane are pressed, slid and released,
+    in small strain and at large deformation with every law, with one material and with two. The deck has the mesh,
+    the materials, the object and the path of the scene; the contact is CalculiX's surface to surface penalty,
+    finger3d's multipliers. CalculiX (calculix-ccx 2.20) runs only where it is installed; otherwise, and in the
+    quick version, the forces are compared with those that it gave for this study; the quick version has the first
+    three.
+
+    Every case by this code, and by CalculiX where it is installed; quick: against the numbers kept.
+    """
+    runs = not quick and program() is not None
+    if not quick and not runs:
+        print(
+            "calculix_forces: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
+        )
+    source = f"CalculiX, deck of the scene, {'_decks for this' if runs else '2.20, number kept'}"
+    rows: list[Row] = []
+    table: dict[str, list[Any]] = {"case": [], "calculix_N": [], "finger3d_N": []}
+    for case in CASES[:3] if quick else CASES:
+        scene = case.scene()
+        ours = finger3d.press(scene.with_effects(scene.fixed_effects), error=False).last.normal_force_N
+        theirs = calculix(scene) if runs else case.kept_N
+        for key, value in zip(table, (case.name, theirs, ours), strict=True):
+            table[key].append(value)
+        rows.append(Row(f"force (N): {case.name}", source, theirs, ours, TOLERANCE, REASON_DECKS, "validation"))
+    return Result(tuple(rows), table, lambda figure: _draw_decks(figure, table))
+
+
+def calculix(scene: Scene) -> float:
+    """Force (N) along -y on the whole finger at the end, by CalculiX."""
+    made = press_deck(scene.model(), scene.title)
+    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
+        path = Path(folder, "press.inp")
+        path.write_text(made.deck.text(), encoding="ascii")
+        solve(path, LIMIT_S_DECKS)
+        return -made.multiple * float(printed_forces(path.with_suffix(".dat"))[1][-1, 1])
+
+
+def _draw_decks(figure: Any, table: dict[str, list[Any]]) -> None:
+    """Differences of the forces."""
+    axes = figure.subplots()
+    off = [100.0 * (o / t - 1.0) for o, t in zip(table["finger3d_N"], table["calculix_N"], strict=True)]
+    axes.axvspan(-100.0 * TOLERANCE, 100.0 * TOLERANCE, color="0.92", label="tolerance: 1 %")
+    axes.axvline(0.0, color="k", lw=0.6)
+    axes.plot(off, range(len(off)), "o")
+    axes.set_yticks(range(len(off)), table["case"], fontsize=8)
+    axes.invert_yaxis()
+    axes.set(xlabel="force, finger3d over CalculiX - 1, %", xlim=(-1.5, 1.5))
+
+
+LABELS = {2: ("contact", "walls"), 3: ("contact", "walls", "ends")}
+PENALTY_FACES, STICK_FACES = 100.0, 40.0
+NU_FACES, MU_FACES = (0.3, 0.4, 0.45), (0.0, 0.25, 1.0)
+REASON_FACES = "two formulations of contact, penalty and multipliers; 1.1 % or less measured"
+LIMIT_S_FACES = 900.0
+
+
+@dataclass(frozen=True)
+class Press:
+    """A press: body, domain, constants, depth and edge lengths (mm), and the force (N) that CalculiX 2.20 gave."""
+
+    name: str
+    body: Design
+    domain: Domain
+    nu: float
+    mu: float
+    depth: float
+    size: float
+    kept: float
+    is_timed: bool = False
+
+    @property
+    def what(self) -> str:
+        """The case in words."""
+        return f"{self.name}, {self.domain}, nu = {self.nu:g}, mu = {self.mu:g}, {self.depth:g} mm"
+
+    def model(self) -> Model:
+        """The model of this program."""
+        mesh, legs = MeshOptions(self.size, 2.0 * self.size, "swept"), (Leg(self.depth, steps=10),)
+        material, friction = Isotropic(1.0, self.nu), Coulomb(self.mu)
+        return Effect().apply(Model(self.body, material, mesh, legs, friction=friction, domain=self.domain))
+
+
+_BLOCK_N = (4.482234, 4.517796, 4.517418, 5.385558, 5.63335, 5.629454, 6.166706, 6.734432, 6.76554)
+_CYLINDER_N = (6.245192, 6.48522, 6.52479, 8.715404, 8.715928, 8.702082, 11.742226, 11.934856, 12.092736)
+
+
+def cases(quick: bool) -> list[Press]:
+    """Sections, then solids; the last is timed."""
+    block, cylinder, short = [], [], []
+    finger = fig9_finger()
+    found = [
+        Press(name, body, "plane-strain", nu, mu, depth, 0.7, force)
+        for name, body, depth, forces in (
+            ("block", block, 2.5, _BLOCK_N),
+            ("half cylinder", cylinder, 3.5, _CYLINDER_N),
+        )
+        for (nu, mu), force in zip(product(NU_FACES, MU_FACES), forces, strict=True)
+    ]
+    if quick:
+        return [found[4]]
+    solid = ((0.3, 0.25, 28.318264), (0.45, 0.25, 31.8341), (0.4, 1.0, 30.612928), (0.4, 0.0, 29.016908))
+    found += [Press("block", short, "solid", nu, mu, 2.5, 1.4, force) for nu, mu, force in solid]
+    return [*found, Press("Fig. 9 finger", finger, "solid", 0.45, 0.25, 10.0, 4.0, 356.31476, is_timed=True)]
+
+
+def _faces(quick: bool) -> Result:
+    """Do presses at large deformation with all free faces in contact agree with CalculiX, and how much faster are
+    they?
+
+    Blocks, a half cylinder and the Fig. 9 finger are pressed by a flat plate, in plane strain and as solids, for
+    three nu and three mu. Walls and ends belong to the contact in both programs, and roll onto the plate where they
+    do. Both use the same quadratic mesh and the law W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2. CalculiX
+    (calculix-ccx 2.20) has a surface-to-surface penalty, 100 MPa/mm and 40 MPa/mm of friction, finger3d multipliers
+    at the vertices. The time is that of meshing and pressing here, and that of the whole program there, on one
+    thread of the same machine. Where CalculiX is not installed, and in the quick version, the forces are compared
+    with those that it gave for this study.
+
+    Every case by both programs.
+    """
+    rows: list[Row] = []
+    table: dict[str, list[Any]] = {
+        key: []
+        for key in "name domain nu mu depth_mm dofs calculix_N finger3d_N points_on_walls calculix_s ours_s".split()
+    }
+    for case in cases(quick):
+        rows += _compared(case, quick, table)
+    return Result(tuple(rows), table, lambda figure: _draw_faces(figure, table))
+
+
+def _compared(case: Press, quick: bool, table: dict[str, list[Any]]) -> Iterator[Row]:
+    begin = time.perf_counter()
+    problem = build(case.model())
+    *_, end = march(problem)
+    ours_s = time.perf_counter() - begin
+    if not end.outcome.ok:
+        raise AssertionError(f"{case.what}: {end.outcome}")
+    force = measure(problem.points, end)["normal_force_N"]
+    theirs, source = None, "CalculiX 2.20, same mesh and law, number kept"
+    if not quick and program():
+        contact = Contact(PENALTY_FACES, STICK_FACES, case.mu, LABELS[problem.mesh.dim])
+        theirs = run_calculix(case.model(), contact, LIMIT_S_FACES)
+        source = "CalculiX, same mesh and law, run for this"
+    wanted = case.kept if theirs is None else theirs.force
+    on_walls = np.count_nonzero(end.state.force[problem.points.face > 0, 0] > 0.0)
+    values = (
+        case.name, case.domain, case.nu, case.mu, case.depth, problem.mesh.points.size, wanted, force, on_walls,
+        theirs.wall if theirs else np.nan, ours_s,
+    )  # fmt: skip
+    for key, value in zip(table, values, strict=True):
+        table[key].append(value)
+    yield Row(f"force, {case.what}, N", source, wanted, force, 0.012, REASON_FACES, "validation")
+    if case.is_timed and theirs:
+        what = f"time of CalculiX over finger3d's, {case.what}, {problem.mesh.points.size} displacements"
+        yield at_least(what, "goal of this project", 30.0, theirs.wall / ours_s, kind="statement")
+
+
+def _draw_faces(figure: Any, table: dict[str, list[Any]]) -> None:
+    left, right = figure.subplots(1, 2)
+    error = 100.0 * (np.array(table["finger3d_N"]) / np.array(table["calculix_N"]) - 1.0)
+    bodies = [f"{name}, {domain}" for name, domain in zip(table["name"], table["domain"], strict=True)]
+    for k, body in enumerate(dict.fromkeys(bodies)):
+        own = np.array([b == body for b in bodies])
+        for axes, key in ((left, "nu"), (right, "mu")):
+            axes.plot(np.array(table[key])[own], error[own], f"C{k}o", mfc="none", label=body)
+    for axes, key in ((left, "nu"), (right, "mu")):
+        axes.axhspan(-1.0, 1.0, color="0.92", label="1 %")
+        axes.axhline(0.0, color="k", lw=0.6)
+        axes.set(xlabel=key, ylabel="force of finger3d over CalculiX's - 1, %", ylim=(-2.0, 2.0))
+
+
+WIDTH = 20.0
+DEPTHS = (5.0, 10.0)
+SIZES = (4.0, 2.0)
+KEPT = {
+    4.0: (8.81694, 28.5524),
+    2.0: (8.80263, 28.4931),
+}  # N per mm at DEPTHS by mesh, CalculiX 2.20: this study in full
+REASON_SECTION = "two contact formulations, penalty and multipliers; 0.3 % or less measured"
+PENALTY_SECTION = 100.0  # MPa/mm: under 1 MPa the surfaces overlap by 0.01 mm, 1e-3 of the depth
+STICK_SECTION = 10.0  # MPa/mm: friction of 0.1 MPa takes 0.01 mm; ten times as stiff, CalculiX does not settle
+_SECONDS = 900.0  # a busy machine: 100 s on a quiet one
+
+
+def problem(size: float) -> Problem:
+    """The finger as half a section."""
+    mesh, legs = MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),)
+    model = Model(fig9_finger(), Isotropic(1.0, 0.45), mesh, legs, friction=Coulomb(0.25), domain="plane-strain")
+    return build(Effect().apply(model))
+
+
+def pressed(body: Problem) -> np.ndarray:
+    """Depth (mm) and force (N per mm width) (10, 2) of this code."""
+    frames = converged(body)
+    return np.array([(f.target.depth_mm, measure(body.points, f)["normal_force_N"] / WIDTH) for f in frames])
+
+
+def _section(quick: bool) -> Result:
+    """Does a press at large deformation agree with CalculiX, an independent code?
+
+    The Fig. 9 finger in plane strain, nu = 0.45, mu = 0.25, is pressed 10 mm by a flat plate. Both codes use the
+    same mesh of quadratic triangles and the same law, W = G/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2 (*HYPERELASTIC, NEO
+    HOOKE with D1 = 2/K; *STATIC with NLGEOM), and each its own contact: CalculiX a face-to-face penalty with
+    friction (100 and 10 MPa/mm), finger3d multipliers at the vertices. CalculiX runs only where it is installed
+    (Debian: calculix-ccx). Otherwise, and in the quick version, the force is compared with the one that CalculiX
+    2.20 gave for this study (validation/REFERENCES.md, 6.5), and the rows say so.
+
+    Meshes of 4 and 2 mm; quick: of 4 mm, against the number kept.
+    """
+    rows: list[Row] = []
+    table: dict[str, list[Any]] = {"size_mm": [], "depth_mm": [], "calculix": [], "finger3d": []}
+    curves = {}
+    for size in SIZES[:1] if quick else SIZES:
+        body = problem(size)
+        curves[size] = pressed(body)
+        other, source = np.array(KEPT[size]), "CalculiX 2.20, same mesh and law, numbers kept"
+        if not quick and program():
+            legs = tuple(Leg(depth, steps=4) for depth in DEPTHS)
+            answer = run_calculix(
+                replace(body.model, legs=legs), Contact(PENALTY_SECTION, STICK_SECTION, 0.25), _SECONDS
+            )
+            other = answer.forces[:, 1] / WIDTH
+            source = "CalculiX, same mesh and law, run for this"
+        for depth, theirs in zip(DEPTHS, other, strict=True):
+            ours = float(np.interp(depth, *curves[size].T))
+            for key, value in zip(table, (size, depth, float(theirs), ours), strict=True):
+                table[key].append(value)
+            what = f"force at {depth:g} mm, mesh of {size:g} mm, N per mm"
+            rows.append(Row(what, source, float(theirs), ours, 0.02, REASON_SECTION, "validation"))
+    return Result(tuple(rows), table, lambda figure: _draw_section(figure, curves, table))
+
+
+def _draw_section(figure: Any, curves: dict[float, np.ndarray], table: dict[str, list[Any]]) -> None:
+    left, right = figure.subplots(1, 2)
+    size, depth, theirs, ours = (np.array(table[key]) for key in table)
+    for k, (h, curve) in enumerate(curves.items()):
+        here = size == h
+        left.plot(*curve.T, f"C{k}-", label=f"finger3d, mesh of {h:g} mm")
+        left.plot(depth[here], theirs[here], f"C{k}o", mfc="none", label=f"CalculiX, mesh of {h:g} mm")
+        right.plot(depth[here], 100.0 * (ours[here] / theirs[here] - 1.0), f"C{k}o-", label=f"mesh of {h:g} mm")
+    left.set(xlabel="depth, mm", ylabel="force, N per mm width")
+    right.set(xlabel="depth, mm", ylabel="finger3d over CalculiX - 1, %", ylim=(-2.5, 2.5))
+    right.axhspan(-2.0, 2.0, color="0.92", label="tolerance: 2 %")
+    right.axhline(0.0, color="k", lw=0.6)
+
+
+def run(quick: bool) -> Result:
+    """Exported decks, all faces in contact, and half a section."""
+    return together((10.0, 13.5), decks=_decks(quick), faces=_faces(quick), section=_section(quick))

@@ -1,0 +1,187 @@
+"""How do shear and gauge strain in the Fig. 9 finger change with friction, and at which angle most linearly?
+
+Source: Maeno 2004, Figs. 11 and 12 and Sec. III-B: R = 100 mm, H = 36.6 mm, plane strain, pressed 10 mm.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from finger3d.mechanics.model import Gauge
+
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, half_cylinder, line, line_r5, said, strains
+from ._press import fig9_finger, under
+from ._rows import Result, Row, columns, together
+
+NUS = (0.3, 0.45, 0.49)
+
+
+def _shear(quick: bool) -> Result:
+    """Does the shear strain in the Fig. 9 finger change with friction more than in the half cylinder, also at large
+    mu?
+
+    Source: Maeno 2004, Fig. 11 and Sec. III-B: 10 mm, plane strain: "when compared to Fig. 7, Fig. 11 reveals
+    larger change in shear strain"; "in particular, shear strain changes even when the friction coefficient is large
+    at the node x = 36 mm"; "the area near the edge of contact slips easily because both sides of the finger have
+    been removed". Fig. 7 is plane stress and Fig. 11 plane strain, so the two geometries are also compared in one
+    plane state.
+
+    Both fingers in both plane states, under five coefficients, along their lines.
+    """
+    size, count = (3.0, 17) if quick else (0.5, 49)
+    x = np.linspace(-48.0, 48.0, count)
+    found, small, slip, lines = {}, {}, {}, []
+    for nu in NUS:
+        for plane in (STRAIN, STRESS):
+            problem = fig9(nu, plane, size, line(x, fig9_finger(1.0), BELOW_FIG9))
+            r5, gauges = line_r5(count=21)
+            other = half_cylinder(nu, plane, size / 10.0, gauges)
+            small[plane, nu] = np.array([strains(under(other, mu, 1)[-1], len(r5))[2] for mu in MUS])
+            frames = [under(problem, mu, 1)[-1] for mu in MUS]
+            found[plane, nu] = np.array([strains(f, count)[2] for f in frames])
+            slip[plane, nu] = [(p.a, p.c) for p in (Profile.of(problem, f) for f in frames)]
+            for mu, values in zip(MUS, found[plane, nu], strict=True):
+                lines += [(plane, nu, mu, float(a), float(b)) for a, b in zip(x, values, strict=True)]
+    rows = [row for nu in NUS for row in _statements(nu, x, found, small, slip)]
+    table = columns("plane nu mu x_mm gamma_xy", lines)
+    return Result(tuple(rows), table, lambda figure: _draw_shear(figure, x, found))
+
+
+def _statements(nu: float, x: np.ndarray, found: dict, small: dict, slip: dict) -> list[Row]:
+    change = {k: float(np.ptp(v, axis=0).max()) for k, v in found.items()}
+    before = {k: float(np.ptp(v, axis=0).max()) for k, v in small.items()}
+    values = found[STRAIN, nu][:, np.argmin(np.abs(x - 36.0))]
+    a, c = slip[STRAIN, nu][-1]
+    rows = [
+        said(
+            f"larger change of gamma_xy than in Fig. 7: ratio, {plane} against plane stress there, nu = {nu:g}",
+            "Fig. 11", 1.0, change[plane, nu] / before[STRESS, nu], "larger", 0.0, "at least",
+        )
+        for plane in (STRAIN, STRESS)
+    ]  # fmt: skip
+    return [
+        *rows,
+        said(
+            f"the geometry does it: ratio of the changes, both in plane strain, nu = {nu:g}", "Sec. III-B",
+            1.0, change[STRAIN, nu] / before[STRAIN, nu], "larger", 0.0, "at least",
+        ),
+        said(
+            f"gamma_xy at x = 36 changes at large mu: .5 to 1 over .06 to 1, plane strain, nu = {nu:g}", "Fig. 11",
+            0.1, abs(values[-1] - values[-2]) / np.ptp(values), "a tenth of the signal", 0.0, "at least",
+        ),
+        said(
+            f"the edge slips at large mu: slip zone at mu = 1 over a, plane strain, nu = {nu:g}", "Sec. III-B",
+            0.02, (a - c) / a, "one of 50 points", 0.0, "at least",
+        ),
+    ]  # fmt: skip
+
+
+def _draw_shear(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+    from matplotlib import colormaps
+
+    panels = figure.subplots(2, 3, sharex=True, sharey="row")
+    figure.suptitle(f"Shear strain {BELOW_FIG9:g} mm under the surface of the Fig. 9 finger at 10 mm")
+    for column, nu in enumerate(NUS):
+        for row, plane in enumerate((STRAIN, STRESS)):
+            axes = panels[row, column]
+            for i, mu in enumerate(MUS):
+                axes.plot(x, found[plane, nu][i], color=colormaps["plasma"](0.85 * i / 4), label=f"{mu:g}")
+            axes.axvline(36.0, color="#999999", ls=":", lw=1)
+            axes.axhline(0.0, color="#999999", lw=0.7)
+            axes.set_title(f"{plane}, nu = {nu:g}")
+            panels[row, 0].set_ylabel("gamma_xy")
+        panels[1, column].set_xlabel("x (mm); dotted: 36 mm")
+    panels[0, 0].legend(title="mu", frameon=False)
+
+
+ANGLES = (0, 15, 30, 45, 60, 75, 90)
+FINE = (0.06, 0.125, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+CASES = ((STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49), (STRESS, 0.49))
+DEPTHS = (1.5, BELOW_FIG9, 6.0)
+SURFACE = 43.287  # mm, height of the surface at x = 36
+
+
+def gauges() -> list[Gauge]:
+    """At x = 36 mm, three depths and seven angles."""
+    return [Gauge(f"{b}:{t}", 36.0, SURFACE - b, angle=math.radians(t)) for b in DEPTHS for t in ANGLES]
+
+
+def bend(mu: np.ndarray, strain: np.ndarray) -> float:
+    """Largest distance from the best straight line over the range of strain."""
+    return float(np.abs(strain - np.polyval(np.polyfit(mu, strain, 1), mu)).max() / np.ptp(strain))
+
+
+def _gauges(quick: bool) -> Result:
+    """Does the strain of a gauge at x = 36 mm fall as friction grows, and most linearly when the gauge is at 30
+    degrees?
+
+    Source: Maeno 2004, Figs. 12 and 14, Sec. III-B: plane strain, 10 mm: "the strain is large when the angle is
+    large; however, when the angle is 30 degrees, the change in strain is rather linear over the entire range"; "the
+    strain is small when the friction coefficient is large". The gauge's depth is not told: y = 40 mm (3.3 mm under
+    the surface) is taken, and 1.5 and 6 mm are in the table. Linear: the largest distance from the best straight
+    line over the range of strain.
+
+    Every angle and depth from one condensation for each nu.
+    """
+    mus = np.array(FINE[1::2] if quick else FINE)
+    found, lines = {}, []
+    for plane, nu in CASES:
+        problem = fig9(nu, plane, 3.0 if quick else 0.5, gauges())
+        frames = [under(problem, float(mu), 1)[-1] for mu in mus]
+        for below in DEPTHS:
+            for angle in ANGLES:
+                strain = np.array([f.gauges[f"{below}:{angle}"] for f in frames])
+                found[plane, nu, below, angle] = strain
+                lines += [(plane, nu, below, angle, float(m), float(s)) for m, s in zip(mus, strain, strict=True)]
+    rows: list[Row] = []
+    for case in CASES:
+        rows += statements(*case, mus, {t: found[(*case, BELOW_FIG9, t)] for t in ANGLES})
+    table = columns("plane nu below_mm angle_deg mu strain", lines)
+    return Result(tuple(rows), table, lambda figure: _draw_gauges(figure, mus, found))
+
+
+def statements(plane: str, nu: float, mus: np.ndarray, strain: dict[int, np.ndarray]) -> list[Row]:
+    """What Secs. III-B and IV say of the gauge, for strains (m,) by angle."""
+    here = f"{plane}, nu = {nu:g}"
+    change = {t: float(np.ptp(s)) for t, s in strain.items()}
+    bent = {t: bend(mus, s) for t, s in strain.items()}
+    steps = np.diff(strain[30])
+    return [
+        said(
+            f"strain at 30 degrees falls as mu grows: rising steps over all movement, {here}", "Fig. 14", 0.0,
+            steps[steps > 0.0].sum() / np.abs(steps).sum(), "round-off and increments", 0.05, "absolute",
+        ),
+        said(
+            f"strain grows with the angle to 60 degrees: change of strain at 60 over that at 30 degrees, {here}",
+            "Fig. 12", 1.0, change[60] / change[30], "larger", 0.0, "at least",
+        ),
+        said(
+            f"30 degrees is the most linear of 15, 30, 45, 60: its bend over the smallest of them, {here}", "Fig. 12",
+            1.0, bent[30] / min(bent[t] for t in (15, 30, 45, 60)), "within a tenth", 0.1, "at most",
+        ),
+        said(
+            f"the strain tells mu: change of strain at 30 degrees from .06 to 1 over its value, {here}", "Fig. 12", 0.1,
+            change[30] / np.abs(strain[30]).max(), "a signal of a tenth", 0.0, "at least",
+        ),
+    ]  # fmt: skip
+
+
+def _draw_gauges(figure: Any, mus: np.ndarray, found: dict[Any, np.ndarray]) -> None:
+    panels = figure.subplots(1, 4, sharey=True)
+    figure.suptitle("Gauge strain at x = 36 mm, 3.3 mm under the surface, depth 10 mm")
+    for axes, (plane, nu) in zip(panels, CASES, strict=True):
+        for i, angle in enumerate(ANGLES[:-1]):
+            wide = {"lw": 2.2} if angle == 30 else {"lw": 1.1}
+            axes.plot(mus, found[plane, nu, BELOW_FIG9, angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°", **wide)
+        axes.axhline(0.0, color="#999999", lw=0.7)
+        axes.set(xlabel="mu", title=f"{plane}, nu = {nu:g}")
+    panels[0].set_ylabel("normal strain along the gauge")
+    panels[0].legend(title="angle", frameon=False, ncols=2, loc="lower left")
+
+
+def run(quick: bool) -> Result:
+    """Shear along the line, then gauges at x = 36 mm."""
+    return together((13.0, 11.2), shear=_shear(quick), gauges=_gauges(quick))

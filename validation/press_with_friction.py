@@ -1,0 +1,409 @@
+"""Do a cylinder and a ball that are pressed with friction stick, slip and dissipate as Spence's solutions say?
+
+Source: validation/REFERENCES.md, 2.1 to 2.4.  The cylinder lies on a half-plane, the ball on a half-space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from finger3d.contact.friction import SLIP
+
+from . import _halfspace, _rings
+from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+from ._increments import PlainCoulomb
+from ._rows import Result, Row, at_least, exact_columns, together, zero
+
+C_OVER_A_LINE = {  # REFERENCES.md, 2.1, fully coupled; (nu, mu)
+    (0.0, 0.25): 0.09910, (0.0, 0.5): 0.52191, (0.0, 1.0): 0.88959,
+    (0.3, 0.125): 0.09243, (0.3, 0.25): 0.54321, (0.3, 0.5): 0.94102, (0.3, 1.0): 0.99789,
+}  # fmt: skip
+INTEGRALS_LINE = {
+    0.3: (1.04269, 0.09348, 4.18e-4),
+    0.0: (1.07903, 0.11847, 3.71e-3),
+}  # P/P_H, int q/P, D/(A P^2), mu = .25
+FULL_STICK_LINE = {0.0: 1.246419, 0.3: 1.065856}  # P/P_H(a), REFERENCES.md, 2.3
+STEPS = {1: (0.2205, 64.1e-4), 5: (0.5128, 11.2e-4), 10: (0.5282, 7.1e-4), 50: (0.5385, 4.6e-4), 200: (0.5436, 4.3e-4)}
+# q A R/a at x/a = 0 ... 1, nu = .3, mu = .25
+CURVE = np.array([0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0])
+SPENCE_LINE = "Spence 1968; REFERENCES.md, 2.1"
+STEPPED = "REFERENCES.md, 2.4"
+THREE_LINE = (
+    "first order in the point spacing, since c lies between two points; 0.6 % or less measured at 40 points to a"
+)
+ONE_LINE = "0.14 % or less measured at 40 points to a; coarser meshes must pass too"
+COLUMNS_LINE = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a"
+COLUMNS_LINE += " reported_D_over_AP2 plain"
+FEW = 5
+"""Increments of which a second-order error is left; twice as many give the stick zone to the point."""
+HEIGHTS = (100.0, 200.0)
+STUCK = 1e6
+
+
+def end_force_loss(profiles: list[Profile]) -> float:
+    """Sum of slip times the friction at the end of each increment (mJ), first order in the increment."""
+    lost, before = 0.0, 0.0
+    for state in (p.frame.state for p in profiles):
+        lost -= float(((state.accumulated_slip - before)[:, 0] * state.force[:, 1] * (state.status == SLIP)).sum())
+        before = state.accumulated_slip
+    return lost
+
+
+def numbers(profiles: list[Profile], nu: float) -> np.ndarray:
+    """P/P_H(a), int q/P, D/(A P^2) by end forces, c/a, D/(A P^2) as reported.
+
+    The first, second and fourth are means over the second half of a self-similar loading, D is at its end.
+    """
+    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
+    force = sum(p.force for p in half)
+    last = profiles[-1]
+    stuck = not (last.status == SLIP).any()
+    return np.array(
+        [
+            force / sum(hertz(nu, p.reach if stuck else p.a) for p in half),
+            sum(p.outward for p in half) / force,
+            end_force_loss(profiles) / (compliance(nu) * last.force**2),
+            np.mean([p.c / p.a for p in half]),
+            last.frame.dissipation_mJ / (compliance(nu) * last.force**2),
+        ]
+    )
+
+
+def _line(quick: bool) -> Result:
+    """Does a cylinder pressed on a half-plane with friction stick, slip and dissipate as Spence's solution says?
+
+    Source: the self-similar solution of Spence 1968 and 1975; Nowell, Hills and Sackfield 1988; Johnson 1985, sec.
+    5.4. Its values are in validation/REFERENCES.md, 2.1 to 2.4, and `_spence.py` recomputes most of them. While a
+    parabola is pressed, c/a, P/P_Hertz(a), int q/P and dissipation/(A P^2) are constants of (beta, mu).
+
+    The body is a block with a fixed base, of half length and height h. The base changes the strain at the surface
+    in proportion to a/h: the integrals are computed at a/h = 1/100 and 1/200 and extrapolated linearly to 0. Forces
+    are compared at equal a. Since the solution is self-similar, means over the second half of the increments are
+    used; they remove the scatter of a and c by one point.
+
+    The values for 1 to 200 increments are those of plain increments, in which a point that closes slips from where
+    it was at their start, and of friction at the end of each increment, as in the integral equations; so is the
+    column of the table. finger3d itself holds a point where it touches and takes the friction under the mean normal
+    force: its c/a and its dissipation are those of Spence in few increments, too.
+
+    Meshes of 10, 20, 40 points to a, 1 to 200 increments, the half-plane by extrapolation in a/h.
+    """
+    meshes = (10, 14, 20) if quick else (10, 20, 40)
+    finest, most = meshes[-1], 50 if quick else 200
+    counts = [n for n in STEPS if n <= most]
+    rows, table, curves = [], [], {}
+    for nu in (0.3,) if quick else (0.3, 0.0):
+        at, plain, c_last, c_own = {}, {}, {}, {}
+        for height, points in [(HEIGHTS[0], finest), *((HEIGHTS[1], n) for n in meshes)]:
+            problem = line(nu, points, loading(1), height)
+            if height == HEIGHTS[1] and not quick:
+                at[height, points, STUCK, 400] = numbers(under(problem, STUCK, loading(400, height)), nu)
+            for count in counts if points == finest else (most,):
+                profiles = under(problem, 0.25, loading(count, height))
+                at[height, points, 0.25, count] = numbers(profiles, nu)
+                c_own[height, count] = profiles[-1].c / profiles[-1].a
+                if points == finest:
+                    stepped = under(problem, PlainCoulomb(0.25), loading(count, height))
+                    plain[height, points, 0.25, count] = numbers(stepped, nu)
+                    c_last[height, count] = stepped[-1].c / stepped[-1].a
+            if height == HEIGHTS[1] and points == finest:
+                curves[nu] = profiles[-1]
+                for mu in [m for n, m in C_OVER_A_LINE if n == nu and m != 0.25 and not quick]:
+                    at[height, points, mu, most] = numbers(under(problem, mu, loading(most, height)), nu)
+        for kind, found in enumerate((at, plain)):
+            table += [(nu, k[2], k[0], k[1], k[3], *v, kind) for k, v in found.items()]
+        rows += _gates(nu, at, plain, finest, most)
+        rows += _few_rows(nu, at, c_own, finest, most)
+        if nu == 0.3:
+            rows += _step_rows(plain, c_last, finest, counts)
+            rows.append(_curve_row(curves[nu]))
+    columns = exact_columns(COLUMNS_LINE, table)
+    return Result(tuple(rows), columns, lambda figure: _draw_line(figure, curves[0.3], columns, finest, most))
+
+
+def _extrapolated(at: dict[Any, np.ndarray], finest: int, mu: float, count: int) -> np.ndarray:
+    near, far = (at[h, finest, mu, count] for h in HEIGHTS)
+    return 2.0 * far - near
+
+
+def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], finest: int, most: int) -> Iterator[Row]:
+    value = _extrapolated(at, finest, 0.25, most)
+    force, outward, lost = INTEGRALS_LINE[nu]
+    here = f"nu = {nu:g}, mu = .25"
+    yield Row(f"P/P_Hertz(a), {here}", SPENCE_LINE, force, value[0], 0.01, ONE_LINE)
+    yield Row(f"int_0^a q/P, {here}", SPENCE_LINE, outward, value[1], 0.03, THREE_LINE)
+    yield Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE_LINE, lost, value[4], 0.03, THREE_LINE)
+    if most == 200:  # fewer increments are not yet on the line ~ 1/N
+        few, many = (_extrapolated(plain, finest, 0.25, n)[2] for n in (50, most))
+        in_steps = many + (many - few) * 50 / (most - 50)
+        yield Row(
+            f"dissipation by end forces, {here}, plain increments, extrapolated in 1/N from 50 and 200",
+            SPENCE_LINE,
+            lost,
+            in_steps,
+            0.03,
+            THREE_LINE,
+        )
+    stuck = [at[HEIGHTS[1], n, STUCK, 400][0] for n in (finest // 4, finest // 2, finest) if most == 200]
+    if stuck:
+        what = f"P/P_Hertz(a), full stick, nu = {nu:g}"
+        closed = "Spence 1968, full stick; REFERENCES.md, 2.3"
+        yield Row(
+            f"{what}, extrapolated in the spacing",
+            closed,
+            FULL_STICK_LINE[nu],
+            2.0 * stuck[2] - stuck[1],
+            0.01,
+            ONE_LINE,
+        )
+    if stuck and nu == 0.0:
+        rate = float(np.log((stuck[0] - FULL_STICK_LINE[nu]) / (stuck[2] - FULL_STICK_LINE[nu])) / np.log(4.0))
+        why = "mean of two halvings; the increments leave an error of their own"
+        yield Row(f"rate of its error with the mesh, {what}", "order of a: 1", 1.0, rate, 0.1, why, measure="at least")
+    for (case_nu, mu), want in C_OVER_A_LINE.items():
+        key = (HEIGHTS[1], finest, mu, most)
+        if case_nu == nu and key in at:
+            yield Row(
+                f"c/a, nu = {nu:g}, mu = {mu:g}", SPENCE_LINE, want, at[key][3], 0.5 / finest,
+                f"half a point spacing, a/{finest}", measure="absolute",
+            )  # fmt: skip
+
+
+def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], finest: int, most: int) -> list[Row]:
+    """Rows of what few increments leave."""
+    here = f"nu = {nu:g}, mu = .25"
+    change = c_own[HEIGHTS[1], 2 * FEW] - c_own[HEIGHTS[1], most]
+    what = f"c/a at the end, {here}: change from {2 * FEW} to {most} increments"
+    why = f"half a point spacing, a/{finest}"
+    lost = {n: at[HEIGHTS[1], finest, 0.25, n][4] for n in (FEW, 2 * FEW, most)}
+    rate = float(np.log2((lost[FEW] - lost[most]) / (lost[2 * FEW] - lost[most])))
+    settles = f"rate at which the dissipation settles, {here}, {FEW} to {2 * FEW} increments"
+    return [
+        zero(what, "self-similar, whatever the increments", change, 0.5 / finest, why),
+        Row(settles, "second order", 2.0, rate, 0.5, "points close one by one", measure="at least"),
+    ]
+
+
+def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int, counts: list[int]) -> Iterator[Row]:
+    for count in counts:
+        want_c, want_d = STEPS[count]
+        got = _extrapolated(at, finest, 0.25, count)[2]
+        yield Row(
+            f"dissipation/(A P^2) by end forces, N = {count} plain increments", STEPPED, want_d, got, 0.03, THREE_LINE
+        )
+        yield Row(
+            f"c/a, N = {count} plain increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
+            "one point spacing, since this is no mean over increments", measure="absolute",
+        )  # fmt: skip
+    errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS_LINE[0.3][2] for n in (1, 10)]
+    yield at_least("rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
+                   "1/N; REFERENCES.md, 2.4", 1.0, float(np.log10(errors[0] / errors[1])))  # fmt: skip
+
+
+def _curve_row(profile: Profile) -> Row:
+    got = _normalised(profile, np.linspace(0.0, 1.0, 11))
+    worst = float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
+    return zero("q(x), largest deviation over its largest value, nu = .3, mu = .25", SPENCE_LINE, worst, 0.05,
+                "q has a kink at c, and c lies between two points")  # fmt: skip
+
+
+def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
+    """q A R / a at x = a `at`."""
+    return np.interp(at * profile.a, profile.x, profile.q) * compliance(0.3) * RADIUS / profile.a
+
+
+def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], finest: int, most: int) -> None:
+    left, middle, right = figure.subplots(1, 3)
+    figure.suptitle(_title(profile))
+    here = np.abs(profile.x) <= profile.a
+    left.plot(profile.x[here] / profile.a, profile.q[here] * compliance(0.3) * RADIUS / profile.a, label="finger3d")
+    left.plot(np.linspace(0, 1, 11), CURVE, "k--", label="integral equations")
+    left.set(xlabel="x/a", ylabel="outward friction q A R/a", xlim=(0, 1), ylim=(0, None))
+    left.legend()
+    t = {k: np.array(v) for k, v in columns.items()}
+    tall = (t["block_height_mm"] == HEIGHTS[1]) & (t["plain"] == 0)
+    for nu, marker in ((0.3, "o"), (0.0, "s")):
+        of = tall & (t["nu"] == nu)
+        if of.any():
+            stuck, slip = of & (t["mu"] == STUCK), of & (t["mu"] == 0.25) & (t["increments"] == most)
+            for which, name, key, want in (
+                (stuck, "P, full stick", "P_over_Hertz", FULL_STICK_LINE[nu]),
+                (slip, "P, mu = .25", "P_over_Hertz", INTEGRALS_LINE[nu][0]),
+                (slip, "int q, mu = .25", "q_over_P", INTEGRALS_LINE[nu][1]),
+            ):
+                error = 100 * np.abs(t[key][which] / want - 1)
+                middle.loglog(t["points_per_a"][which], error, marker + "-", label=f"{name}, nu = {nu:g}")
+    middle.loglog([10, 40], [2, 0.5], "k:", label="slope -1")
+    middle.set(xlabel="points per a", ylabel="error, %", title="a/h = 1/200")
+    middle.set_xticks([10, 20, 40], ["10", "20", "40"], minor=False)
+    middle.set_xticks([], minor=True)
+    middle.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
+    of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
+    for height in HEIGHTS:
+        which = of & (t["block_height_mm"] == height) & (t["plain"] == 1)
+        right.loglog(t["increments"][which], 1e4 * t["D_over_AP2"][which], "o-", label=f"plain, a/h = 1/{height:g}")
+    own = of & tall
+    name = f"finger3d, a/h = 1/{HEIGHTS[1]:g}"
+    right.loglog(t["increments"][own], 1e4 * t["reported_D_over_AP2"][own], "s-", label=name)
+    right.loglog(list(STEPS), [1e4 * d for _, d in STEPS.values()], "k+", ms=10, label="integral equations")
+    right.axhline(1e4 * INTEGRALS_LINE[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
+    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="nu = .3, mu = .25")
+    right.legend(fontsize=7)
+
+
+def _title(profile: Profile) -> str:
+    got = _normalised(profile, np.linspace(0.0, 1.0, 11))
+    return f"q of nu = .3, mu = .25: error {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} % of the largest q"
+
+
+SPENCE_SPHERE = "Spence 1975; REFERENCES.md, 2.2"
+C_OVER_A_SPHERE = {
+    (0.0, 0.125): 0.04180, (0.0, 0.25): 0.36896, (0.0, 0.5): 0.81265, (0.0, 1.0): 0.96827,
+    (0.3, 0.06): 0.02826, (0.3, 0.125): 0.34734, (0.3, 0.25): 0.82416, (0.3, 0.5): 0.98416, (0.3, 1.0): 0.99948,
+}  # fmt: skip
+INTEGRALS_SPHERE = {0.3: (1.01341, 0.18168, 1.8e-4), 0.0: (1.02718, 0.23809, 3.17e-3)}  # P/P_H(depth), T/P, D/(P depth)
+FULL_STICK_SPHERE = {0.0: 1.052891, 0.3: 1.016213}
+THREE_SPHERE = "first order in the spacing, since c lies between two points; 0.5 % or less measured at 10 points to a"
+ONE_SPHERE = "0.05 % or less measured; coarser meshes must pass too"
+LOST = "first order in the spacing, and the reference's last digit"
+COLUMNS_SPHERE = "body nu mu points_per_a increments P_over_Hertz T_over_P D_over_Pd c_over_a iterations"
+DEPTH = 1.0 / _halfspace.RADIUS  # a = 1
+
+
+def hertz_sphere(nu: float) -> float:
+    """Frictionless force at DEPTH, N (Johnson 1985, sec. 4.2)."""
+    return 4.0 / 3.0 / (1.0 - nu**2) * np.sqrt(_halfspace.RADIUS) * DEPTH**1.5
+
+
+def depths(count: int) -> list[float]:
+    """Equal increments of the depth, that is of a^2."""
+    return [DEPTH * k / count for k in range(1, count + 1)]
+
+
+def _sphere(quick: bool) -> Result:
+    """Does a ball pressed on a half-space with friction stick, slip and dissipate as the coupled solution says?
+
+    Source: the self-similar solution of Spence 1968 and 1975, Johnson 1985, sec. 5.4; its values are in
+    validation/REFERENCES.md, 2.2 and 2.3. While a paraboloid is pressed, c/a, P/P_Hertz(depth), T/P and
+    dissipation/(P depth) are constants of (nu, mu).
+
+    Two computations: the contact solution alone, on rings over the exact half-space (influence functions of Johnson
+    1985, ch. 3); and the whole chain in 3D, quadratic tetrahedra under a quarter of a block with contact points a/4
+    to a/10 apart. The block is 50 a high; its compliance is removed by dividing by the frictionless force on the
+    same mesh.
+
+    Rings a/80 wide under 200 increments; tets of a/4, a/7, a/10 under 40.
+    """
+    rings, many, meshes = (40, 50, (5,)) if quick else (80, 200, (4, 7, 10))
+    rows, table, found = [], [], {}
+    for nu in (0.3,) if quick else (0.3, 0.0):
+        body = _rings.rings(nu, round(1.1 * rings), round(1.1 * rings) / rings)
+        cases = [(0.25, 40), (0.25, 50), (0.25, many), (1e6, many)]
+        cases += [(mu, many) for n, mu in C_OVER_A_SPHERE if n == nu and mu != 0.25 and not (quick and mu > 0.2)]
+        for mu, count in dict.fromkeys(cases):
+            r = _rings.press(body, _halfspace.RADIUS, mu, depths(count))
+            found["rings", nu, mu, rings, count] = np.array(
+                [r.P / hertz_sphere(nu), r.T / r.P, r.D / (r.P * DEPTH), r.c / r.a, r.iterations]
+            )
+        for points in meshes:
+            ball = _halfspace.quarter(nu, points, 20.0 if quick else 50.0)
+            force = _halfspace.press(ball, 0.0, [(DEPTH, 0.0)])[-1].P
+            steps = _halfspace.press(ball, 0.25, [(d, 0.0) for d in depths(40)])
+            s = steps[-1]
+            found["tets", nu, 0.25, points, 40] = np.array(
+                [
+                    s.P / force,
+                    s.T / s.P,
+                    s.D / (s.P * DEPTH),
+                    np.sqrt(s.stick_area / s.area),
+                    max(t.iterations for t in steps),
+                ]
+            )
+        rows += [*_ring_rows(nu, found, rings, many), *_tet_rows(nu, found, rings, meshes)]
+    table = [(*k, *v) for k, v in found.items()]
+    return Result(tuple(rows), exact_columns(COLUMNS_SPHERE, table), lambda figure: _draw_sphere(figure, found, rings))
+
+
+def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -> Iterator[Row]:
+    force, sum_, lost = INTEGRALS_SPHERE[nu]
+    value = found["rings", nu, 0.25, rings, many]
+    here = f"rings, nu = {nu:g}, mu = .25"
+    yield Row(f"P/P_Hertz(depth), {here}", SPENCE_SPHERE, force, value[0], 0.01, ONE_SPHERE)
+    yield Row(f"T/P, {here}", SPENCE_SPHERE, sum_, value[1], 0.03, THREE_SPHERE)
+    yield Row(
+        f"P/P_Hertz(depth), full stick, rings, nu = {nu:g}", "Spence 1968, full stick; REFERENCES.md, 2.3",
+        FULL_STICK_SPHERE[nu], found["rings", nu, 1e6, rings, many][0], 0.01, ONE_SPHERE,
+    )  # fmt: skip
+    if many == 200:
+        in_steps = value[2] + (value[2] - found["rings", nu, 0.25, rings, 50][2]) * 50 / (200 - 50)
+        rounding = 0.5 * 10.0 ** np.floor(np.log10(lost) - (1 if nu else 2)) / lost
+        yield Row(
+            f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200",
+            SPENCE_SPHERE,
+            lost,
+            in_steps,
+            0.03 + rounding,
+            LOST,
+        )
+    for (case, mu), want in C_OVER_A_SPHERE.items():
+        key = ("rings", nu, mu, rings, many)
+        if case == nu and key in found:
+            what, near = f"c/a, rings, nu = {nu:g}, mu = {mu:g}", f"one ring, a/{rings}"
+            yield Row(what, SPENCE_SPHERE, want, found[key][3], 1.0 / rings, near, measure="absolute")
+
+
+def _tet_rows(nu: float, found: dict[Any, np.ndarray], rings: int, meshes: tuple[int, ...]) -> Iterator[Row]:
+    force, sum_, _ = INTEGRALS_SPHERE[nu]
+    value = found["tets", nu, 0.25, meshes[-1], 40]
+    here = f"3D, nu = {nu:g}, mu = .25, {meshes[-1]} points to a"
+    yield Row(f"P/P_frictionless(depth), {here}", SPENCE_SPHERE, force, value[0], 0.01, ONE_SPHERE)
+    yield Row(f"T/P, {here}", SPENCE_SPHERE, sum_, value[1], 0.03, THREE_SPHERE)
+    exact = found["rings", nu, 0.25, rings, 40][2]
+    if len(meshes) > 2:
+        first, last = (found["tets", nu, 0.25, n, 40][2] - exact for n in (meshes[0], meshes[-1]))
+        rate = np.log(first / last) / np.log(meshes[-1] / meshes[0])
+        yield Row(
+            f"rate at which the excess of D falls with the mesh, 3D, nu = {nu:g}",
+            "first order in the spacing, against rings", 1.0, float(rate), 0.3,
+            "few points lie along the edge of the stick zone", measure="at least",
+        )  # fmt: skip
+        yield Row(
+            f"c/a, {here}", SPENCE_SPHERE, C_OVER_A_SPHERE[nu, 0.25], value[3], 1.0 / meshes[-1],
+            f"one point spacing, a/{meshes[-1]}", measure="absolute",
+        )  # fmt: skip
+
+
+def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
+    left, middle, right = figure.subplots(1, 3)
+    for nu, colour in ((0.3, "C0"), (0.0, "C1")):
+        got = {k[2]: v for k, v in found.items() if k[0] == "rings" and k[1] == nu and k[2] < 10}
+        if not got:
+            continue
+        mus = sorted(got)
+        left.semilogx(
+            mus, [got[m][3] for m in mus], colour + "o", label=f"rings, nu = {nu:g}", mfc="none" if nu else None
+        )
+        wanted = {m: c for (n, m), c in C_OVER_A_SPHERE.items() if n == nu}
+        left.semilogx(list(wanted), list(wanted.values()), colour + "--", label="reference")
+        tets = {k[3]: v for k, v in found.items() if k[0] == "tets" and k[1] == nu}
+        points = list(tets)
+        for i, name, mark in ((0, "P", "o-"), (1, "T/P", "s-")):
+            error = [100 * abs(tets[n][i] / INTEGRALS_SPHERE[nu][i] - 1) for n in points]
+            middle.loglog(points, error, colour + mark, label=f"{name}, nu = {nu:g}", mfc="w" if i else None)
+        exact = found["rings", nu, 0.25, rings, 40][2]
+        right.loglog(points, [tets[n][2] for n in points], colour + "o-", label=f"3D, nu = {nu:g}")
+        right.axhline(exact, color=colour, ls="--", lw=1, label=f"rings a/{rings} wide")
+    left.set(xlabel="mu", ylabel="c/a", title="stick radius")
+    middle.set(xlabel="points per a", ylabel="error, %", title="3D, mu = .25")
+    right.set(xlabel="points per a", ylabel="D/(P depth), 40 increments", title="dissipation, mu = .25")
+    for axes in (middle, right):
+        axes.set_xticks(points, [str(n) for n in points])
+        axes.set_xticks([], minor=True)
+
+
+def run(quick: bool) -> Result:
+    """The cylinder, then the ball."""
+    return together((10.0, 9.0), line=_line(quick), sphere=_sphere(quick))
