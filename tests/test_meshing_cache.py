@@ -46,7 +46,7 @@ def test_a_warm_cache_needs_no_cad(real: tuple[Mesh, Any, list[str]]) -> None:
         "from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
         "from finger3d.meshing.generate import *;"
         "d = designs()['clipped_cylinder'](100.0, 50.0, 36.6, 20.0);"
-        "o = N(size_mm=5.0, base_size_mm=10.0, mesher='', grading=None);"
+        "o = N(size_mm=5.0, base_size_mm=10.0, mesher='ftetwild', grading=None);"
         f"assert mesh_solid(d, o, {ZONE}, {BOTH})[1].from_cache"
     )
     assert not loaded(program, "build123d", "OCP", "pytetwild", "trimesh", "scipy", "vtk")
