@@ -1,16 +1,75 @@
-"""Elements and assembly: exactness, rates and published values (validation/REFERENCES.md, 5)."""
+"""Tensors, stiffness and recovered fields: exactness, rates and published values (validation/REFERENCES.md, 5)."""
 
 from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
+from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import _CELLS_IN_CACHE, stiffness
-from finger3d.fem.laws.material import Elasticity
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.recovery.reactions import mean_traction_weights
+from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
+from finger3d.fem.tensors import bases_of, cofactor, determinant, rotated_delassus
+from finger3d.objects import vertical_frame
+from tests.contact_cases import random_compliance
 from tests.meshes import body_load, edge_load, error_norms, full, grid, mapped
+
+
+def test_they_are_those_of_linear_algebra_singular_tensors_included() -> None:
+    f = np.random.default_rng(0).normal(size=(5, 4, 3, 3))
+    assert np.allclose(determinant(f), np.linalg.det(f), rtol=1e-12)
+    j = np.linalg.det(f)[..., None, None]
+    assert np.allclose(cofactor(f), j * np.swapaxes(np.linalg.inv(f), -1, -2), rtol=1e-9)
+    # a projection on a plane has no inverse; its cofactor projects on the normal
+    assert np.array_equal(cofactor(np.diag([1.0, 1.0, 0.0])), np.diag([0.0, 0.0, 1.0]))
+
+
+def unit_vectors(dim: int) -> np.ndarray:
+    vectors = np.random.default_rng(1).normal(size=(50, dim))
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_bases_are_orthonormal_and_begin_with_the_normal(dim: int) -> None:
+    normal = np.vstack([unit_vectors(dim), np.eye(dim)[1], -np.eye(dim)[1]])
+    bases = bases_of(normal)
+    assert np.array_equal(bases[:, 0], normal)
+    assert np.allclose(bases @ np.swapaxes(bases, 1, 2), np.eye(dim), atol=1e-12)
+    assert np.allclose(bases[-1], vertical_frame(dim))
+    # a rotation of the upright frame, not a reflection
+    assert np.allclose(np.linalg.det(bases), np.linalg.det(vertical_frame(dim)))
+
+
+def test_a_basis_is_turned_about_the_axis_across_both_normals() -> None:
+    normal = unit_vectors(3)
+    rotation = np.swapaxes(vertical_frame(3).T @ bases_of(normal), 1, 2)
+    axis = np.cross([0.0, -1.0, 0.0], normal)
+    assert np.allclose(np.einsum("cij,cj->ci", rotation, axis), axis, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_turned_compliance_is_that_of_turned_vectors(dim: int) -> None:
+    rng = np.random.default_rng(0)
+    compliance = random_compliance(rng, 5, dim)
+    turn = np.linalg.qr(rng.normal(size=(5, dim, dim)))[0]
+    force = rng.normal(size=(5, dim))
+    plain = np.einsum("idjk,jk->id", compliance, np.einsum("cki,ck->ci", turn, force))
+    assert np.einsum("idjk,jk->id", rotated_delassus(compliance, turn), force) == pytest.approx(
+        np.einsum("cik,ck->ci", turn, plain), rel=1e-10
+    )
+    assert rotated_delassus(compliance, np.tile(np.eye(dim), (5, 1, 1))) is compliance
+    some = np.array([3, 0])
+    of_some = rotated_delassus(compliance, turn[some], some)
+    assert of_some == pytest.approx(rotated_delassus(compliance, turn)[np.ix_(some, range(dim), some, range(dim))])
+
 
 PI = np.pi
 
@@ -182,3 +241,100 @@ def test_linear_triangles_fail_cook_at_near_incompressibility() -> None:
 def test_compressibility_floor_moves_results_by_less_than_1e_6() -> None:
     values = [cook(8, Elasticity(250.0 / 3, lame, True), 100.0) for lame in (250 / 3 * 1e7, 250 / 3 * 1e10)]
     assert values[0] == pytest.approx(values[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_strain_of_a_quadratic_field_is_exact_inside_a_cell_and_a_mean_at_the_nodes(dim: int) -> None:
+    mesh, rng = quadratic(grid((2,) * dim, 0.2)), np.random.default_rng(0)
+    slope = rng.normal(size=(dim, dim))
+    strain = nodal_strain(mesh, mesh.points @ slope.T)
+    assert np.allclose(strain, 0.5 * (slope + slope.T), atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_linear_field_is_recovered_from_vertices_and_from_quadrature_points(dim: int) -> None:
+    mesh = quadratic(grid((2,) * dim, 0.2))
+    linear = mesh.points @ np.arange(1.0, dim + 1.0) + 0.5
+    assert np.allclose(nodal_pressure(mesh, linear[mesh.vertices]), linear)
+    bary, _ = quadrature(dim, 2)
+    at = np.einsum("qk,ek->eq", bary, linear[mesh.cells[:, : dim + 1]])
+    assert np.allclose(extrapolated(mesh, at.reshape(-1)), linear)
+
+
+@pytest.mark.parametrize("plane_strain", [True, False])
+def test_across_a_section_are_no_strain_or_no_stress(plane_strain: bool) -> None:
+    material, mesh = Isotropic(2.0, 0.3), quadratic(grid((1, 1)))
+    slope = np.array([[0.01, 0.002], [0.002, -0.003]])
+    law = material.elasticity(not plane_strain)
+    across = partial(material.across, plane_strain=plane_strain)
+    e, s = (field[0] for field in strain_and_stress(mesh, (mesh.points @ slope).ravel(), [law], 1.0, [across]))
+    np.testing.assert_allclose(e[:2, :2], slope, atol=1e-15)
+    assert (e if plane_strain else s)[2, 2] == pytest.approx(0.0, abs=1e-15)
+    # Hooke's law along z: E e_z = s_z - nu (s_x + s_y)
+    assert 2.0 * e[2, 2] == pytest.approx(s[2, 2] - 0.3 * (s[0, 0] + s[1, 1]), abs=1e-15)
+
+
+def test_the_pressure_of_the_mixed_form_is_added_to_the_normal_stresses() -> None:
+    mesh, law = quadratic(grid((1, 1, 1))), Isotropic(1.0, 0.49).elasticity()
+    pressures = np.arange(len(mesh.vertices))
+    unknowns = np.concatenate([np.zeros(mesh.points.size), pressures])
+    _, sigma = strain_and_stress(mesh, unknowns, [law], 0.25)
+    np.testing.assert_array_equal(sigma[mesh.vertices], 0.25 * pressures[:, None, None] * np.eye(3))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_forces_of_a_quadratic_traction_read_it(dim: int) -> None:
+    mesh = quadratic(grid((3,) * dim, 0.2))
+
+    def traction(at: np.ndarray) -> np.ndarray:
+        return (1.0 + at[:, :1] ** 2 - 0.5 * at[:, -1:] * (dim == 3)) * np.eye(dim)[1]
+
+    forces = edge_load(mesh, "y-", traction)[:, 1]
+    boxes = np.array([[[0.1, 0.15], [0.4, 0.3]], [[0.5, 0.55], [0.9, 0.8]]])[:, :, : dim - 1]
+    weights = mean_traction_weights(mesh, "y-", boxes)
+    total, extent = 0.0, 0.0
+    for (low, *_), (high, *_), below, above in zip(*boxes.transpose(1, 0, 2), (0.15, 0.55), (0.3, 0.8), strict=True):
+        of_x, z = high - low + (high**3 - low**3) / 3.0, above - below
+        of_z = 0.5 * (above**2 - below**2)
+        total += of_x if dim == 2 else of_x * z - 0.5 * of_z * (high - low)
+        extent += high - low if dim == 2 else (high - low) * z
+    # shape functions of the face hold it exactly
+    assert weights @ forces == pytest.approx(total / extent, rel=1e-10)
+
+
+def test_boxes_that_tile_a_face_share_every_force() -> None:
+    mesh = quadratic(grid((3, 3, 3), 0.2))
+    cuts = np.array([0.0, 0.23, 0.61, 1.0])
+    total = np.zeros(len(mesh.points))
+    for x0, x1 in itertools.pairwise(cuts):
+        for z0, z1 in itertools.pairwise(cuts):
+            box = np.array([[[x0, z0], [x1, z1]]])
+            total += (x1 - x0) * (z1 - z0) * mean_traction_weights(mesh, "y-", box)
+    assert total[np.unique(mesh.facets["y-"])] == pytest.approx(1.0, abs=1e-10)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_traction_that_jumps_between_parts_is_not_smeared(dim: int) -> None:
+    """Quadratic on the stiffer part and constant on the softer one: both sides are read exactly."""
+    mesh = quadratic(grid((4,) * dim, 0.2))
+    stiff = mesh.points[mesh.cells[:, : dim + 1]].mean(axis=1)[:, 0] > 0.5
+    mesh = replace(mesh, part=stiff.astype(np.int64), part_labels=("stiff",))
+    split = replace(mesh, facets=dict(mesh.facets))
+    facets = mesh.facets["y-"]
+    right = mesh.points[facets[:, :dim]].mean(axis=1)[:, 0] > 0.5
+    split.facets.update(left=facets[~right], right=facets[right])
+    forces = edge_load(split, "left", lambda at: np.full((len(at), 1), 0.3) * np.eye(dim)[1])[:, 1]
+    forces += edge_load(split, "right", lambda at: (2.0 + at[:, :1] ** 2) * np.eye(dim)[1])[:, 1]
+    left, beside = (
+        np.array([[[low] + [0.1] * (dim - 2), [high] + [0.8] * (dim - 2)]]) for low, high in ((0.2, 0.5), (0.5, 0.9))
+    )
+    exact = 2.0 + (0.9**3 - 0.5**3) / 3.0 / 0.4
+    for box, mean in ((left, 0.3), (beside, exact)):
+        jumping = mean_traction_weights(mesh, "y-", box, moduli=(1.0, 50.0)) @ forces
+        assert jumping == pytest.approx(mean, rel=1e-9)
+        assert abs(mean_traction_weights(mesh, "y-", box) @ forces / mean - 1.0) > 1e-3
+
+
+def test_a_box_beside_the_face_is_refused() -> None:
+    with pytest.raises(Finger3dError, match="40 % of it is not on the face y-"):
+        mean_traction_weights(quadratic(grid((2, 2))), "y-", np.array([[[0.7], [1.2]]]))

@@ -1,18 +1,30 @@
-"""The repository around the code: what is shipped, pinned, promised and held apart."""
+"""The project: metadata, platforms, imports, citations, types, errors."""
 
 from __future__ import annotations
 
 import ast
 import graphlib
 import json
+import math
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import numpy as np
 import pytest
+import scipy.sparse as sp
+
+import finger3d
+from finger3d import _machine
+from finger3d.contact.state import ContactState
+from finger3d.fem.assembly import Stiffness
+from finger3d.fem.solvers.condense import condense
+from tests.meshes import grid
 
 HEAVY = {
     "build123d",
@@ -239,3 +251,164 @@ def test_interfaces_stay_small(root: Path) -> None:
     assert 0 < len(members) <= 8
     assert mechanics.count("assert isinstance") <= 3
     assert effects.count("\n") <= 400
+
+
+POORER = """
+import os, signal, sys
+for name in ("resource", "fcntl", "pwd", "grp", "termios"):
+    sys.modules[name] = None
+for name in ("killpg", "sysconf", "sched_getaffinity", "getuid", "geteuid", "fork", "setsid", "getpgid"):
+    if hasattr(os, name):
+        delattr(os, name)
+for name in ("SIGHUP", "SIGKILL", "pthread_sigmask"):
+    if hasattr(signal, name):
+        delattr(signal, name)
+"""
+
+
+def test_every_module_is_imported_and_a_section_pressed_without_what_windows_lacks(paper_scene, tmp_path) -> None:
+    code = POORER + (
+        "import importlib, pkgutil, finger3d\n"
+        "for module in pkgutil.walk_packages(finger3d.__path__, 'finger3d.'):\n"
+        "    if not module.name.startswith(('finger3d.__main__', 'finger3d.app')):\n"
+        "        importlib.import_module(module.name)\n"
+        "from finger3d.cli import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    words = ["press", str(paper_scene), "--out", "o", "--set", "model.domain=plane-strain", "--set", "press.steps=2"]
+    words += ["--set", "mesh.size_mm=6", "--set", "mesh.base_size_mm=16"]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = (tmp_path / "o" / "summary.json").read_text()
+    assert '"peak_memory_MB": null' in summary
+    assert "unknown" in (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no getrusage")
+def test_peak_memory_is_in_bytes_on_macos_and_in_kib_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    import resource
+
+    class Usage:
+        ru_maxrss = 3 * 2**30
+
+    monkeypatch.setattr(resource, "getrusage", lambda who: Usage)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert _machine.peak_memory_MB() == 3072.0
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert _machine.peak_memory_MB() == 3072.0 * 1024
+    monkeypatch.setitem(sys.modules, "resource", None)
+    assert math.isnan(_machine.peak_memory_MB())
+
+
+PACKAGE = Path(finger3d.__file__).parent
+
+
+def module_name(path: Path) -> str:
+    parts = ("finger3d", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported(path: Path, modules: set[str]) -> set[str]:
+    """Modules of the package that a file imports anywhere; of a package, those files that names are taken from."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= (inner & modules) or {node.module}
+    return found & modules
+
+
+def graph() -> dict[str, set[str]]:
+    files = {module_name(path): path for path in PACKAGE.rglob("*.py")}
+    return {name: imported(path, set(files)) - {name} for name, path in files.items()}
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    arrows = graph()
+    assert arrows["finger3d.mechanics.discretise.build"]  # arrows are found
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as error:
+        raise AssertionError(" -> ".join(error.args[1])) from None
+
+
+ROOT = Path(__file__).resolve().parents[1]
+REFERENCES = ROOT / "validation" / "REFERENCES.md"
+# generated from the studies, whose sources are checked here
+GENERATED = ("validation/figures/",)
+PRIVATE = re.compile(r"\b(?:references|design|contract|geometry|house|models)\.md\b|\b[Ii]ssues? #?\d")
+CITED = re.compile(r"REFERENCES\.md, (\d+(?:\.\d+)?(?:(?:, | and | to )\d+(?:\.\d+)?)*)")
+
+
+def texts() -> dict[str, str]:
+    """Text of every file of the project, by its path."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    found = {}
+    for name in filter(None, listed):
+        path = ROOT / name
+        if path.is_file() and path != Path(__file__).resolve() and not name.startswith(GENERATED):
+            try:
+                found[name] = path.read_text(encoding="utf-8")
+            except UnicodeDecodeError:  # a picture, an STL file
+                continue
+    return found
+
+
+def test_no_file_cites_a_page_that_is_not_in_the_project() -> None:
+    assert not {name: match[0] for name, text in texts().items() if (match := PRIVATE.search(text))}
+
+
+def test_every_section_of_the_references_that_is_cited_exists() -> None:
+    sections = set(re.findall(r"^#{2,3} (\d+(?:\.\d+)?) ", REFERENCES.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    cited = {
+        (name, section)
+        for name, text in texts().items()
+        # a citation may be broken across the lines of a docstring or a comment
+        for group in CITED.findall(re.sub(r"\s*\n[ #]*", " ", text))
+        for section in re.findall(r"\d+(?:\.\d+)?", group)
+    }
+    assert len(cited) > 50
+    assert not {(name, section) for name, section in cited if section not in sections}
+
+
+def test_every_section_of_the_references_has_its_anchor_and_names_its_users() -> None:
+    text = REFERENCES.read_text(encoding="utf-8")
+    numbers = re.findall(r"^### (\d+\.\d+) ", text, flags=re.MULTILINE)
+    assert len(numbers) == len(set(numbers))
+    for section in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
+        number = section.split(" ")[0]
+        assert f'<a id="s{number}"></a>' in section
+        users = re.findall(r"Used\s+by:\s+([\w\s,./:*-]+?)\.(?:\s|$)", section)
+        assert users, number
+        for name in re.findall(r"[\w./]+", " ".join(users)):
+            if name != "and":
+                path = ROOT / name if name.startswith("tests/") else ROOT / "validation" / f"{name}.py"
+                assert path.is_file(), f"{number}: {name}"
+
+
+def test_arrays_and_arrays_in_mappings_are_read_only() -> None:
+    mesh = grid((2, 2))
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.points[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.facets["x-"][0] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        replace(mesh, points=mesh.points + 1.0).points[0] = 1.0
+
+
+def test_the_array_that_was_passed_stays_writable() -> None:
+    gap = np.ones(3)
+    state = ContactState.at_rest(gap, 2)
+    gap[0] = 2.0
+    assert state.gap[0] == 2.0
+
+
+def test_the_compliance_of_a_condensed_body_is_read_only() -> None:
+    rows = sp.csr_matrix(np.eye(1, 4, 3))
+    stiffness = Stiffness(sp.csr_matrix(np.diag([1.0, 1.0, 1.0, 2.0])), np.zeros(0, dtype=np.int64), 1.0)
+    condensed = condense(stiffness, np.arange(2), rows, "superlu")
+    assert condensed.compliance[0, 0] == 0.5
+    with pytest.raises(ValueError, match="read-only"):
+        condensed.compliance[0, 0] = 1.0
