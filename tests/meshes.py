@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +13,7 @@ from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import Element, quadrature
+from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import FACETS, Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.solvers import mumps, pardiso
 from finger3d.fem.surface.traces import local_rows, strain_row, surface
@@ -126,6 +128,11 @@ def interface(mesh: Mesh, first: int, second: int) -> np.ndarray:
     middle = mesh.cells[:, d + 1 :].ravel()[where]
     pairs = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (0, 2)]
     return np.hstack([chosen, *(middle[np.searchsorted(key, chosen[:, p] @ [n, 1])][:, None] for p in pairs)])
+
+
+def part_volume(mesh: Mesh, number: int) -> float:
+    """Volume (area in 2D) of the curved cells of a part."""
+    return curved_volume(replace(mesh, cells=mesh.cells[mesh.part == number], part=None, part_labels=()))
 
 
 def edge_lengths(mesh: Mesh, facets: str) -> tuple[Float, Float]:
