@@ -26,7 +26,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Sphere
-from tests.contact_cases import half_plane, random_compliance, random_problem, violation
+from tests.contact_cases import half_plane, problem_of, random_compliance, random_problem, violation
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -55,7 +55,7 @@ def test_the_projection_and_the_residual_know_the_same_solutions() -> None:
     compliance, gap = half_plane(21, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 21) ** 2
     free = np.column_stack([gap - 0.3, np.full(21, -0.01)])
     state = ContactState.at_rest(gap, 2)
-    found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state
+    found = solve_increment(problem_of(compliance, free, 0.3, state=state)).state
     moved = np.column_stack([found.gap, found.tangential_displacement])
     mu = np.full(21, 0.3)
     assert set(found.status) == {OPEN, STICK, SLIP}
@@ -181,13 +181,14 @@ def pressed(rule: RuleName, law: NormalLaw) -> np.ndarray:
 
 
 @pytest.mark.parametrize("rule", RULES)
-def test_a_layer_acts_in_series_with_the_body(rule: RuleName) -> None:
+@pytest.mark.parametrize(
+    ("law", "wanted"), [(Layer(0.5), [1.0 / (1.0 + 1.0), 1.0 / (1.0 + 0.25)]), (Signorini(), [1.0] * 2)]
+)
+def test_a_layer_acts_in_series_with_the_body_and_bare_surfaces_add_nothing(
+    law: NormalLaw, wanted: list[float], rule: RuleName
+) -> None:
     # springs in series: 1 mm over 1 mm/N of the body and k / A of the layer
-    np.testing.assert_allclose(pressed(rule, Layer(0.5)), [1.0 / (1.0 + 1.0), 1.0 / (1.0 + 0.25)], rtol=1e-12)
-
-
-def test_bare_surfaces_add_no_compliance() -> None:
-    np.testing.assert_allclose(pressed("projection", Signorini()), [1.0, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(pressed(rule, law), wanted, rtol=1e-12)
 
 
 def test_only_starting_all_stuck_depends_on_the_steps() -> None:
@@ -204,9 +205,7 @@ def test_only_starting_all_stuck_depends_on_the_steps() -> None:
 def test_every_rule_settles_a_normal_press(name: RuleName) -> None:
     gap = np.linspace(-1.0, 1.0, 21) ** 2
     free = np.column_stack([gap - 0.3, np.zeros(21)])
-    found = RULES[name](
-        ContactProblem.of(ContactState.at_rest(gap, 2), free, half_plane(21, 2, 0.0), ContactLaw(Coulomb(0.3)), 1.0)
-    )
+    found = RULES[name](problem_of(half_plane(21, 2, 0.0), free, 0.3, state=ContactState.at_rest(gap, 2)))
     assert found.outcome.ok
 
 
@@ -220,12 +219,12 @@ def test_where_it_settles_it_agrees_with_the_projection() -> None:
     a = b = ContactState.at_rest(gap, 2)
     for depth in np.linspace(0.05, 0.5, 10):
         free = np.column_stack([gap - depth, np.zeros(21)])
-        literal = maeno_active_set(ContactProblem.of(a, free, compliance, ContactLaw(Coulomb(0.25)), depth))
+        literal = maeno_active_set(problem_of(compliance, free, 0.25, depth, state=a))
         assert literal.outcome is Outcome.CONVERGED
         assert literal.method == "paper"
         a, b = (
             literal.state,
-            solve_increment(ContactProblem.of(b, free, compliance, ContactLaw(Coulomb(0.25)), depth)).state,
+            solve_increment(problem_of(compliance, free, 0.25, depth, state=b)).state,
         )
         assert np.array_equal(a.status, b.status)
         assert np.abs(a.force - b.force).max() < 1e-12
@@ -239,7 +238,7 @@ def test_a_cycle_is_reported_and_never_called_converged() -> None:
         state = ContactState.at_rest(np.zeros(6), 2)
         for _ in range(3):
             free = rng.normal(size=(6, 2))
-            found = maeno_active_set(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(0.8)), 1.0))
+            found = maeno_active_set(problem_of(compliance, free, 0.8, state=state))
             outcomes.add(found.outcome)
             if not found.outcome.ok:
                 assert found.residual > 1e-8

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from finger3d.contact.acceleration import accelerated_newton, assemble_in_place, chord_step, threads_for, warm_start
 from finger3d.contact.conditions import ContactProblem, augmentation_parameters, project_on_friction_cone, residual
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
+from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.lemke import directions, friction_start, lemke
 from finger3d.contact.newton import (
     ActiveSet,
@@ -30,7 +29,7 @@ from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
-from tests.contact_cases import half_plane, half_space, random_compliance, random_problem, violation
+from tests.contact_cases import half_plane, half_space, problem_of, random_compliance, random_problem, violation
 
 COEFFICIENTS = [0.0, 1e-6, 0.06, 0.25, 1.0, 5.0, 1e6]
 
@@ -44,7 +43,7 @@ def press(compliance: np.ndarray, gap: np.ndarray, path: list[tuple[float, ...]]
         free = np.zeros((len(gap), d))
         free[:, 0] = gap - target[0]
         free[:, 1:] = -np.asarray(target[1:])[: d - 1]
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
+        found = solve_increment(problem_of(compliance, free, mu, state=state))
         assert found.outcome is Outcome.CONVERGED, (mu, target, found.outcome.name)
         assert found.residual <= 1e-8
         assert violation(state, found.state, free, compliance, mu) <= 1e-8
@@ -71,7 +70,7 @@ def test_any_state_returned_as_converged_meets_every_condition(
     for _ in range(4):
         free = rng.normal(size=(points, dim))
         free[:, 0] += 0.3
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
+        found = solve_increment(problem_of(compliance, free, mu, state=state))
         if found.outcome.ok:
             assert violation(state, found.state, free, compliance, mu) <= 1e-8
             state = found.state
@@ -179,13 +178,10 @@ def test_a_failed_increment_leaves_the_state_and_a_repeat_gives_the_same() -> No
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
     broken = free.copy()
     broken[0, 0] = np.nan
-    failed = solve_increment(ContactProblem.of(first, broken, compliance, ContactLaw(Coulomb(0.3)), 1.0))
+    failed = solve_increment(problem_of(compliance, broken, 0.3, state=first))
     assert failed.outcome is Outcome.NOT_FINITE
     assert failed.state is first
-    a, b = (
-        solve_increment(ContactProblem.of(first, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state
-        for _ in range(2)
-    )
+    a, b = (solve_increment(problem_of(compliance, free, 0.3, state=first)).state for _ in range(2))
     assert np.array_equal(a.force, b.force)
 
 
@@ -195,14 +191,8 @@ def test_floating_body_and_nan_are_outcomes_not_numbers() -> None:
     free = np.column_stack([gap - 0.3, np.zeros((len(gap), 2))])
     bad = compliance.copy()
     bad[0, 1, 0, 1] = -1.0
-    assert (
-        solve_increment(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0)).outcome
-        is Outcome.INDEFINITE
-    )
-    assert (
-        solve_increment(ContactProblem.of(state, free, compliance * np.nan, ContactLaw(Coulomb(0.3)), 1.0)).outcome
-        is Outcome.NOT_FINITE
-    )
+    assert solve_increment(problem_of(bad, free, 0.3, state=state)).outcome is Outcome.INDEFINITE
+    assert solve_increment(problem_of(compliance * np.nan, free, 0.3, state=state)).outcome is Outcome.NOT_FINITE
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -213,14 +203,12 @@ def test_a_number_that_is_none_shows_wherever_it_is_between_points_that_touch(
     compliance, gap, path = states_3d()
     before = press(compliance, gap, path[:1], 0.3)[0]
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
-    touching = np.flatnonzero(
-        solve_increment(ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state.force[:, 0]
-    )
+    touching = np.flatnonzero(solve_increment(problem_of(compliance, free, 0.3, state=before)).state.force[:, 0])
     for i, j, a, b in ((0, -1, 0, 0), (1, 2, 1, 2), (-1, 0, 2, 0)):
         bad = compliance.copy()
         bad[touching[i], a, touching[j], b] = bad[touching[j], b, touching[i], a] = value
         for state in (ContactState.at_rest(gap, 3), before):
-            found = rule(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0))
+            found = rule(problem_of(bad, free, 0.3, state=state))
             assert found.outcome is Outcome.NOT_FINITE
             assert found.state is state
 
@@ -238,15 +226,8 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
 
 def test_no_touch_no_force() -> None:
     compliance, gap, _ = states_3d()
-    found = solve_increment(
-        ContactProblem.of(
-            ContactState.at_rest(gap, 3),
-            np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]),
-            compliance,
-            ContactLaw(Coulomb(0.3)),
-            1.0,
-        )
-    )
+    free = np.column_stack([gap + 1.0, np.zeros((len(gap), 2))])
+    found = solve_increment(problem_of(compliance, free, 0.3, state=ContactState.at_rest(gap, 3)))
     assert found.outcome.ok
     assert not found.state.force.any()
     assert (found.state.status == OPEN).all()
@@ -267,18 +248,13 @@ def parabola() -> tuple[np.ndarray, np.ndarray]:
     return half_plane(41, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 41) ** 2
 
 
-def problem_of(compliance: np.ndarray, free: np.ndarray, mu: float, scale: float = 1.0) -> ContactProblem:
-    at_rest = ContactState.at_rest(np.zeros(len(free)), free.shape[1])
-    return ContactProblem.of(at_rest, free, compliance, ContactLaw(Coulomb(mu)), scale)
-
-
 def pressed(method: Method, compliance: np.ndarray, gap: np.ndarray, mu: float) -> list[NewtonResult]:
     """Four increments: two of pressing, two with an oblique slide."""
     d = compliance.shape[1]
     state, out = ContactState.at_rest(gap, d), []
     for depth, x, z in ((0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.004, 0.002), (0.1, 0.008, 0.004)):
         free = np.stack([gap - depth, np.full(len(gap), -x), np.full(len(gap), -z)], axis=1)[:, :d]
-        problem = ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 0.1)
+        problem = problem_of(compliance, free, mu, 0.1, state=state)
         out.append(method(problem, state.force, 60, True))
         assert out[-1].solved
         state = next_state(state, out[-1].force, out[-1].relative_displacement, out[-1].status)
@@ -315,9 +291,7 @@ def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: flo
     rng = np.random.default_rng(3)
     compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
     start = warm_start(problem_of(compliance, free, 0.0), np.zeros((9, dim)))
-    wanted = solve_increment(
-        ContactProblem.of(ContactState.at_rest(np.zeros(9), dim), free, compliance, ContactLaw(Coulomb(0.0)), 1.0)
-    )
+    wanted = solve_increment(problem_of(compliance, free, 0.0))
     assert wanted.outcome.ok
     assert wanted.state.force[:, 0].max() > 0.0
     assert np.abs(start - wanted.state.force).max() < accuracy * wanted.state.force.max()
@@ -327,9 +301,7 @@ def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: flo
 def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kept: bool) -> None:
     compliance, gap = sphere()
     free = np.stack([gap - 0.1, np.full(len(gap), 0.02), np.zeros(len(gap))], axis=1)
-    wanted = solve_increment(
-        ContactProblem.of(ContactState.at_rest(gap, 3), free, compliance, ContactLaw(Coulomb(0.25)), 1.0)
-    ).state.force
+    wanted = solve_increment(problem_of(compliance, free, 0.25, state=ContactState.at_rest(gap, 3))).state.force
     expected = wanted.copy()
     expected[:, 1:] *= share
     start = warm_start(problem_of(compliance, free, 0.25), expected)
@@ -341,9 +313,7 @@ def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kep
 def test_the_warm_start_is_admissible_and_close() -> None:
     compliance, gap = sphere()
     free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
-    wanted = solve_increment(
-        ContactProblem.of(ContactState.at_rest(np.zeros(len(gap)), 3), free, compliance, ContactLaw(Coulomb(0.25)), 0.1)
-    )
+    wanted = solve_increment(problem_of(compliance, free, 0.25, 0.1))
     assert wanted.outcome.ok
     start = warm_start(problem_of(compliance, free, 0.25), np.zeros_like(free))
     assert np.linalg.norm(start - wanted.state.force) < 1e-3 * np.linalg.norm(wanted.state.force)

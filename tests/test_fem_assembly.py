@@ -96,18 +96,6 @@ def on_boundary(mesh: Mesh, labels: str | None = None) -> np.ndarray:
     return held
 
 
-@pytest.mark.parametrize("dim", [1, 2, 3])
-@pytest.mark.parametrize("degree", [1, 2, 3, 5, 6])
-def test_quadrature_integrates_monomials(dim: int, degree: int) -> None:
-    # int x^p over the unit simplex = p! / (p + dim)!
-    from math import factorial
-
-    bary, w = quadrature(dim, degree)
-    for power in range(degree + 1):
-        want = factorial(power) / factorial(power + dim)
-        assert np.sum(w * bary[:, 1] ** power) == pytest.approx(want, rel=1e-13)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("mixed", [False, True])
 def test_rigid_motions_cost_nothing_and_nothing_else_does(dim: int, mixed: bool) -> None:
@@ -191,12 +179,13 @@ def test_manufactured_solution_converges_at_the_rates_of_quadratic_elements(nu: 
     assert rate_h1 > 1.8
 
 
-def cook(n: int, elastic: Elasticity, force: float) -> float:
+def cook(n: int, elastic: Elasticity, force: float, order: int = 2) -> float:
     def shape(p: np.ndarray) -> np.ndarray:
         x, t = 48 * p[:, 0], p[:, 1]
         return np.stack([x, 44 * p[:, 0] + t * (44 - 28 * p[:, 0])], axis=1)
 
-    mesh = mapped(grid((n, n)), shape)
+    linear = grid((n, n))
+    mesh = mapped(linear, shape) if order == 2 else replace(linear, points=shape(linear.points))
     load = edge_load(mesh, "x+", lambda p: np.tile([0.0, force / 16.0], (len(p), 1)))
     held = on_boundary(mesh, "x-")
     u = solve(mesh, elastic, load, held, np.zeros_like(mesh.points))
@@ -224,18 +213,11 @@ def test_cook_membrane(elastic: Elasticity, force: float, want: float) -> None:
 
 
 def test_linear_triangles_fail_cook_at_near_incompressibility() -> None:
-    mesh_error = []
-    for nu, want in ((0.3, 8.778), (0.4999, 7.403)):
-        p = grid((24, 24))
-        x, t = 48 * p.points[:, 0], p.points[:, 1]
-        mesh = Mesh(np.stack([x, 44 * p.points[:, 0] + t * (44 - 28 * p.points[:, 0])], axis=1), p.cells, p.facets)
-        load = edge_load(mesh, "x+", lambda q: np.tile([0.0, 100.0 / 16.0], (len(q), 1)))
-        u = solve(
-            mesh, Elasticity.of(250.0, nu, mixed=False), load, on_boundary(mesh, "x-"), np.zeros_like(mesh.points)
-        )
-        at = np.argmin(np.linalg.norm(mesh.points - [48.0, 52.0], axis=1))
-        mesh_error.append(abs(u[at, 1] / want - 1))
-    assert mesh_error[0] < 0.1 < 0.25 < mesh_error[1]
+    good, locked = (
+        abs(cook(24, Elasticity.of(250.0, nu, mixed=False), 100.0, order=1) / want - 1)
+        for nu, want in ((0.3, 8.778), (0.4999, 7.403))
+    )
+    assert good < 0.1 < 0.25 < locked
 
 
 def test_compressibility_floor_moves_results_by_less_than_1e_6() -> None:
@@ -270,8 +252,7 @@ def test_across_a_section_are_no_strain_or_no_stress(plane_strain: bool) -> None
     e, s = (field[0] for field in strain_and_stress(mesh, (mesh.points @ slope).ravel(), [law], 1.0, [across]))
     np.testing.assert_allclose(e[:2, :2], slope, atol=1e-15)
     assert (e if plane_strain else s)[2, 2] == pytest.approx(0.0, abs=1e-15)
-    # Hooke's law along z: E e_z = s_z - nu (s_x + s_y)
-    assert 2.0 * e[2, 2] == pytest.approx(s[2, 2] - 0.3 * (s[0, 0] + s[1, 1]), abs=1e-15)
+    np.testing.assert_allclose(s, material.elasticity().stress(e[None])[0], rtol=1e-12, atol=1e-15)
 
 
 def test_the_pressure_of_the_mixed_form_is_added_to_the_normal_stresses() -> None:

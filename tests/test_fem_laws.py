@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from finger3d.contact.friction import Coulomb
-from finger3d.effects.viscosity import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.invariants import Derivatives, InvariantLaw
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.discretise.build import build
@@ -29,27 +27,6 @@ def test_uniaxial_stress_follows_hookes_law(nu: float) -> None:
     np.testing.assert_allclose(Isotropic(2.0, nu).elasticity().stress(strain)[0], np.diag([2e-3, 0.0, 0.0]), atol=1e-15)
 
 
-def test_plane_stress_leaves_no_stress_across_the_section() -> None:
-    material, strain = Isotropic(2.0, 0.3), np.array([[[1e-3, 2e-4], [2e-4, -5e-4]]])
-    stress = material.elasticity(plane_stress=True).stress(strain)
-    across, none = material.across(strain, stress, plane_strain=False)
-    whole = np.zeros((1, 3, 3))
-    whole[:, :2, :2], whole[:, 2, 2] = strain, across
-    assert none[0] == 0.0
-    full = material.elasticity().stress(whole)[0]
-    np.testing.assert_allclose(full[:2, :2], stress[0], rtol=1e-12)
-    assert abs(full[2, 2]) < 1e-15
-
-
-def test_stress_across_plane_strain_is_that_of_the_solid() -> None:
-    material, strain = Isotropic(2.0, 0.3), np.array([[[1e-3, 2e-4], [2e-4, -5e-4]]])
-    whole = np.zeros((1, 3, 3))
-    whole[:, :2, :2] = strain
-    none, across = material.across(strain, material.elasticity().stress(strain), plane_strain=True)
-    assert none[0] == 0.0
-    assert across[0] == pytest.approx(material.elasticity().stress(whole)[0, 2, 2])
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 def test_element_matrices_are_the_contraction_with_the_stress(dim: int) -> None:
     law, rng = Isotropic(2.0, 0.3).elasticity(), np.random.default_rng(0)
@@ -59,13 +36,6 @@ def test_element_matrices_are_the_contraction_with_the_stress(dim: int) -> None:
     strains = [0.5 * ((w.T @ gradients) + (w.T @ gradients).T) for w in (u, v)]
     energy = np.einsum("ij,ij->", law.stress(strains[0][None])[0], strains[1])
     assert np.einsum("ai,aibj,bj->", v, cell, u) == pytest.approx(energy)
-
-
-def test_a_nearly_incompressible_body_is_mixed_but_in_plane_stress() -> None:
-    material = Isotropic(1.0, 0.5)
-    assert material.is_nearly_incompressible
-    assert material.elasticity().mixed
-    assert not material.elasticity(plane_stress=True).mixed
 
 
 G = 0.7
@@ -268,8 +238,3 @@ def test_uniform_compression_relaxes_as_the_series_says() -> None:
         _, strain, sigma = formulation_of(held.model).fields(held, frame.meshed_state)
         assert sigma[:, 1, 1] == pytest.approx(-stress, rel=1e-9)
         assert strain[:, 1, 1] == pytest.approx(-min(t, 1.0) * 0.1, rel=1e-9)
-
-
-def test_settings_are_kept_as_the_model_compares_them() -> None:
-    assert Effect(((0.3, 0.5),)).apply(block()) == Effect(((0.3, 0.5),)).apply(block())
-    assert Relaxation(((0.3, 0.5),), True) != Relaxation(((0.3, 0.5),), False)

@@ -52,17 +52,14 @@ def test_mirrored_nodes_keep_a_reflected_cell_positive(element: Element) -> None
     assert (np.linalg.det(jacobian) > 0.0).all()
 
 
-@pytest.mark.parametrize("element", [TRI3, TET4, TRI6, TET10], ids=lambda e: e.name)
-def test_facets_have_the_order_of_the_cell(element: Element) -> None:
-    assert (element.facet.dim, element.facet.order) == (element.dim - 1, element.order)
-
-
 @pytest.mark.parametrize("dim", [1, 2, 3])
 @pytest.mark.parametrize("degree", [1, 2, 3, 5, 6])
 def test_quadrature_is_exact_to_its_degree(dim: int, degree: int) -> None:
     bary, w = quadrature(dim, degree)
-    # integral of a product of powers of barycentric coordinates: prod(a_i!) / (sum(a_i) + dim)!
-    assert w @ bary[:, 1] ** degree == pytest.approx(math.factorial(degree) / math.factorial(degree + dim), rel=1e-12)
+    # integral of a power of a barycentric coordinate over the unit simplex
+    for power in range(degree + 1):
+        wanted = math.factorial(power) / math.factorial(power + dim)
+        assert w @ bary[:, 1] ** power == pytest.approx(wanted, rel=1e-13)
 
 
 TRIANGLE = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]), {})

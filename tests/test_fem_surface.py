@@ -108,15 +108,24 @@ def contact(mesh: Mesh, face: BoundarySurface, u: np.ndarray, share: float | Non
     normal = np.array([0.2, -1.0, 0.1])[: mesh.dim]
     normal = normal / np.linalg.norm(normal)
     at = face.samples + face.interpolate @ u
-    return deformed_contact(
-        face,
-        points=mesh.points,
-        displacement=u,
-        gap=at @ normal + 1.2,
-        normal=np.broadcast_to(normal, at.shape),
-        axes=(),
-        object_share=None if share is None else np.full(len(face.nodes), share),
-    )
+    return touched(mesh, face, u, at @ normal + 1.2, np.broadcast_to(normal, at.shape), share)
+
+
+def under_ball(
+    mesh: Mesh, face: BoundarySurface, u: np.ndarray, radius: float, share: float | None = None
+) -> DeformedContact:
+    """With a ball, whose normals turn along the face."""
+    away = face.samples + face.interpolate @ u - np.array([0.4, 1.0 + radius, 0.6])[: mesh.dim]
+    distance = np.linalg.norm(away, axis=1)
+    return touched(mesh, face, u, distance - radius, away / distance[:, None], share)
+
+
+def touched(
+    mesh: Mesh, face: BoundarySurface, u: np.ndarray, gap: np.ndarray, normal: np.ndarray, share: float | None
+) -> DeformedContact:
+    object_share = None if share is None else np.full(len(face.nodes), share)
+    given = {"points": mesh.points, "displacement": u, "gap": gap, "normal": normal}
+    return deformed_contact(face, **given, axes=(), object_share=object_share)
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -162,23 +171,6 @@ def test_nodal_forces_are_those_of_the_transposed_rows(d: int) -> None:
     mesh, face, u = made(d)
     at, force = contact(mesh, face, u), np.random.default_rng(9).normal(size=(len(face.nodes), d))
     assert at.nodal_forces(force).ravel() == pytest.approx(at.rows.T @ force.ravel(), rel=1e-12, abs=1e-13)
-
-
-def under_ball(
-    mesh: Mesh, face: BoundarySurface, u: np.ndarray, radius: float, share: float | None = None
-) -> DeformedContact:
-    """With a ball, whose normals turn along the face."""
-    away = face.samples + face.interpolate @ u - np.array([0.4, 1.0 + radius, 0.6])[: mesh.dim]
-    distance = np.linalg.norm(away, axis=1)
-    return deformed_contact(
-        face,
-        points=mesh.points,
-        displacement=u,
-        gap=distance - radius,
-        normal=away / distance[:, None],
-        axes=(),
-        object_share=None if share is None else np.full(len(face.nodes), share),
-    )
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -28,7 +28,7 @@ from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, ObjectPose, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.contact_cases import random_compliance
 from tests.logs import Log
-from tests.meshes import grid
+from tests.meshes import grid, part_volume
 from tests.models import block, fig9, last, run
 from tests.soft_object_cases import half_ball, pad
 
@@ -305,11 +305,8 @@ def test_parts_follow_the_section_of_a_body(name: str) -> None:
     before, wanted = (mesh_part(one, model.first_contact.contact_box, ())[0] for one in (model, other))
     found = stretched(before, FINGERTIP, other.design)
 
-    def volume(mesh: Mesh, part: int) -> float:
-        return curved_volume(replace(mesh, cells=mesh.cells[mesh.part == part], part=None, part_labels=()))
-
     def changes(after: Mesh) -> list[float]:
-        return [volume(after, part) / volume(before, part) - 1.0 for part in range(3)]
+        return [part_volume(after, part) / part_volume(before, part) - 1.0 for part in range(3)]
 
     # the arcs of the swept mesh are less fine than those of the section
     assert changes(found) == pytest.approx(changes(wanted), rel=1e-3, abs=1e-9)

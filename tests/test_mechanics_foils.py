@@ -34,6 +34,7 @@ from finger3d.objects import Plane
 from finger3d.scene.scene import parse
 from tests.foil_cases import FOIL, LEGS, MIDDLE, block
 from tests.models import marched
+from tests.scenes import HALF_CYLINDER, changed, written
 
 ASIDE = Gauge("a", 1.3, 1.7, 0.4, 0.5, 1.5)
 
@@ -253,15 +254,9 @@ def test_viscosity_with_and_without_bulk_agree_around_a_foil_in_an_incompressibl
 
 
 def test_press_writes_both_strains(tmp_path: Path) -> None:
-    scene = tmp_path / "scene.toml"
-    scene.write_text(
-        'effects.auto = false\n[finger]\ngeometry = "half_cylinder"\nradius_mm = 5.0\nwidth_mm = 4.0\n[material]\n'
-        'E_MPa = 1.0\nnu = 0.3\n[press]\ndepth_mm = 0.5\nsteps = 3\n[model]\ndomain = "plane-strain"\n'
-        "[mesh]\nsize_mm = 0.3\n"
-        'base_size_mm = 1.0\n[[gauge]]\nname = "g"\nx_mm = 1.0\ny_mm = 3.5\nangle_deg = 20.0\nlength_mm = 1.5\n'
-        "[effects.embedded_gauge]\nE_MPa = 3000.0\nthickness_mm = 0.02\nwidth_mm = 3.0\n",
-        encoding="utf-8",
-    )
+    text = changed(HALF_CYLINDER, width_mm=4.0, steps=3, domain="plane-strain", y_mm=3.5, angle_deg=20.0)
+    foil = "[effects.embedded_gauge]\nE_MPa = 3000.0\nthickness_mm = 0.02\nwidth_mm = 3.0\n"
+    scene = written(tmp_path, f"{text}length_mm = 1.5\n{foil}")
     out = tmp_path / "out"
     assert main(["press", str(scene), "--out", str(out), "--no-figures"]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))

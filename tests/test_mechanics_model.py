@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 from finger3d.effects.elastic_object import Effect as ElasticObject
-from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.foils import EmbeddedBars
-from finger3d.mechanics.finite_strain.formulation import FiniteStrain
 from finger3d.mechanics.formulation import Loads, length_scale
-from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
-from finger3d.mechanics.path import AUTO_START, ending_at, targets
+from finger3d.mechanics.path import ending_at, targets
 from finger3d.mechanics.readings.reading import Marker, Taxel
-from finger3d.mechanics.small_strain.elastic import SmallStrain
-from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose
-from tests.models import block, half_cylinder
+from tests.models import block
 
 
 def test_a_path_has_poses_at_the_quarters_of_every_leg() -> None:
@@ -31,13 +23,6 @@ def test_a_path_has_poses_at_the_quarters_of_every_leg() -> None:
     assert [pose.slide_x_mm for pose in path.poses] == pytest.approx([0.0] * 4 + [0.25, 0.5, 0.75, 1.0])
     assert (path.half_length_mm, path.half_width_mm) == (4.0, 2.0)
     assert block(domain="plane-strain").contact_path.half_width_mm == 0.0
-
-
-def test_a_leg_ends_at_its_depth_and_lasts_its_duration() -> None:
-    end = Leg(0.2, 0.1, duration_s=3.0).end(ObjectPose(0.5, time_s=1.5))
-    assert (end.depth_mm, end.slide_x_mm, end.time_s) == (0.2, 0.1, 4.5)
-    assert not Leg(0.2).moves_sideways
-    assert Leg(0.2, turn_y=0.1).moves_sideways
 
 
 def test_forces_scale_with_the_modulus_unless_another_stiffness_or_a_force_is_given() -> None:
@@ -76,10 +61,6 @@ def test_targets_pass_through_every_leg() -> None:
 def test_time_runs_through_legs_with_a_duration() -> None:
     path = targets((Leg(1.0, steps=2, duration_s=4.0), Leg(1.0, steps=1), Leg(0.0, steps=2, duration_s=1.0)))
     assert [t.time_s for t in path] == [2.0, 4.0, 4.0, 4.5, 5.0]
-
-
-def test_automatic_legs_begin_with_a_fixed_number() -> None:
-    assert len(targets((Leg(1.0, steps="auto"),))) == AUTO_START
 
 
 def test_a_pose_between_two_is_linear_in_all_coordinates() -> None:
@@ -121,14 +102,3 @@ def test_gaps_are_measured_by_the_depth_and_by_the_deepest_leg_without_one() -> 
     assert length_scale(problem, Move(ObjectPose(0.1), ObjectPose(0.2))) == 0.2
     assert length_scale(problem, Move(ObjectPose(0.0), ObjectPose(0.0))) == 0.4
     assert length_scale(problem, Move(ObjectPose(0.1), ObjectPose(0.1, turn_z=0.1))) == 0.4
-
-
-def test_the_model_determines_its_formulation() -> None:
-    model = replace(half_cylinder(1.0), legs=(Leg(0.5, steps=1, duration_s=1.0),))
-    relaxing = Viscosity(((0.3, 0.5),)).apply(model)
-    assert isinstance(formulation_of(model), SmallStrain)
-    assert isinstance(formulation_of(relaxing), Viscoelastic)
-    for finite in (LargeDeformation().apply(model), LargeDeformation().apply(relaxing)):
-        formulation = formulation_of(finite)
-        assert isinstance(formulation, FiniteStrain)
-        assert formulation.relaxation == finite.relaxation

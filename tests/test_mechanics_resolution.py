@@ -46,32 +46,13 @@ from finger3d.meshing.structured.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import ball, box, write_stl
-from tests.models import large_fig9, run, swept_fig9
-from tests.scenes import FIG9 as FINGER
+from tests.models import ended, large_fig9, run, swept_fig9
+from tests.scenes import SWEPT_FINGER, changed
 
 FIG9 = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=36.6, width_mm=20.0)
 SCENE = (
-    FINGER
-    + """
-[material]
-E_MPa = 1.0
-nu = 0.45
-[object]
-shape = "sphere"
-radius_mm = 0.5
-[press]
-depth_mm = 5.0
-steps = 2
-[model]
-domain = "plane-strain"
-[mesh]
-size_mm = 4.0
-base_size_mm = 8.0
-[[gauge]]
-name = "g"
-x_mm = 10.0
-y_mm = 30.0
-"""
+    changed(SWEPT_FINGER, nu=0.45, depth_mm=5.0, steps=2, size_mm=4.0, base_size_mm=8.0, name="g", x_mm=10.0, y_mm=30.0)
+    + '[object]\nshape = "sphere"\nradius_mm = 0.5\n[model]\ndomain = "plane-strain"\n'
 )
 
 
@@ -168,9 +149,7 @@ def test_what_points_see_well_is_neither_refused_nor_warned_of(
 
 def test_a_flank_that_touches_the_wall_is_resolved_by_points_of_the_wall() -> None:
     """The plane is all but parallel to the wall: it comes 0.09 mm closer to it as it goes down 5 mm."""
-    problem = build(fig9(Plane(tilt=math.radians(89.0)), 5.0, 1.0))
-    *_, end = march(problem)
-    assert end.outcome.ok
+    problem, end = ended(fig9(Plane(tilt=math.radians(89.0)), 5.0, 1.0))
     walls = problem.points.face == 1
     assert (end.state.status[walls] != OPEN).any()
     force = problem.world_force(end.meshed_state.contact)
@@ -296,9 +275,7 @@ def test_an_edge_that_cuts_between_points_which_moved_is_told() -> None:
 
 def test_an_object_that_slides_off_is_no_mistake() -> None:
     legs = (Leg(1.0, steps=1), Leg(1.0, slide_x_mm=60.0, steps=12))
-    problem = build(fig9(Sphere(radius_mm=20.0), 1.0, 2.0, legs=legs))
-    *_, end = march(problem)
-    assert end.outcome.ok
+    problem, end = ended(fig9(Sphere(radius_mm=20.0), 1.0, 2.0, legs=legs))
     assert (end.state.status == OPEN).all()
 
 

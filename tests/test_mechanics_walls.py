@@ -26,7 +26,8 @@ from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Move, ObjectPose, Plane, RigidObject, Sphere, Wave
 from tests.bodies import ball, box, channel, write_stl
-from tests.models import block, fig9, last
+from tests.models import block, ended, fig9, last, run
+from tests.scenes import BLOCK, changed, written
 
 WALLS, ENDS = FREE_FACES.index("walls"), FREE_FACES.index("ends")
 CLEARANCE = 1e-5
@@ -44,9 +45,7 @@ def in_slot(**changes: object) -> Model:
 
 def test_a_confined_block_is_compressed_uniaxially() -> None:
     """Without friction strain is uniform, u_x = 0: pressures are M eps and nu/(1 - nu) of it (Hooke's law)."""
-    problem = build(in_slot())
-    *_, end = march(problem)
-    assert end.outcome.ok
+    problem, end = ended(in_slot())
     assert set(problem.points.face) == {0, WALLS}
     nu, strain = 0.3, 0.2 / 3.0
     vertical = (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) * strain
@@ -90,9 +89,7 @@ def test_a_slot_that_slides_pushes_the_wall(effect: Effect | None) -> None:
     slot = MeshObject(surface=channel(102.0, 20.0))
     legs = (Leg(2.0, steps=2), Leg(2.0, slide_x_mm=4.0, steps=8))
     model = fig9(object=slot, mesh=MeshOptions(2.0, 8.0, "swept"), legs=legs, domain="plane-strain", gauges=())
-    problem = build(effect.apply(model) if effect else model)
-    steps = list(march(problem))
-    assert all(step.outcome.ok for step in steps)
+    problem, steps = run(effect.apply(model) if effect else model)
     on_walls = [(step.state.status[problem.points.face == WALLS] != OPEN).any() for step in steps]
     first = on_walls.index(True)
     assert 2 <= first <= 4
@@ -120,9 +117,7 @@ def test_a_plane_above_the_finger_has_no_candidates_on_its_walls() -> None:
 def test_a_ball_over_the_rim_touches_contact_face_wall_and_end() -> None:
     ball = Sphere(5.0, 3.0, radius_mm=3.0)
     model = block(object=ball, mesh=MeshOptions(0.4, 1.0, "swept"), legs=(Leg(1.0, steps=4),))
-    problem = build(model)
-    *_, end = march(problem)
-    assert end.outcome.ok
+    problem, end = ended(model)
     assert set(problem.points.face) == {0, WALLS, ENDS}
     force = problem.world_force(end.meshed_state.contact).sum(axis=0)
     # the corner is pushed inwards along both axes, from the ball's middle
@@ -135,32 +130,11 @@ def test_contact_csv_names_the_face(tmp_path: Path) -> None:
     import csv
 
     write_stl(tmp_path / "slot.stl", channel(8.1, 2.0, 3.0))
-    (tmp_path / "scene.toml").write_text(
-        """
-        [finger]
-        geometry = "block"
-        half_length_mm = 4.0
-        height_mm = 3.0
-        width_mm = 4.0
-        [material]
-        E_MPa = 1.0
-        nu = 0.45
-        [object]
-        shape = "mesh"
-        path = "slot.stl"
-        [press]
-        depth_mm = 0.3
-        steps = 3
-        [model]
-        domain = "plane-strain"
-        [mesh]
-        size_mm = 0.5
-        base_size_mm = 0.5
-        """,
-        encoding="utf-8",
-    )
+    body = {"half_length_mm": 4.0, "height_mm": 3.0, "width_mm": 4.0, "nu": 0.45, "x_mm": 1.0, "y_mm": 1.5}
+    text = changed(BLOCK, **body, depth_mm=0.3, steps=3, size_mm=0.5, base_size_mm=0.5)
+    scene = written(tmp_path, text + '[object]\nshape = "mesh"\npath = "slot.stl"\n')
     out = tmp_path / "out"
-    assert main(["press", str(tmp_path / "scene.toml"), "--out", str(out), "--no-figures", "--no-error"]) == 0
+    assert main(["press", str(scene), "--out", str(out), "--no-figures", "--no-error"]) == 0
     with (out / "contact.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert {row["face"] for row in rows} == {"contact", "walls"}
@@ -189,10 +163,8 @@ def test_a_cylinder_that_rolls_on_keeps_its_force() -> None:
         object=Cylinder(-1.0, radius_mm=radius), legs=tuple(path), friction=Coulomb(0.0), domain="plane-strain",
         mesh=MeshOptions(0.1, 1.0, "swept"),
     )  # fmt: skip
-    problem = build(body)
-    steps = list(march(problem))
+    problem, steps = run(body)
     forces = [measure(problem.points, step)["normal_force_N"] for step in steps[1:]]
-    assert all(step.outcome.ok for step in steps)
     assert forces == pytest.approx([forces[0]] * len(forces), rel=0.02)  # the block is finite
     assert max(check.penetration_mm for check in check_surface(problem, steps)) < 0.02 * depth
 

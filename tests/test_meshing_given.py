@@ -20,57 +20,10 @@ from finger3d.meshing.given.given import GivenMesh, given_mesh
 from finger3d.meshing.given.mesh_files import read_contents
 from finger3d.meshing.given.mesh_output import write_mesh_msh, write_mesh_vtu
 from tests.given_meshes import GMSH, cube, refused, vtu_of
+from tests.meshes import part_volume
 
 # Gmsh 4.15 writes the middles of a tetrahedron's last two edges in the other order than VTK: (2, 3), then (1, 3)
-TET10 = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-2 1 "base"
-2 2 "Contact "
-3 7 "skin"
-$EndPhysicalNames
-$Entities
-0 0 2 1
-1 0 0 0 1 1 1 1 1 0
-2 0 0 0 1 1 1 1 2 0
-1 0 0 0 1 1 1 1 7 0
-$EndEntities
-$Nodes
-1 10 1 10
-3 1 0 10
-1
-2
-3
-4
-5
-6
-7
-8
-9
-10
-0 0 0
-0 0 1
-1 0 0
-0 1 0
-0 0 0.5
-0.5 0 0.5
-0.5 0 0
-0 0.5 0
-0.5 0.5 0
-0 0.5 0.5
-$EndNodes
-$Elements
-3 3 1 3
-2 1 9 1
-1 1 3 2 7 6 5
-2 2 9 1
-2 2 3 4 6 9 10
-3 1 11 1
-3 1 2 3 4 5 6 7 8 9 10
-$EndElements
-"""
+TET10 = (GMSH / "tetrahedron.msh").read_text(encoding="ascii")
 
 
 def test_quadratic_cells_of_gmsh_come_into_the_order_of_vtk(tmp_path: Path) -> None:
@@ -297,8 +250,7 @@ def test_a_mesh_of_gmsh_is_a_finger(name: str) -> None:
     assert body.half_length_mm == pytest.approx(10.0, abs=1e-9)
     assert body.width_mm == pytest.approx(8.0, abs=1e-9)
     assert body.part_labels == ("core",)
-    core = replace(body.mesh, cells=body.mesh.cells[body.mesh.part == 1], part=None)
-    assert curved_volume(core) == pytest.approx(10.0 * 3.0 * 8.0, rel=1e-9)
+    assert part_volume(body.mesh, 1) == pytest.approx(10.0 * 3.0 * 8.0, rel=1e-9)
     x, z = np.array([-7.3, 0.0, 4.1]), np.array([1.0, -2.0, 3.9])
     np.testing.assert_allclose(body.top(x, z), np.sqrt(RADIUS**2 - x**2) + MIDDLE, atol=0.01)
     assert np.isnan(body.top(np.array([10.5]), np.zeros(1)))[0]
