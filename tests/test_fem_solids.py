@@ -21,7 +21,8 @@ from finger3d.fem.solids.deformed import stretch
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.tensors import InvertedError, determinant
-from tests.meshes import edge_load, full, grid, mapped
+from tests.meshes import full, grid
+from validation._common import mapped, side_load
 
 LAW = MooneyRivlin(0.4, 0.3)
 CASES = [(2, 0.3, False), (2, 0.45, True), (2, 0.5, True), (2, 0.5, False), (3, 0.3, False), (3, 0.5, False)]
@@ -206,7 +207,7 @@ def test_thick_sphere_under_pressure() -> None:
     free = np.flatnonzero(~held)
     # the cavity carries pressure -p n over its deformed area, a dead load at the exact motion: cof(F) N dA
     cavity = replace(mesh, points=mesh.points + exact)
-    area = edge_load(cavity, "x-", lambda p: p / np.linalg.norm(p, axis=1)[:, None])
+    area = side_load(cavity, "x-", lambda p: p / np.linalg.norm(p, axis=1)[:, None])
     load = np.concatenate([want * area.ravel(), np.zeros(len(mesh.vertices))])
     for _ in range(12):
         force = solid.internal_forces(x)

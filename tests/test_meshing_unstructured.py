@@ -174,7 +174,7 @@ def test_parts_share_their_interfaces() -> None:
     assert len(labelled) == len(boundary(mesh.cells[:, :4], 3))
     for number, area in enumerate(design.section().areas_mm2.values()):
         assert 4.0 * part_volume(mesh, number) == pytest.approx(area * design.width_mm, rel=1e-4)
-    skin = mesh.points[np.unique(interface(mesh, 0, 1))]
+    skin = mesh.points[interface(mesh, 0, 1)]
     np.testing.assert_allclose(np.hypot(skin[:, 0], skin[:, 1] - 2.0), 9.0, rtol=1e-10)
 
 
@@ -309,9 +309,9 @@ def test_a_real_mesh_of_parts_is_conforming_and_on_its_interfaces() -> None:
     check(mesh, {label: area * FINGERTIP.width_mm for label, area in areas.items()})
     assert report.min_dihedral_deg > 3.0
     assert set(mesh.facets) == {"base", "contact", "ends", "symmetry_x", "symmetry_z", "walls"}
-    skin = mesh.points[np.unique(interface(mesh, 0, 1))]
+    skin = mesh.points[interface(mesh, 0, 1)]
     np.testing.assert_allclose(np.hypot(skin[:, 0], skin[:, 1] - 2.0), 9.0, rtol=1e-10)  # its axis is 12 - 10 mm high
-    core = mesh.points[np.unique(interface(mesh, 0, 2))]
+    core = mesh.points[interface(mesh, 0, 2)]
     assert (np.isclose(core[:, 1], 6.0, atol=1e-9) | np.isclose(core[:, 0], 3.0, atol=1e-9)).all()
     again, cached = mesh_solid(FINGERTIP, options, (-2.0, 2.0, -2.0, 2.0), BOTH)
     assert cached.from_cache
@@ -330,7 +330,7 @@ def test_a_step_file_with_a_core_and_a_cavity_is_meshed(tmp_path: Path) -> None:
     check(mesh, {"": 400.0 - 4.5 * np.pi, "core": 80.0})
     cavity = mesh.points[np.unique(mesh.facets["cavity"])] - [0.0, 3.0, 0.0]
     np.testing.assert_allclose(np.linalg.norm(cavity, axis=1), 1.5, rtol=1e-10)
-    np.testing.assert_allclose(mesh.points[np.unique(interface(mesh, 0, 1)), 1], 1.0, rtol=1e-12)
+    np.testing.assert_allclose(mesh.points[interface(mesh, 0, 1), 1], 1.0, rtol=1e-12)
 
 
 def cube_of_two() -> tuple[np.ndarray, np.ndarray]:
@@ -372,7 +372,7 @@ def test_nodes_near_an_interface_come_onto_it() -> None:
     part = (points[cells].mean(axis=1)[:, 1] > 0.5).astype(np.int64)
     moved = points + 0.03 * np.random.default_rng(0).uniform(-1.0, 1.0, points.shape)
     mesh = snap(moved, cells, halves(), part)
-    assert (mesh.points[np.unique(interface(mesh, 0, 1)), 1] == 0.5).all()
+    assert (mesh.points[interface(mesh, 0, 1), 1] == 0.5).all()
     for number in range(2):
         assert part_volume(mesh, number) == pytest.approx(0.5, rel=1e-12)
 
