@@ -20,7 +20,6 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
@@ -42,8 +41,9 @@ from finger3d.mechanics.march.step_halving import (
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.path import Station, stations, targets
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.objects import Cylinder, Move, ObjectPose, Plane, Sphere
+from finger3d.objects import Cylinder, Move, ObjectPose, Plane
 from tests.models import block, fig9, half_cylinder, large_fig9, last, run
+from validation import increment_orders
 
 
 # validation/REFERENCES.md, 2.6, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
@@ -224,34 +224,9 @@ def test_an_increment_begins_at_the_end_of_a_similar_one() -> None:
 
 
 NAMES = ("normal_force_N", "friction_sum_N", "dissipation_mJ")
-
 COUNTS = (10, 20, 40, 80)
-
-
-def on_a_bar(**changes: object) -> Model:
-    """The section of the paper's finger on a round bar."""
-    mesh, bar = MeshOptions(1.0, 4.0), Cylinder(radius_mm=20.0, axis="z")
-    model = fig9(domain="plane-strain", mesh=mesh, object=bar, friction=Coulomb(0.5), legs=(Leg(6.0),))
-    return replace(model, **changes)
-
-
-def solid(**changes: object) -> Model:
-    """The paper's finger on a coarse mesh."""
-    return fig9(mesh=MeshOptions(2.5, 10.0, "swept"), friction=Coulomb(0.5), **changes)
-
-
-PRESSES = {
-    "section on a bar": (on_a_bar(), 320),
-    "that slides": (on_a_bar(legs=(Leg(5.0), Leg(5.0, slide_x_mm=2.0))), 320),
-    "that is released": (on_a_bar(legs=(Leg(6.0), Leg(2.0))), 320),
-    "with viscosity": (
-        on_a_bar(legs=(Leg(6.0, duration_s=1.0),), relaxation=Relaxation(((0.4, 0.5),), bulk=True)),
-        320,
-    ),
-    "at large deformation": (LargeDeformation().apply(on_a_bar(friction=Coulomb(0.3))), 160),
-    "solid on a plane": (solid(), 320),
-    "solid on a ball": (solid(object=Sphere(radius_mm=30.0), legs=(Leg(5.0),)), 320),
-}
+QUICK = ("section on a bar", "solid on a plane")
+SLOW = ("bar is released", "bar slides", "with viscosity", "solid on a ball", "at large deformation")
 
 
 def numbers(problem: Problem, count: int) -> np.ndarray:
@@ -262,15 +237,12 @@ def numbers(problem: Problem, count: int) -> np.ndarray:
     return np.array([measured[name] for name in NAMES])
 
 
-SLOW = ("at large deformation", "that slides", "that is released", "with viscosity", "solid on a ball")
-
-
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PRESSES])
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_errors_fall_at_second_order(name: str) -> None:
     # points touch one by one, so that single ratios scatter widely about 4: the median is taken, and the whole fall
-    model, finest = PRESSES[name]
-    problem = build(model)
-    exact = numbers(problem, finest)
+    press = next(press for press in increment_orders.presses(quick=False) if press.name == name)
+    problem = build(replace(press.model, friction=Coulomb(press.mu)))
+    exact = numbers(problem, 160 if press.model.finite_strain else 320)
     errors = np.abs([numbers(problem, count) / exact - 1.0 for count in COUNTS])
     assert np.median(errors[:-1] / errors[1:]) >= 3.3
     assert (errors[-1] <= errors[0] / 10.0).all()
