@@ -84,10 +84,17 @@ def half_space(x: np.ndarray, z: np.ndarray, spacing: float, nu: float, modulus:
     return out
 
 
+def problem_of(
+    compliance: np.ndarray, free: np.ndarray, mu: float, scale: float = 1.0, state: ContactState | None = None
+) -> ContactProblem:
+    """Problem of points under Coulomb's friction, which touch without force at first unless a state is given."""
+    before = ContactState.at_rest(np.zeros(len(free)), free.shape[1]) if state is None else state
+    return ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(mu)), scale)
+
+
 def random_problem(dim: int, seed: int = 0, points: int = 7) -> tuple[ContactProblem, np.ndarray]:
     """Contact problem of a random symmetric positive definite operator, and random forces (c, d)."""
     rng = np.random.default_rng(seed)
     delassus = random_compliance(rng, points, dim, 1.0).reshape(points * dim, points * dim)
     free, force = rng.normal(size=(points, dim)), rng.normal(size=(points, dim))
-    at_rest = ContactState.at_rest(np.zeros(points), dim)
-    return ContactProblem.of(at_rest, free, delassus, ContactLaw(Coulomb(0.5)), 1.0), force
+    return problem_of(delassus, free, 0.5), force

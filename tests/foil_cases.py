@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.objects import Sphere
+from finger3d.mechanics.model import Gauge, Leg, Model
+from tests import models
 
 FOIL = Effect(3000.0, 0.02, 1.0)
 LEGS = (Leg(0.3, steps=3, duration_s=1.0), Leg(0.3, slide_x_mm=0.1, steps=2, duration_s=1.0))
@@ -19,12 +14,8 @@ GOOD = {"name": "g", "x_mm": 0.0, "y_mm": 3.0, "length_mm": 2.0}
 
 
 def block(**changes: object) -> Model:
-    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), LEGS[:1], object=Sphere(radius_mm=4.0),
-        friction=Coulomb(0.25), gauges=(MIDDLE,),
-    )  # fmt: skip
-    return replace(model, **changes)
+    """A block under a ball with a gauge in its middle."""
+    return models.block(**{"gauges": (MIDDLE,), "legs": LEGS[:1]} | changes)
 
 
 def scene_of(effect: dict, *gauges: dict, **more: object) -> dict:

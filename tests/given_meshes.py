@@ -15,7 +15,7 @@ from tests.meshes import grid
 GMSH = Path(__file__).resolve().parent / "gmsh"
 """A dome of radius 20 mm, 20 mm long and 8 mm high and wide, its walls along x straight, with a core of 10 by 3 mm.
 
-`body.geo` tells how the files were made.
+`body.geo` tells how the files were made.  `tetrahedron.msh` is one cell with named facets, as Gmsh writes it.
 """
 
 

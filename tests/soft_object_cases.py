@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.objects import Plane
 from tests.bodies import ball
+from tests.models import block
 
 
 def pad(**changes: Any) -> Model:
+    """A block 6 mm wide on a plane, unless something else is given."""
     body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=6.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.6, 1.2, "swept"), (Leg(0.3, steps=2),), friction=Coulomb(0.3)
-    )  # fmt: skip
-    return replace(model, **changes)
+    usual = {"mesh": MeshOptions(0.6, 1.2, "swept"), "object": Plane(), "friction": Coulomb(0.3)}
+    return block(**{"design": body, "legs": (Leg(0.3, steps=2),)} | usual | changes)
 
 
 def half_ball(radius: float) -> Triangles:

@@ -1,4 +1,4 @@
-"""The contact solution: every condition holds, in every dimension, under every numbering, unit and turn."""
+"""Solvers of one increment of frictional contact."""
 
 from __future__ import annotations
 
@@ -9,15 +9,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.newton import uniqueness
+from finger3d.contact.acceleration import accelerated_newton, assemble_in_place, chord_step, threads_for, warm_start
+from finger3d.contact.conditions import ContactProblem, augmentation_parameters, project_on_friction_cone, residual
+from finger3d.contact.friction import OPEN, SLIP, STICK
+from finger3d.contact.lemke import directions, friction_start, lemke
+from finger3d.contact.newton import (
+    ActiveSet,
+    ActiveSetSystem,
+    Iterate,
+    NewtonResult,
+    Precision,
+    assemble,
+    block_gauss_seidel,
+    force_of_sets,
+    newton,
+    uniqueness,
+)
 from finger3d.contact.rules import maeno_active_set
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
-from tests.contact_cases import half_plane, random_compliance, violation
+from tests.contact_cases import half_plane, half_space, problem_of, random_compliance, random_problem, violation
 
 COEFFICIENTS = [0.0, 1e-6, 0.06, 0.25, 1.0, 5.0, 1e6]
 
@@ -31,7 +43,7 @@ def press(compliance: np.ndarray, gap: np.ndarray, path: list[tuple[float, ...]]
         free = np.zeros((len(gap), d))
         free[:, 0] = gap - target[0]
         free[:, 1:] = -np.asarray(target[1:])[: d - 1]
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
+        found = solve_increment(problem_of(compliance, free, mu, state=state))
         assert found.outcome is Outcome.CONVERGED, (mu, target, found.outcome.name)
         assert found.residual <= 1e-8
         assert violation(state, found.state, free, compliance, mu) <= 1e-8
@@ -58,7 +70,7 @@ def test_any_state_returned_as_converged_meets_every_condition(
     for _ in range(4):
         free = rng.normal(size=(points, dim))
         free[:, 0] += 0.3
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 1.0))
+        found = solve_increment(problem_of(compliance, free, mu, state=state))
         if found.outcome.ok:
             assert violation(state, found.state, free, compliance, mu) <= 1e-8
             state = found.state
@@ -166,13 +178,10 @@ def test_a_failed_increment_leaves_the_state_and_a_repeat_gives_the_same() -> No
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
     broken = free.copy()
     broken[0, 0] = np.nan
-    failed = solve_increment(ContactProblem.of(first, broken, compliance, ContactLaw(Coulomb(0.3)), 1.0))
+    failed = solve_increment(problem_of(compliance, broken, 0.3, state=first))
     assert failed.outcome is Outcome.NOT_FINITE
     assert failed.state is first
-    a, b = (
-        solve_increment(ContactProblem.of(first, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state
-        for _ in range(2)
-    )
+    a, b = (solve_increment(problem_of(compliance, free, 0.3, state=first)).state for _ in range(2))
     assert np.array_equal(a.force, b.force)
 
 
@@ -182,14 +191,8 @@ def test_floating_body_and_nan_are_outcomes_not_numbers() -> None:
     free = np.column_stack([gap - 0.3, np.zeros((len(gap), 2))])
     bad = compliance.copy()
     bad[0, 1, 0, 1] = -1.0
-    assert (
-        solve_increment(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0)).outcome
-        is Outcome.INDEFINITE
-    )
-    assert (
-        solve_increment(ContactProblem.of(state, free, compliance * np.nan, ContactLaw(Coulomb(0.3)), 1.0)).outcome
-        is Outcome.NOT_FINITE
-    )
+    assert solve_increment(problem_of(bad, free, 0.3, state=state)).outcome is Outcome.INDEFINITE
+    assert solve_increment(problem_of(compliance * np.nan, free, 0.3, state=state)).outcome is Outcome.NOT_FINITE
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -200,14 +203,12 @@ def test_a_number_that_is_none_shows_wherever_it_is_between_points_that_touch(
     compliance, gap, path = states_3d()
     before = press(compliance, gap, path[:1], 0.3)[0]
     free = np.column_stack([gap - 0.6, np.full(len(gap), -0.05), np.full(len(gap), -0.1)])
-    touching = np.flatnonzero(
-        solve_increment(ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(0.3)), 1.0)).state.force[:, 0]
-    )
+    touching = np.flatnonzero(solve_increment(problem_of(compliance, free, 0.3, state=before)).state.force[:, 0])
     for i, j, a, b in ((0, -1, 0, 0), (1, 2, 1, 2), (-1, 0, 2, 0)):
         bad = compliance.copy()
         bad[touching[i], a, touching[j], b] = bad[touching[j], b, touching[i], a] = value
         for state in (ContactState.at_rest(gap, 3), before):
-            found = rule(ContactProblem.of(state, free, bad, ContactLaw(Coulomb(0.3)), 1.0))
+            found = rule(problem_of(bad, free, 0.3, state=state))
             assert found.outcome is Outcome.NOT_FINITE
             assert found.state is state
 
@@ -225,15 +226,279 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
 
 def test_no_touch_no_force() -> None:
     compliance, gap, _ = states_3d()
-    found = solve_increment(
-        ContactProblem.of(
-            ContactState.at_rest(gap, 3),
-            np.column_stack([gap + 1.0, np.zeros((len(gap), 2))]),
-            compliance,
-            ContactLaw(Coulomb(0.3)),
-            1.0,
-        )
-    )
+    free = np.column_stack([gap + 1.0, np.zeros((len(gap), 2))])
+    found = solve_increment(problem_of(compliance, free, 0.3, state=ContactState.at_rest(gap, 3)))
     assert found.outcome.ok
     assert not found.state.force.any()
     assert (found.state.status == OPEN).all()
+
+
+Method = Callable[[ContactProblem, np.ndarray, int, bool], NewtonResult]
+
+
+def sphere(points: int = 11, spacing: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """Compliance and gap of a square of half-space points under a sphere of radius 1."""
+    axis = spacing * (np.arange(points) - (points - 1) / 2.0)
+    x, z = (a.ravel() for a in np.meshgrid(axis, axis))
+    return half_space(x, z, spacing, 0.3), 0.5 * (x**2 + z**2)
+
+
+def parabola() -> tuple[np.ndarray, np.ndarray]:
+    """Compliance and gap of a line of half-plane points under a parabola."""
+    return half_plane(41, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 41) ** 2
+
+
+def pressed(method: Method, compliance: np.ndarray, gap: np.ndarray, mu: float) -> list[NewtonResult]:
+    """Four increments: two of pressing, two with an oblique slide."""
+    d = compliance.shape[1]
+    state, out = ContactState.at_rest(gap, d), []
+    for depth, x, z in ((0.05, 0.0, 0.0), (0.1, 0.0, 0.0), (0.1, 0.004, 0.002), (0.1, 0.008, 0.004)):
+        free = np.stack([gap - depth, np.full(len(gap), -x), np.full(len(gap), -z)], axis=1)[:, :d]
+        problem = problem_of(compliance, free, mu, 0.1, state=state)
+        out.append(method(problem, state.force, 60, True))
+        assert out[-1].solved
+        state = next_state(state, out[-1].force, out[-1].relative_displacement, out[-1].status)
+    return out
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.06, 0.25, 1.0, 10.0])
+@pytest.mark.parametrize("case", [parabola, sphere])
+def test_plain_and_accelerated_newton_agree(case: Callable[[], tuple[np.ndarray, np.ndarray]], mu: float) -> None:
+    fast, plain = (pressed(method, *case(), mu) for method in (accelerated_newton, newton))
+    for a, b in zip(fast, plain, strict=True):
+        assert np.array_equal(a.status, b.status)
+        assert np.abs(a.force - b.force).max() < 1e-10 * b.force.max()
+        assert np.abs(a.relative_displacement - b.relative_displacement).max() < 1e-11
+    assert sum(a.iterations for a in fast) <= sum(b.iterations for b in plain)
+    if case is sphere and 0.0 < mu <= 1.0:
+        assert sum(a.iterations for a in fast) < 0.5 * sum(b.iterations for b in plain)
+
+
+def test_what_single_precision_cannot_settle_is_settled_in_double() -> None:
+    # two points that move together but for a hundred-millionth, and an independent third
+    coupling = np.array([[1.0, 1.0 - 1e-8, 0.0], [1.0 - 1e-8, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    free = np.zeros((3, 3))
+    free[:, 0] = -1.0
+    problem = problem_of(np.kron(coupling, np.eye(3)).reshape(3, 3, 3, 3), free, 0.25)
+    assert not newton(problem, np.ones_like(free), 4, True, np.float32).solved
+    found = accelerated_newton(problem, np.ones_like(free), 30, True)
+    assert found.solved
+    assert found.force[:, 0] == pytest.approx([1.0 / (2.0 - 1e-8)] * 2 + [1.0], rel=1e-7)
+
+
+@pytest.mark.parametrize(("dim", "accuracy"), [(2, 1e-12), (3, 1e-6)])  # round-off of double and of single precision
+def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: float) -> None:
+    rng = np.random.default_rng(3)
+    compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
+    start = warm_start(problem_of(compliance, free, 0.0), np.zeros((9, dim)))
+    wanted = solve_increment(problem_of(compliance, free, 0.0))
+    assert wanted.outcome.ok
+    assert wanted.state.force[:, 0].max() > 0.0
+    assert np.abs(start - wanted.state.force).max() < accuracy * wanted.state.force.max()
+
+
+@pytest.mark.parametrize(("share", "kept"), [(1.0, True), (0.995, True), (0.9, False), (0.7, False)])
+def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kept: bool) -> None:
+    compliance, gap = sphere()
+    free = np.stack([gap - 0.1, np.full(len(gap), 0.02), np.zeros(len(gap))], axis=1)
+    wanted = solve_increment(problem_of(compliance, free, 0.25, state=ContactState.at_rest(gap, 3))).state.force
+    expected = wanted.copy()
+    expected[:, 1:] *= share
+    start = warm_start(problem_of(compliance, free, 0.25), expected)
+    assert np.array_equal(start, expected) == kept
+    if not kept:
+        assert np.linalg.norm(start - wanted) < 0.1 * np.linalg.norm(expected - wanted)
+
+
+def test_the_warm_start_is_admissible_and_close() -> None:
+    compliance, gap = sphere()
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    wanted = solve_increment(problem_of(compliance, free, 0.25, 0.1))
+    assert wanted.outcome.ok
+    start = warm_start(problem_of(compliance, free, 0.25), np.zeros_like(free))
+    assert np.linalg.norm(start - wanted.state.force) < 1e-3 * np.linalg.norm(wanted.state.force)
+    assert (np.linalg.norm(start[:, 1:], axis=1) <= 0.25 * (1.0 + 1e-6) * start[:, 0]).all()
+
+
+def test_a_singular_operator_leaves_the_expected_forces() -> None:
+    force = np.array([[1.0, 0.0], [0.0, 0.0]])
+    problem = problem_of(np.ones((2, 2, 2, 2)), np.full((2, 2), -1.0), 0.3)
+    assert np.array_equal(warm_start(problem, force), force)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_matrix_assembled_in_place_is_that_of_the_plain_assembly(dim: int, precision: Precision, seed: int) -> None:
+    problem, force = random_problem(dim, seed, points=12)
+    status = np.random.default_rng(seed).permutation(np.repeat([OPEN, STICK, SLIP], 4)).astype(np.int8)
+    status[:seed] = OPEN
+    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
+    wanted = assemble(problem, active, np.float64)
+    found = assemble_in_place(problem, active, precision)
+    assert found.dtype == precision
+    # an entry is a sum of at most nine products of numbers of order 1
+    assert np.abs(found - wanted).max() <= 50.0 * np.finfo(precision).eps * np.abs(wanted).max()
+
+
+def test_chord_steps_reduce_the_mismatch_of_slip_directions() -> None:
+    compliance, gap = sphere()
+    pressing = pressed(newton, compliance, gap, 0.25)[1]
+    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
+    free[:, 1:] -= 0.01
+    problem = problem_of(compliance, free, 0.25)
+    found = newton(problem, pressing.force, 30, damped=False)
+    assert found.solved
+    slips = found.status == SLIP
+    assert slips.sum() > 5
+    # the system is assembled for slip directions that are 0.01 rad off
+    angle = 0.01 * np.random.default_rng(0).normal(size=len(gap))
+    turned = found.force.copy()
+    turned[slips, 1] -= (angle * found.force[:, 2])[slips]
+    turned[slips, 2] += (angle * found.force[:, 1])[slips]
+    before = Iterate.of(problem, turned)
+    assert (before.status == found.status).all()
+    system = ActiveSetSystem.of(problem, ActiveSet.of(problem, before.status, before.augmented_force))
+    force = chord_step(system, system.solution(), np.zeros_like(free))
+    mismatches = []
+    for _ in range(3):
+        iterate = Iterate.of(problem, force)
+        mismatches.append(iterate.mismatch)
+        force = chord_step(system, force, force - iterate.projected)
+    assert mismatches[1] < 0.1 * mismatches[0]
+    assert mismatches[2] < 0.1 * mismatches[1]
+
+
+def test_small_systems_run_on_one_thread() -> None:
+    from threadpoolctl import threadpool_info
+
+    with threads_for(600):
+        assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} == {1}
+
+
+def test_augmentation_is_isotropic_in_the_tangent_plane() -> None:
+    rho = augmentation_parameters(np.diag([1.0, 2.0, 4.0]), 3)
+    assert rho == pytest.approx(np.array([[1.0, 0.25, 0.25]]))
+
+
+def test_points_of_a_nearly_floating_body_stick_to_round_off() -> None:
+    """Single precision loses digits where soft springs alone hold the body; chord iterations bring them back."""
+    compliance, gap = sphere()
+    soft = compliance + 3e5 * np.einsum("k,l->kl", [0.0, 1.0, 0.0], [0.0, 1.0, 0.0])[None, :, None, :]
+    free = np.column_stack([gap - 0.05, np.full_like(gap, 0.01), np.zeros_like(gap)])
+    problem = problem_of(soft, free, 1.0)
+    found = accelerated_newton(problem, np.zeros_like(free), 60, True)
+    assert found.solved
+    slip = np.linalg.norm(found.relative_displacement[found.status == STICK, 1:], axis=1)
+    assert 0.0 < len(slip)
+    # forces at round-off alone would leave slips of 2e-12; their own round-off times this compliance is 6e-14
+    assert slip.max() <= 5e-13
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_newton_step_solves_the_linearised_projection_equation(dim: int, seed: int) -> None:
+    problem, force = random_problem(dim, seed)
+    # one iteration of the method makes the friction at slipping points admissible, where the system is the derivative
+    for _ in range(2):
+        iterate = Iterate.of(problem, force)
+        system = ActiveSetSystem.of(problem, ActiveSet.of(problem, iterate.status, iterate.augmented_force))
+        force = system.solution()
+    open_, stick, slip = (iterate.status == s for s in (OPEN, STICK, SLIP))
+    displacement = problem.relative_displacement(force)
+    scale = np.abs(force).max() + 1.0
+    assert not force[open_].any()
+    assert np.abs(displacement[stick]).max(initial=0.0) < 1e-9 * scale
+    assert np.abs(displacement[slip, 0]).max(initial=0.0) < 1e-9 * scale
+    along = np.sum(force[:, 1:] * iterate.augmented_force[:, 1:], axis=1) / np.maximum(
+        np.linalg.norm(iterate.augmented_force[:, 1:], axis=1), 1e-300
+    )
+    assert along[slip] == pytest.approx(0.5 * force[slip, 0], abs=1e-9 * scale)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_matrix_is_that_of_the_blocks_written_out(dim: int) -> None:
+    problem, force = random_problem(dim, 4)
+    iterate = Iterate.of(problem, force)
+    status = np.array([OPEN, STICK, SLIP, SLIP, STICK, OPEN, SLIP], dtype=np.int8)
+    active = ActiveSet.of(problem, status, iterate.augmented_force)
+    x = np.linspace(1.0, 2.0, active.size)
+    w = problem.delassus @ active.force(x).ravel()  # displacements of these unknowns
+    rho, m = problem.augmentation.ravel(), len(active.active_dofs)
+    image = np.empty(len(x))
+    image[:m] = rho[active.active_dofs] * w[active.active_dofs]
+    if dim == 3:
+        trial = iterate.augmented_force[active.slip_points]
+        a = np.minimum(0.5 * trial[:, 0] / np.linalg.norm(trial[:, 1:], axis=1), 1.0)
+        across = np.sum(active.tangent * (rho * w).reshape(-1, 3)[active.slip_points, 1:], axis=1)
+        image[m:] = (1.0 - a) * x[m:] + a * across
+    assert ActiveSetSystem.of(problem, active).solve(image) == pytest.approx(x, rel=1e-9)
+    assert assemble(problem, active, np.float64) @ x == pytest.approx(image, rel=1e-9)
+
+
+def test_the_forces_of_an_active_set_are_admissible() -> None:
+    problem, force = random_problem(3, 4)
+    status = np.array([OPEN, STICK, SLIP, SLIP, STICK, OPEN, SLIP], dtype=np.int8)
+    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
+    x = np.linspace(1.0, 2.0, active.size)
+    found = active.force(x)
+    assert not found[status == OPEN].any()
+    assert found[status == STICK].ravel() == pytest.approx(x[:6])
+    slipping = found[status == SLIP]
+    assert slipping[:, 0] == pytest.approx(x[6:9])
+    direction = Iterate.of(problem, force).augmented_force[status == SLIP, 1:]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    assert np.sum(slipping[:, 1:] * direction, axis=1) == pytest.approx(0.5 * x[6:9])
+    assert direction[:, 0] * slipping[:, 2] - direction[:, 1] * slipping[:, 1] == pytest.approx(x[9:])
+
+
+def test_gauss_seidel_converges_to_the_solution_of_newton() -> None:
+    problem, force = random_problem(3, 2)
+    found = newton(problem, np.zeros_like(force), 60, damped=True)
+    assert found.solved
+    assert residual(found.force, found.relative_displacement, found.status, problem.friction, 1.0) < 1e-11
+    swept = block_gauss_seidel(problem, np.zeros_like(force), 400)
+    assert np.abs(swept - found.force).max() < 1e-9
+    projected, _, _ = project_on_friction_cone(problem, swept, problem.relative_displacement(swept))
+    assert np.abs(projected - swept).max() < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_solution_is_complementary(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(7, 7))
+    matrix, q = a @ a.T + 0.1 * np.eye(7), rng.normal(size=7)
+    z = lemke(matrix, q, 200)
+    assert z is not None
+    w = matrix @ z + q
+    # the perturbation that excludes ties is 1e-9 to 2e-9 of the largest q
+    assert min(z.min(), w.min()) > -1e-7
+    assert np.abs(z * w).max() < 1e-7
+
+
+def test_without_a_solution_there_is_none() -> None:
+    assert lemke(-np.eye(2), np.array([-1.0, -1.0]), 50) is None
+    assert lemke(np.eye(2), np.array([-1.0, -2.0]), 0) is None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_in_two_dimensions_the_active_set_is_that_of_the_solution(seed: int) -> None:
+    problem, force = random_problem(2, seed)
+    points = np.arange(len(force))
+    assert friction_start(problem, points, 4 * len(points) - 1) is None
+    found = friction_start(problem, points, 4 * len(points))
+    solution = newton(problem, np.zeros_like(force), 60, damped=True)
+    assert found is not None
+    assert solution.solved
+    status, direction = found
+    assert np.array_equal(status, solution.status)
+    exact = force_of_sets(problem, status, np.hstack([np.zeros((len(force), 1)), direction]))
+    assert np.abs(exact - solution.force).max() < 1e-9 * np.abs(solution.force).max()
+
+
+def test_directions_span_the_tangent_plane() -> None:
+    assert directions(1).tolist() == [[1.0], [-1.0]]
+    polygon = directions(2, 6)
+    assert np.linalg.norm(polygon, axis=1) == pytest.approx(1.0)
+    assert polygon.sum(axis=0) == pytest.approx(0.0, abs=1e-14)
+    assert np.linalg.det(polygon[:2]) == pytest.approx(np.sin(np.pi / 3.0))

@@ -1,4 +1,4 @@
-"""Hyperelastic laws: derivatives, closed forms (validation/REFERENCES.md, 5.7), small strain, stability."""
+"""Laws of materials: linear elasticity, hyperelastic laws, relaxation."""
 
 from __future__ import annotations
 
@@ -7,11 +7,36 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.invariants import Derivatives, InvariantLaw
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.fem.tensors import InvertedError
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.objects import Plane
+from tests.models import marched
+from tests.viscous_cases import RAMP_AND_HOLD, TWO, block, mean_relaxation, viscous
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+def test_uniaxial_stress_follows_hookes_law(nu: float) -> None:
+    strain = np.diag([1.0, -nu, -nu])[None] * 1e-3
+    np.testing.assert_allclose(Isotropic(2.0, nu).elasticity().stress(strain)[0], np.diag([2e-3, 0.0, 0.0]), atol=1e-15)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_element_matrices_are_the_contraction_with_the_stress(dim: int) -> None:
+    law, rng = Isotropic(2.0, 0.3).elasticity(), np.random.default_rng(0)
+    gradients = rng.normal(size=(4, dim))
+    cell = law.contract(np.einsum("am,bn->ambn", gradients, gradients)[None])[0]
+    u, v = rng.normal(size=(2, 4, dim))
+    strains = [0.5 * ((w.T @ gradients) + (w.T @ gradients).T) for w in (u, v)]
+    energy = np.einsum("ij,ij->", law.stress(strains[0][None])[0], strains[1])
+    assert np.einsum("ai,aibj,bj->", v, cell, u) == pytest.approx(energy)
+
 
 G = 0.7
 LAWS: dict[str, IsochoricLaw] = {
@@ -198,3 +223,18 @@ def test_stability() -> None:
     bend = 4.0 * np.exp(2.0 * e) + 2.0 * np.exp(-e)
     assert (1.0 - 0.1 * x) * bend - 0.1 * slope**2 == pytest.approx(0.0, abs=1e-9)
     assert found["uniaxial tension"] > 0.0 > found["uniaxial compression"]
+
+
+def test_uniform_compression_relaxes_as_the_series_says() -> None:
+    # nu = 0 under a flat plate: a bar, stress = E int r(t - s) d'(s) ds / h
+    problem = build(block(material=Isotropic(2.0, 0.0), object=Plane(), friction=Coulomb(0.0), legs=RAMP_AND_HOLD))
+    held = viscous(problem)
+    for frame in marched(held):
+        t = frame.target.time_s
+        mean = mean_relaxation(TWO, np.array(max(t - 1.0, 0.0)), np.array(t)) * min(t, 1.0)
+        stress = 2.0 * 0.3 / 3.0 * float(mean)
+        pressure = frame.state.force[:, 0] / problem.points.area
+        assert pressure == pytest.approx(stress, rel=1e-9)
+        _, strain, sigma = formulation_of(held.model).fields(held, frame.meshed_state)
+        assert sigma[:, 1, 1] == pytest.approx(-stress, rel=1e-9)
+        assert strain[:, 1, 1] == pytest.approx(-min(t, 1.0) * 0.1, rel=1e-9)

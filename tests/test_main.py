@@ -1,14 +1,23 @@
-"""``python -m finger3d``."""
+"""The entry point, errors and interruption."""
 
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
+import weakref
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
-from finger3d.cli import main as cli
+from finger3d import cli
+from finger3d._interruption import termination_interrupts
+from finger3d.cli import main
+from finger3d.errors import OUT_OF_MEMORY, out_of_memory
 from tests.scenes import HALF_CYLINDER
 
 
@@ -41,7 +50,7 @@ def test_a_working_folder_that_was_removed_is_told(tmp_path, root) -> None:
 @pytest.mark.parametrize("words", [["--out", ""], ["--out="]])
 def test_an_empty_value_is_refused(words, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert cli(["press", "scene.toml", *words]) == 2
+    assert main(["press", "scene.toml", *words]) == 2
     assert capsys.readouterr().err == "finger3d: the value after --out is empty; give one\n"
     assert not list(tmp_path.iterdir())
 
@@ -60,3 +69,171 @@ def test_a_limit_of_the_address_space_ends_with_one_line_or_a_result(kilobytes, 
     if done.returncode:
         assert done.stderr.splitlines()[-1].startswith("finger3d: out of memory")
         assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "memory"),
+    [
+        (MemoryError("Unable to allocate 6 GiB"), True), (OSError(12, "Cannot allocate memory"), True),
+        (RuntimeError("can't start new thread"), True), (ImportError("x.so: failed to map segment"), True),
+        (OSError(2, "No such file"), False), (RuntimeError("other"), False),
+        (ValueError("cannot allocate memory"), False),
+    ],
+)  # fmt: skip
+def test_what_says_that_memory_ran_out(error: BaseException, memory: bool, monkeypatch, capsys) -> None:
+    assert out_of_memory(error) is memory
+
+    def fails(*args: object, **kwargs: object) -> int:
+        raise error
+
+    monkeypatch.setattr(cli, "app", fails)
+    if memory:
+        assert cli.main(["info"]) == 3
+        assert capsys.readouterr().err == f"finger3d: {OUT_OF_MEMORY}\n"
+    else:
+        with pytest.raises(type(error)):
+            cli.main(["info"])
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "press --no-figures --out OUT", "sensitivity --of gauge_g --out OUT", "cost", "sweep --workers 1 --out OUT "
+        "--vary friction.mu=0.1,0.2", "identify --measured CSV --free material.E_MPa=0.1:1 --out OUT",
+        "optimise --budget 1 --free gauge.g.x_mm=1:2 --out OUT", "optimise --gauges 1 --out OUT",
+        "calibrate --gauge g --out OUT",
+    ],
+)  # fmt: skip
+def test_an_increment_that_does_not_converge_is_exit_code_3(command: str, tmp_path: Path, capsys) -> None:
+    """No force of 1000 N is reached in a finger 5 mm high and 2 mm wide with E = 1 MPa."""
+    scene, csv = tmp_path / "scene.toml", tmp_path / "bench.csv"
+    scene.write_text(HALF_CYLINDER.replace("depth_mm = 0.5", "force_N = 1e3"))
+    csv.write_text("step,gauge_g\n1,0.01\n2,0.02\n4,0.05\n")
+    name, *options = command.replace("OUT", str(tmp_path / "out")).replace("CSV", str(csv)).split()
+    assert cli.main([name, str(scene), *options]) == 3
+    assert "the prescribed force is not reached" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_termination_is_an_interruption(name: str) -> None:
+    number = getattr(signal, name)
+    outside = signal.signal(number, signal.SIG_DFL)  # under nohup, SIGHUP would be ignored
+    try:
+        with pytest.raises(KeyboardInterrupt), termination_interrupts():
+            signal.raise_signal(number)
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, outside)
+
+
+def test_an_ignored_hangup_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with termination_interrupts():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_commands_run_outside_the_main_thread() -> None:
+    def run() -> None:
+        with termination_interrupts():
+            done.append(True)
+
+    done: list[bool] = []
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert done
+
+
+def wait() -> None:
+    end = time.monotonic() + 10.0
+    while time.monotonic() < end:
+        pass
+
+
+@pytest.mark.parametrize("converted", [False, True], ids=["caught", "turned into an ImportError"])
+def test_an_interruption_that_a_package_catches_is_raised_again(converted: bool) -> None:
+    def package() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException as error:
+            if converted:
+                raise ImportError from error
+
+    def work() -> None:
+        with suppress(ImportError):  # as where an extra is looked for
+            package()
+        wait()
+
+    with pytest.raises(KeyboardInterrupt), termination_interrupts():
+        work()
+
+
+def test_one_interruption_is_one_exception_while_what_is_done_is_kept() -> None:
+    """The exception lives while blocks end, however long that takes, and when the command has answered it is over."""
+    kept = False
+    with termination_interrupts():
+        try:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            finally:
+                time.sleep(0.1)
+                kept = True
+        except KeyboardInterrupt:
+            pass
+    time.sleep(0.1)
+    assert kept
+
+
+class Referent:
+    """An object that can be referred to weakly."""
+
+
+def test_an_interruption_in_a_callback_of_a_weak_reference_is_raised_again(capfd: pytest.CaptureFixture[str]) -> None:
+    """As while a module is imported, whose lock is such a reference: Python prints the exception and drops it."""
+
+    def interrupted(reference: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    def work() -> None:
+        referents.clear()
+        wait()
+
+    referents = [Referent()]
+    reference = weakref.ref(referents[0], interrupted)
+    hook = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), termination_interrupts():
+        work()
+    assert reference() is None
+    assert sys.unraisablehook is hook
+    assert "Exception ignored" not in capfd.readouterr().err
+
+
+def test_other_exceptions_of_callbacks_are_still_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[type[BaseException]] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda dropped: told.append(dropped.exc_type))
+
+    def broken(reference: object) -> None:
+        raise ValueError
+
+    with termination_interrupts():
+        referent = Referent()
+        reference = weakref.ref(referent, broken)
+        del referent
+    assert reference() is None
+    assert told == [ValueError]
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_an_interruption_after_the_work_ends_the_process_with_130(name: str) -> None:
+    code = (
+        "import signal, sys, time; import finger3d.__main__ as m; sys.argv = ['finger3d', 'schema']; "
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # under nohup, the child would inherit that it is ignored
+        f"m.main(); signal.raise_signal(signal.{name}); time.sleep(20)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 130
+    assert done.stderr == ""

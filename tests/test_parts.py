@@ -24,8 +24,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Taxel
-from tests.meshes import edge_load, full, grid
+from tests.meshes import full, grid
 from tests.models import last, marched
+from validation._common import side_load
 
 BODY = Isotropic(0.5, 0.45)
 EFFECTS: dict[str, dict[str, Any]] = {
@@ -173,7 +174,7 @@ def test_a_skin_on_a_half_space_gives_way_as_the_layered_closed_form_says(
         part = (y[mesh.cells].mean(axis=1) > 4.0).astype(np.int64)
         body = quadratic(replace(mesh, points=points, part=part, part_labels=("skin",)))
         matrix = full(stiffness(body, elasticity_of((below, layer), body, False)).upper)
-        pressure = edge_load(body, "y+", lambda at: np.stack([np.zeros(len(at)), -np.cos(k * at[:, 0])], axis=1))
+        pressure = side_load(body, "y+", lambda at: np.stack([np.zeros(len(at)), -np.cos(k * at[:, 0])], axis=1))
         load = np.zeros(matrix.shape[0])
         load[: pressure.size] = pressure.ravel()
         sides = np.flatnonzero((body.points[:, 0] == 0.0) | (body.points[:, 0] == 1.0))

@@ -1,7 +1,8 @@
-"""The site: its tables are complete; in a browser, its pages open, and its links lead somewhere."""
+"""The site, its sketches, and the notebook."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -14,9 +15,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import finger3d
+from finger3d._notebook import card
 from finger3d.cli import main
 from tests.scenes import HALF_CYLINDER, SECTION
 
@@ -197,3 +201,35 @@ def test_generated_tables_keep_their_columns(root: Path) -> None:
 def test_a_figure_of_the_gallery_leads_to_its_full_size(site: Path) -> None:
     gallery = (site / "gallery.html").read_text(encoding="utf-8")
     assert re.search(r'<a [^>]*href="_images/gear\.png"><img [^>]*src="_images/gear\.png"', gallery)
+
+
+def test_the_script_draws_the_sketches_that_open_the_pages(root: Path, tmp_path: Path) -> None:
+    spec = importlib.util.spec_from_file_location("sketches", root / "docs" / "_sketches.py")
+    assert spec
+    assert spec.loader
+    sketches = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sketches)
+    sketches.draw(tmp_path)
+    theory = root / "docs" / "theory"
+    names = {path.stem for path in tmp_path.iterdir()}
+    assert names == {path.stem for path in theory.glob("*.png")}
+    assert names == {path.stem for path in theory.glob("*.md")} - {"index", "solutions"}
+    for name in names:
+        drawn, kept = (np.asarray(Image.open(folder / f"{name}.png"), dtype=float) for folder in (tmp_path, theory))
+        assert drawn.shape == kept.shape
+        assert np.abs(drawn - kept).mean() < 1.0
+        opening = (theory / f"{name}.md").read_text(encoding="utf-8").split("$")[0]
+        assert f"]({name}.png)\n\n" in opening
+        assert len(opening.split()) > 40
+
+
+def test_all_text_is_escaped() -> None:
+    html = card("<t>", "<s>", [("<r>",)], ["<n>"], ["<f>"], ["<h>"])
+    assert all(f"&lt;{letter}&gt;" in html for letter in "tsrnfh")
+    assert not any(f"<{letter}>" in html for letter in "trnfh")
+
+
+def test_a_table_and_remarks_are_shown_only_where_there_are_some() -> None:
+    assert card("title", "status") == "<div><b>title</b>: status</div>"
+    assert "1 remark<" in card("title", "status", folded=["one"])
+    assert "2 remarks<" in card("title", "status", folded=["one", "two"])

@@ -6,13 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect
-from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.objects import Sphere
+from finger3d.mechanics.model import Gauge, Leg, Model
+from tests import models
 
 TWO = ((0.5, 1.0), (0.2, 0.1))
 RAMP = (Leg(0.3, steps=6, duration_s=1.0),)
@@ -21,12 +18,8 @@ UP_AND_DOWN = (*RAMP_AND_HOLD, Leg(0.0, steps=4, duration_s=0.5), Leg(0.0, steps
 
 
 def block(**changes: object) -> Model:
-    body = designs()["block"](half_length_mm=4.0, height_mm=3.0, width_mm=4.0)
-    model = Model(
-        body, Isotropic(1.0, 0.3), MeshOptions(0.8, 1.2, "swept"), UP_AND_DOWN, object=Sphere(radius_mm=4.0),
-        friction=Coulomb(0.25), gauges=(Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),),
-    )  # fmt: skip
-    return replace(model, **changes)
+    """A block under a ball that comes and goes, with a gauge."""
+    return models.block(**{"gauges": (Gauge("g", 0.0, 1.5, 0.0, 0.0, 2.0),), "legs": UP_AND_DOWN} | changes)
 
 
 def viscous(problem: Problem, prony: tuple = TWO, bulk: bool = True, **changes: object) -> Problem:
@@ -38,10 +31,6 @@ def mean_relaxation(prony: tuple, low: np.ndarray, high: np.ndarray) -> np.ndarr
     total = (1.0 - sum(g for g, _ in prony)) * (high - low)
     total += sum(g * tau * (np.exp(-low / tau) - np.exp(-high / tau)) for g, tau in prony)
     return total / (high - low)
-
-
-def relaxation(prony: tuple, t: np.ndarray) -> np.ndarray:
-    return 1.0 - sum(g * (1.0 - np.exp(-t / tau)) for g, tau in prony)
 
 
 def scene_of(effect: dict, domain: str = "solid", legs: tuple = ({"depth_mm": 1.0, "duration_s": 1.0},)) -> dict:

@@ -28,7 +28,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import strain_row
 from finger3d.geometry.registry import designs
-from finger3d.meshing.structured.grid import Sizes, rows, triangulate
+from finger3d.meshing.structured.grid import Sizes, rows
 
 from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
 from ._press import under
@@ -44,8 +44,8 @@ def linear_mesh(nodes: int) -> Mesh:
     section = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0).section()
     found = []
     for size in np.linspace(0.3, 2.0, 171):
-        grid = triangulate(rows(section, Sizes(size, size, 0.0, 5.0)))
-        found.append(unfold(Mesh(grid.points, grid.cells, grid.facets), (0,))[0])
+        grid = rows(section, Sizes(size, size, 0.0, 5.0))
+        found.append(unfold(Mesh(grid.points, grid.triangulated()[0], grid.facets), (0,))[0])
     return min(found, key=lambda mesh: abs(len(mesh.points) - nodes))
 
 

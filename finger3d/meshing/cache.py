@@ -35,7 +35,6 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()
     except (OSError, TypeError):  # a design typed at a prompt has no file: its meshes serve this process only
         code = f"{id(type(design))} of {os.getpid()}"
-    netgen = options.mesher == "netgen"
     text = json.dumps(
         {
             **design.cache_fields,
@@ -43,7 +42,7 @@ def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...
             "sizes": [repr(float(options.size_mm)), repr(float(options.base_size_mm))],
             "zone": [repr(float(z)) for z in zone],
             "symmetry": sorted(symmetry),
-            "versions": {name: _version(name) for name in _PACKAGES["netgen" if netgen else "ftetwild"]},
+            "versions": {name: _version(name) for name in _PACKAGES[options.mesher]},
         },
         sort_keys=True,
     )

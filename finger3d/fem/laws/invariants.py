@@ -95,18 +95,14 @@ class InvariantLaw(ABC):
         inverse = 1.0 / square
         by = self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1))
         g1, g2 = 2.0 * square, -2.0 * inverse
-        stress, diagonal = _wide1(by.w1) * g1, _wide1(by.w1) * 2.0 * g1
+        stress, diagonal = by.w1[..., None] * g1, by.w1[..., None] * 2.0 * g1
         if by.w2 is not None:
-            stress, diagonal = stress + _wide1(by.w2) * g2, diagonal - _wide1(by.w2) * 2.0 * g2
+            stress, diagonal = stress + by.w2[..., None] * g2, diagonal - by.w2[..., None] * 2.0 * g2
         out = diagonal[..., None] * np.eye(3)
         for w, a, b in ((by.w11, g1, g1), (by.w12, g1, g2), (by.w12, g2, g1), (by.w22, g2, g2)):
             if w is not None:
                 out = out + _wide(w) * a[..., :, None] * b[..., None, :]
         return stress, out
-
-
-def _wide1(scalar: Float) -> Float:
-    return scalar[..., None]
 
 
 def _wide(scalar: Float) -> Float:

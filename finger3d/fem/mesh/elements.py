@@ -126,9 +126,9 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     """Barycentric points (q, dim + 1) and weights (q,) that sum to the reference simplex's volume 1/dim!.
 
     In 1D it is Gauss and Legendre's rule. Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix
-    1973), degree 3 in 3D is Keast's 5-point rule (1986), whose weight at the centre is negative, degree 5 in 2D is
-    Radon's symmetric 7-point rule (1948) and in 3D the symmetric 14-point rule of Walkington (2000). Any other is a
-    Gauss-Jacobi product on the collapsed square or cube (Stroud 1971): positive weights, but not symmetric.
+    1973), degree 3 in 3D is Keast's 5-point rule (1986), whose weight at the centre is negative, and degree 5 in 2D is
+    Radon's symmetric 7-point rule (1948). Any other is a Gauss-Jacobi product on the collapsed square or cube (Stroud
+    1971): positive weights, but not symmetric.
     """
     if dim == 1:
         x, w = np.polynomial.legendre.leggauss(degree // 2 + 1)
@@ -145,13 +145,6 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
         points = [np.full((1, 3), 1.0 / 3.0), *[np.full((3, 3), a) + (1.0 - 3.0 * a) * np.eye(3) for a in orbits]]
         values = [9.0 / 80.0, *[(155.0 - root) / 2400.0] * 3, *[(155.0 + root) / 2400.0] * 3]
         return np.vstack(points), np.array(values)
-    if degree == 5 and dim == 3:
-        orbits = [0.31088591926330060980, 0.092735250310891226402]
-        b = 0.045503704125649649492
-        near_edges = [[0.5 - b if k in edge else b for k in range(4)] for edge in EDGES[3].tolist()]
-        points = [*[np.full((4, 4), a) + (1.0 - 4.0 * a) * np.eye(4) for a in orbits], np.array(near_edges)]
-        values = [0.11268792571801585080, 0.073493043116361949544, 0.042546020777081466438]
-        return np.vstack(points), np.repeat(values, (4, 4, 6)) / 6.0
     if degree == 3 and dim == 3:
         ends = np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0
         return np.vstack([np.full((1, 4), 0.25), ends]), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)

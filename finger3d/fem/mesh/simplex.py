@@ -241,23 +241,21 @@ def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:
     """
     parent = np.arange(len(mesh.points))
     sign = np.ones_like(mesh.points)
-    of_cell, of_facet = mesh.element.mirrored, mesh.facet_element.mirrored
     for axis in axes:
         n = len(mesh.points)
         off = np.abs(mesh.points[:, axis]) > 0.0
         image = np.where(off, n + np.cumsum(off) - 1, np.arange(n))
-        flipped = mesh.points[off].copy()
-        flipped[:, axis] *= -1.0
-        flipped_sign = sign[off].copy()
-        flipped_sign[:, axis] *= -1.0
+        other = reflected(mesh, axis)
         plane = "symmetry_" + "xyz"[axis]
-        facets = {label: np.vstack([f, image[f][:, of_facet]]) for label, f in mesh.facets.items() if label != plane}
-        cells = np.vstack([mesh.cells, image[mesh.cells][:, of_cell]])
+        facets = {
+            label: np.vstack([f, image[other.facets[label]]]) for label, f in mesh.facets.items() if label != plane
+        }
+        cells = np.vstack([mesh.cells, image[other.cells]])
         part = None if mesh.part is None else np.tile(mesh.part, 2)
-        points = np.vstack([mesh.points, flipped])
+        points = np.vstack([mesh.points, other.points[off]])
         mesh = replace(mesh, points=points, cells=cells, facets=facets, part=part)
         parent = np.concatenate([parent, parent[off]])
-        sign = np.vstack([sign, flipped_sign])
+        sign = np.vstack([sign, np.where(np.arange(sign.shape[1]) == axis, -sign[off], sign[off])])
     return mesh, parent, sign
 
 

@@ -114,9 +114,7 @@ def extrapolated(mesh: Mesh, values: Float) -> Float:
     bary, _ = quadrature(d, 2)
     to_nodes = mesh.element.nodes @ np.linalg.inv(bary)
     local = np.einsum("kq,eq...->ek...", to_nodes, values.reshape(len(mesh.cells), d + 1, *values.shape[1:]))
-    corners = mesh.points[mesh.cells[:, : d + 1]]
-    volume = np.abs(np.linalg.det(np.diff(corners, axis=1)))
-    weights = np.broadcast_to(volume[:, None], mesh.cells.shape)
+    weights = np.broadcast_to(np.abs(signed_volumes(mesh))[:, None], mesh.cells.shape)
     total, weight = np.zeros((n, *values.shape[1:])), np.zeros(n)
     np.add.at(total, mesh.cells, local * weights.reshape(*weights.shape, *[1] * (values.ndim - 1)))
     np.add.at(weight, mesh.cells, weights)

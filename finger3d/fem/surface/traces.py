@@ -230,12 +230,7 @@ def strain_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
 
 def displacement_row(mesh: Mesh, point: Float, direction: Float) -> sp.csr_matrix:
     """Row (1, n d) of the displacement at `point` (d,) along `direction` (d,)."""
-    cells = _holding(mesh, point)
-    row = np.zeros(mesh.points.shape)
-    for cell, bary in cells:
-        values = mesh.element.shape(bary[None])[0]
-        np.add.at(row, mesh.cells[cell], np.outer(values, direction) / len(cells))
-    return sp.csr_matrix(row.reshape(1, -1))
+    return sp.csr_matrix(direction[None] @ displacement_rows(mesh, point, np.ones(mesh.dim)))
 
 
 def displacement_rows(mesh: Mesh, point: Float, signs: Float) -> sp.csr_matrix:
@@ -280,9 +275,10 @@ def values_over(mesh: Mesh, facets: Int, places: Float, lowest: bool = True) -> 
     """
     d = mesh.dim
     across = [0] if d == 2 else [0, 2]
-    face, bary = (
-        _edges_over(mesh.points[facets], places[:, 0]) if d == 2 else _triangles_over(mesh, facets, places, lowest)
-    )
+    if d == 2:
+        face, bary = _edges_over(mesh.points[facets], places[:, 0])
+    else:
+        face, bary = Triangles(mesh.points, facets[:, :3]).hits(places[:, 0], places[:, 2], lowest=lowest)
     there = face >= 0
     nodes = mesh.points[facets[face[there]]][:, :, across]
     element = mesh.facet_element
@@ -290,10 +286,6 @@ def values_over(mesh: Mesh, facets: Int, places: Float, lowest: bool = True) -> 
     row = np.repeat(np.flatnonzero(there), values.shape[1])
     column = facets[face[there]].ravel()
     return sp.csr_matrix((values.ravel(), (row, column)), shape=(len(places), len(mesh.points))), there
-
-
-def _triangles_over(mesh: Mesh, facets: Int, places: Float, lowest: bool) -> tuple[Int, Float]:
-    return Triangles(mesh.points, facets[:, :3]).hits(places[:, 0], places[:, 2], lowest=lowest)
 
 
 def _edges_over(coords: Float, x: Float) -> tuple[Int, Float]:

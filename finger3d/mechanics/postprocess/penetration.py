@@ -34,7 +34,7 @@ _ADVISE_ABOVE, _WARN_ABOVE = 0.01, 0.1
 _ORDER, _ORDER_AT_CREASE = 1.5, 0.7
 """Power of the edge length with which penetration falls: at the edge of contact, beyond which the gap opens with the
 distance to the power 1.5 (Johnson 1985, sec. 4.2), and at a sharp edge of the finger, where .5 to 1 were measured
-(tests/test_mechanics_penetration.py)."""
+(tests/test_mechanics_results.py)."""
 
 _MARGIN = 0.9
 """Edge length that is advised, over the one that follows: penetration depends on where contact ends between points."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from finger3d._types import Float, Int
+from finger3d._types import Int
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.io import atomic
 from finger3d.meshing.given.given import MAIN_BODY
@@ -66,7 +66,7 @@ def write_mesh_msh(path: Path, mesh: Mesh) -> None:
     count = len(mesh.points)
     text.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n3 1 0 {count}\n")
     text.writelines(f"{k}\n" for k in range(1, count + 1))
-    _write_rows(text, mesh.points, "%.17g")
+    np.savetxt(text, mesh.points, fmt="%.17g")
     total = len(mesh.cells) + sum(len(facets) for _, facets in surfaces)
     text.write(f"$EndNodes\n$Elements\n{len(groups)} {total} 1 {total}\n")
     first = 1
@@ -74,15 +74,11 @@ def write_mesh_msh(path: Path, mesh: Mesh) -> None:
         for k, (_, cells) in enumerate(entities, 1):
             text.write(f"{dim} {k} {kind} {len(cells)}\n")
             ordered = cells[:, _GMSH_TET10_ORDER] if dim == 3 else cells
-            _write_rows(text, np.column_stack([first + np.arange(len(cells)), ordered + 1]), "%d")
+            np.savetxt(text, np.column_stack([first + np.arange(len(cells)), ordered + 1]), fmt="%d")
             first += len(cells)
     text.write("$EndElements\n")
     with atomic(path) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
-
-
-def _write_rows(text: io.StringIO, rows: Float | Int, form: str) -> None:
-    np.savetxt(text, rows, fmt=form)
 
 
 def _parts(mesh: Mesh) -> tuple[Int, tuple[str, ...]]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -190,8 +189,3 @@ def thin_places(section: Section) -> tuple[Float, Float]:
 def _along(curve: Callable[[Float], Float], length: float, step: float) -> Float:
     """Points (n, 2) on a curve, about a step (mm) apart."""
     return curve(np.linspace(0.0, 1.0, int(np.clip(math.ceil(length / step), 50, 2000)) + 1))
-
-
-def ranges(breaks: list[float], end: float) -> list[tuple[float, float]]:
-    """Return the ranges (from, to) into which parameters divide those from 0 to the end."""
-    return list(pairwise([0.0, *breaks, end]))

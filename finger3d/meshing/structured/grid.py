@@ -15,7 +15,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.geometry.section import Arc, Core, Flat, Section
 from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.structured.bands import Band, Bands, bands, ranges, thin_places
+from finger3d.meshing.structured.bands import Band, Bands, bands, thin_places
 
 STRUCTURED_GROWTH = 0.25
 """Growth of the edge length per length away from the contact zone."""
@@ -95,30 +95,10 @@ class GridLayout:
     facets: Mapping[str, Int]
     curves: tuple[tuple[Arc | Flat, Float], ...]
 
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return len(self.points)
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Linear triangles of a half section.
-
-    Attributes
-    ----------
-    points : (n, 2) mm
-    cells : (m, 3) counter-clockwise
-    facets : label -> (k, 2) edges, outward
-    curves : see :class:`GridLayout`
-    part : (m,) number of the part of each triangle
-    """
-
-    points: Float
-    cells: Int
-    facets: Mapping[str, Int]
-    curves: tuple[tuple[Arc | Flat, Float], ...]
-    part: Int
+    def triangulated(self) -> tuple[Int, Int]:
+        """Return the triangles (m, 3) between the rows, counter-clockwise, and the number (m,) of the part of each."""
+        cells = [_zip(s.upper, s.lower, s.at_upper, s.at_lower) for s in self.strips]
+        return np.vstack(cells), np.repeat([s.part for s in self.strips], [len(c) for c in cells])
 
 
 def folded_zone(zone: tuple[float, float, float, float], half_length: float) -> tuple[float, float]:
@@ -198,13 +178,7 @@ def _with_thin_places(section: Section, sizes: Sizes) -> Sizes:
     """Return the sizes with edge lengths that follow from the thickness of the parts."""
     points, wanted = thin_places(section)
     few = wanted < sizes.at(points[:, :2], section)
-    if not few.any():
-        return sizes
-    present = sizes.grading or Grading(np.zeros((0, 3)), np.zeros(0))
-    return replace(
-        sizes,
-        grading=Grading(np.vstack([present.points, points[few]]), np.concatenate([present.sizes, wanted[few]])),
-    )
+    return replace(sizes, grading=Grading(points[few], wanted[few])) if few.any() else sizes
 
 
 def _samples(section: Section, sizes: Sizes, division: Bands) -> Float:
@@ -252,7 +226,7 @@ def _on_row(section: Section, sizes: Sizes, u: Float, row_places: list[_Place], 
     if not breaks:
         return _spread(u, points, size, 2 if first else 1)
     pieces = []
-    for low, high in ranges(breaks, float(u[-1])):
+    for low, high in pairwise([0.0, *breaks, float(u[-1])]):
         inside = (low <= u) & (u <= high)
         pieces.append(_spread(u[inside], points[inside], size[inside], 1))
     return np.concatenate([pieces[0], *(p[1:] for p in pieces[1:])])
@@ -361,10 +335,3 @@ def _zip(upper: Int, lower: Int, at_upper: Float, at_lower: Float) -> Int:
     down = np.stack([upper[:-1], lower[below], upper[1:]], axis=1)
     up = np.stack([lower[:-1], lower[1:], upper[above]], axis=1)
     return np.vstack([down, up])
-
-
-def triangulate(layout: GridLayout) -> Grid:
-    """Turn rows into triangles with labelled edges."""
-    cells = [_zip(s.upper, s.lower, s.at_upper, s.at_lower) for s in layout.strips]
-    part = np.repeat([s.part for s in layout.strips], [len(c) for c in cells])
-    return Grid(layout.points, np.vstack(cells), layout.facets, layout.curves, part)

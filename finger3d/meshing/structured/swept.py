@@ -17,7 +17,7 @@ from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.limits import check_count, check_sizes
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.grid import Grid, GridLayout, Sizes, folded_zone, rows, triangulate
+from finger3d.meshing.structured.grid import GridLayout, Sizes, folded_zone, rows
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh
@@ -39,9 +39,8 @@ def mesh_section(
     check_sizes(design, options, 2)
     axes = tuple(_AXIS[a] for a in ("x",) if a not in symmetry)
     grid, section = _grid(design, options, zone, 2, _copies(design, options, 2, symmetry))
-    mesh = _on_curves(
-        quadratic(_with_parts(Mesh(grid.points, grid.cells, grid.facets), section, grid.part)), grid.curves
-    )
+    cells, part = grid.triangulated()
+    mesh = _on_curves(quadratic(_with_parts(Mesh(grid.points, cells, grid.facets), section, part)), grid.curves)
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
     multiple = design.width_mm * (2 - len(axes))
@@ -62,7 +61,8 @@ def mesh_swept(
     axes = tuple(_AXIS[a] for a in ("x", "z") if a not in symmetry)
     grid, section = _grid(design, options, zone, 3, _copies(design, options, 3, symmetry))
     levels = np.linspace(0.0, half, layers + 1)
-    swept = _with_parts(_sweep(grid, levels), section, np.tile(np.tile(grid.part, 3), layers))
+    triangles, part = grid.triangulated()
+    swept = _with_parts(_sweep(grid, triangles, levels), section, np.tile(part, 3 * layers))
     mesh = _on_curves(quadratic(swept), tuple((curve, np.tile(u, layers + 1)) for curve, u in grid.curves))
     whole = unfold(mesh, axes)[0]
     seconds = {"cad": 0.0, "mesh": time.perf_counter() - start}
@@ -72,7 +72,7 @@ def mesh_swept(
 
 def cell_count(design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...]) -> float:
     """Return the number of cells of a mesh of :func:`mesh_section` or :func:`mesh_swept`, without making it."""
-    return 2.0 * _layout(design, options, zone, dim)[0].count * _copies(design, options, dim, symmetry)
+    return 2.0 * len(_layout(design, options, zone, dim)[0].points) * _copies(design, options, dim, symmetry)
 
 
 def _layers(design: Design, options: MeshSizes) -> int:
@@ -98,11 +98,11 @@ def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
     )
 
 
-def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[Grid, Section]:
-    """Return the triangles of the half section; a mesh of `copies` cells per triangle must fit the memory."""
+def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[GridLayout, Section]:
+    """Return the rows of the half section; a mesh of `copies` cells per triangle must fit the memory."""
     layout, section = _layout(design, options, zone, dim)
-    check_count(2.0 * layout.count * copies, dim, options)
-    return triangulate(layout), section
+    check_count(2.0 * len(layout.points) * copies, dim, options)
+    return layout, section
 
 
 def _layout(design: Design, options: MeshSizes, zone: Zone, dim: int) -> tuple[GridLayout, Section]:
@@ -132,13 +132,13 @@ def _on_curves(mesh: Mesh, curves: tuple[tuple[Arc | Flat, Float], ...]) -> Mesh
     return replace(mesh, points=points)
 
 
-def _sweep(grid: Grid, levels: Float) -> Mesh:
-    """Sweep triangles through z levels (l + 1,) from 0, three tets a prism, and label the boundary."""
+def _sweep(grid: GridLayout, triangles: Int, levels: Float) -> Mesh:
+    """Sweep triangles (m, 3) through z levels (l + 1,) from 0, three tets a prism, and label the boundary."""
     n, layers = len(grid.points), len(levels) - 1
     points = np.hstack([np.tile(grid.points, (layers + 1, 1)), np.repeat(levels, n)[:, None]])
     # Sorted corners make neighbouring prisms split their common quadrilateral along the same diagonal.
-    order = np.argsort(grid.cells, axis=1)
-    a, b, c = np.take_along_axis(grid.cells, order, axis=1).T
+    order = np.argsort(triangles, axis=1)
+    a, b, c = np.take_along_axis(triangles, order, axis=1).T
     even = np.isin(order @ [9, 3, 1], [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1])[:, None]
     tets = [(a, b, c, c + n), (a, b, c + n, b + n), (a, b + n, c + n, a + n)]
     one = np.vstack([_oriented(np.stack(t, axis=1), even) for t in tets])
@@ -151,7 +151,7 @@ def _oriented(tets: Int, even: NDArray[np.bool_]) -> Int:
     return np.where(even, tets, tets[:, [1, 0, 2, 3]])
 
 
-def _labelled(grid: Grid, faces: Int, n: int, layers: int) -> dict[str, Int]:
+def _labelled(grid: GridLayout, faces: Int, n: int, layers: int) -> dict[str, Int]:
     """Labels of boundary triangles: by level at the ends, by the section's edge in between."""
     level, node = faces // n, faces % n
     out = {

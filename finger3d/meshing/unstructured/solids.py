@@ -73,7 +73,7 @@ def finer_in_layers(field: Sizing, body: Tessellation) -> Sizing:
 
     if not body.part_labels:
         return field
-    points, sizes = [np.zeros((0, 3))], [np.zeros(0)]
+    points, sizes = [], []
     for number in range(len(body.part_labels) + 1):
         if not len((surface := body.part(number)).faces):
             continue
@@ -82,8 +82,7 @@ def finer_in_layers(field: Sizing, body: Tessellation) -> Sizing:
         few = places[field.at(places) > limit]
         points.append(np.abs(few) * [1, 0, 1] + few * [0, 1, 0])  # where a Grading has its points
         sizes.append(np.full(len(few), limit))
-    present = field.grading or Grading(points[0], sizes[0])
-    grading = Grading(np.vstack([present.points, *points]), np.concatenate([present.sizes, *sizes]))
+    grading = Grading(np.vstack(points), np.concatenate(sizes))
     return replace(field, grading=grading) if len(grading.sizes) else field
 
 

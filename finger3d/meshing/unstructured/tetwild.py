@@ -19,6 +19,8 @@ from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.design import Design
+from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface_checks import mistake
 from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.refinement.sizing import Sizing, sizing
@@ -68,7 +70,7 @@ def new_mesh(
     field = finer_in_layers(field, body)
     cells = checked_tets(design, field, options)
     cad_seconds = time.perf_counter() - start
-    check_surface(body.points, body.surface)
+    check_surface(Triangles(body.points, body.surface))
     check_volume(design, body, symmetry)
     report.say(f"meshing, about {cells:.0f} tetrahedra")
     reasons = []
@@ -124,37 +126,21 @@ def _within_layers(design: Design, glued: Glued, epsilon: float, diagonal: float
     return epsilon
 
 
-def check_surface(points: Float, triangles: Int) -> None:
+def check_surface(surface: Triangles) -> None:
     """Raise a Finger3dError for a surface on which pytetwild crashes, hangs, or meshes another body."""
-    reason = surface_defect(points, triangles)
-    if reason:
-        raise Finger3dError(f"the finger's surface cannot be meshed: {reason}; mend the design or the file")
+    if reason := mistake(surface, may_be_hollow=True) or _unfit(surface):
+        raise Finger3dError(f"the finger's surface cannot be meshed: it {reason}; mend the design or the file")
 
 
-def surface_defect(points: Float, triangles: Int) -> str:
-    """Return what makes a surface unfit for pytetwild; empty if nothing does."""
-    if points.ndim != 2 or points.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) < 4:
-        return f"it needs (n, 3) points and at least 4 triangles (m, 3), and has {points.shape} and {triangles.shape}"
-    if not np.isfinite(points).all():
-        return "a point is not finite"
-    if triangles.min() < 0 or triangles.max() >= len(points):
-        return "a triangle names a point that does not exist"
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = high - low
-    diagonal = float(np.linalg.norm(extent))
-    if not 1e-2 < diagonal < 1e4:
-        return f"its diagonal is {diagonal:.3g} mm; allowed: 0.01 to 10000"
+def _unfit(surface: Triangles) -> str:
+    """Return what makes the extent of a surface unfit for pytetwild; empty if nothing does."""
+    extent = surface.high - surface.low
+    if not 1e-2 < surface.size < 1e4:
+        return f"has a diagonal of {surface.size:.3g} mm; allowed: 0.01 to 10000"
     if extent.min() <= 1e-3 * extent.max():
-        return f"it is {extent.min():.3g} mm thin and {extent.max():.3g} mm long; allowed: at most 1:1000"
-    if np.linalg.norm(points.mean(axis=0)) > 1e3 * diagonal:
-        return "it lies farther from the origin than 1000 times its size"
-    import trimesh
-
-    surface = trimesh.Trimesh(points, triangles, process=False)
-    if not surface.is_watertight:
-        return "it is not closed"
-    if not surface.is_winding_consistent or not surface.volume > 0.0:
-        return "its triangles do not all face outward"
+        return f"is {extent.min():.3g} mm thin and {extent.max():.3g} mm long; allowed: at most 1:1000"
+    if np.linalg.norm(surface.points.mean(axis=0)) > 1e3 * surface.size:
+        return "lies farther from the origin than 1000 times its size"
     return ""
 
 

@@ -1,0 +1,378 @@
+"""The path of a press: its increments, their order, and how they are halved."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from finger3d._cost import PressSize
+from finger3d.accuracy.estimate import press_numbers
+from finger3d.contact.friction import Coulomb, TwoCoefficients
+from finger3d.contact.rules import RULES
+from finger3d.contact.state import ContactSolution, ContactState
+from finger3d.effects.large_deformation import Effect as LargeDeformation
+from finger3d.errors import Finger3dError, Outcome
+from finger3d.fem.laws import NeoHooke
+from finger3d.fem.laws.material import Isotropic
+from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.march.parts import Substep, energies, solved_in_turn
+from finger3d.mechanics.march.solve import Press, march
+from finger3d.mechanics.march.step_halving import (
+    FEW_CUTS,
+    automatic,
+    errors_of_runs,
+    increment_error,
+    last_step,
+    limits,
+    march_automatic,
+    refine,
+    step_error,
+)
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.path import Station, stations, targets
+from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.objects import Cylinder, Move, ObjectPose, Plane
+from tests.models import block, fig9, half_cylinder, large_fig9, last, run
+from validation import increment_errors
+
+
+# validation/REFERENCES.md, 2.6, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
+@pytest.mark.parametrize(
+    ("depth", "force", "a", "c"),
+    [(0.2, 0.12668, 0.862, 0.639), (0.5, 0.40495, 1.508, 1.376), (1.0, 1.01932, 2.297, 2.230)],
+)
+def test_half_cylinder_in_plane_stress(depth: float, force: float, a: float, c: float) -> None:
+    size = 0.04
+    finger = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
+    model = Model(
+        finger, Isotropic(1.0, 0.3), MeshOptions(size, 0.5), (Leg(depth, steps=100),), friction=Coulomb(0.25),
+        domain="plane-stress",
+    )  # fmt: skip
+    got = last(model)
+    assert got["normal_force_N"] == pytest.approx(force, rel=0.01)
+    assert got["contact_half_length_mm"] == pytest.approx(a, abs=0.013 + size)
+    assert got["stick_half_length_mm"] == pytest.approx(c, abs=0.013 + size)
+    assert abs(got["tangential_force_x_N"]) < 1e-12
+
+
+def test_fig9_in_plane_strain_gives_26_4_newton_per_millimetre() -> None:
+    got = last(fig9(domain="plane-strain", mesh=MeshOptions(1.0, 4.0)))
+    assert got["normal_force_N"] / 20.0 == pytest.approx(26.4, rel=0.005)
+    assert 74.0 <= 2.0 * got["contact_half_length_mm"] <= 78.0  # at rest
+
+
+def test_fig9_as_a_solid_and_with_held_ends() -> None:
+    free = last(fig9())
+    assert free["normal_force_N"] == pytest.approx(305.0, rel=0.01)
+    assert abs(free["outward_friction_z_N"]) > 2.0 * abs(free["outward_friction_x_N"])  # mostly along the width
+    held = last(fig9(held_ends=True))
+    section = last(fig9(domain="plane-strain", mesh=MeshOptions(1.0, 4.0)))
+    assert held["normal_force_N"] == pytest.approx(section["normal_force_N"], rel=0.005)
+
+
+@pytest.mark.slow
+def test_swept_and_pytetwild_meshes_agree_within_one_percent() -> None:
+    swept, tetwild = last(fig9()), last(fig9(mesh=MeshOptions(2.0, 8.0, "ftetwild")))
+    assert tetwild["normal_force_N"] == pytest.approx(swept["normal_force_N"], rel=0.01)
+    assert tetwild["normal_force_N"] == pytest.approx(305.0, rel=0.01)
+
+
+def test_contact_forces_and_base_reaction_balance() -> None:
+    problem, frames = run(
+        block(symmetry=(), legs=(Leg(0.3, steps=2), Leg(0.3, slide_x_mm=0.1, slide_z_mm=0.05, steps=2)))
+    )
+    unknowns = problem.unknowns(frames[-1].meshed_state.contact.force)
+    full = problem.body.stiffness.upper + sp.triu(problem.body.stiffness.upper, 1).T
+    residual = (full @ unknowns)[: problem.mesh.points.size].reshape(problem.mesh.points.shape)
+    base = np.unique(problem.mesh.facets["base"])
+    contact = problem.points.to_global(frames[-1].state.force).sum(axis=0)
+    scale = np.abs(frames[-1].state.force).sum()
+    assert np.abs(residual[base].sum(axis=0) + contact).max() < 1e-10 * scale
+    assert np.abs(residual.sum(axis=0)).max() < 1e-10 * scale  # K moves no rigid body, so inner forces cancel
+
+
+def test_press_slide_release_returns_to_rest() -> None:
+    legs = (Leg(0.3, steps=3), Leg(0.3, slide_x_mm=0.5, steps=5), Leg(0.0, slide_x_mm=0.5, steps=3), Leg(0.3, steps=3))
+    problem, frames = run(block(legs=legs))
+    assert problem.axes == ("z",)
+    slid, released = measure(problem.points, frames[7]), measure(problem.points, frames[10])
+    pressed = frames[7].state.force[:, 0].sum()  # along the normals of the ball
+    assert pressed > slid["normal_force_N"]
+    assert slid["friction_sum_N"] == pytest.approx(0.25 * pressed, rel=1e-9)  # all slips
+    assert released["normal_force_N"] == 0.0
+    lost = [f.dissipation_mJ for f in frames]
+    assert all(b >= a for a, b in zip(lost, lost[1:], strict=False))
+
+
+def test_tilted_plane_pushes_along_its_own_normal() -> None:
+    tilt = np.deg2rad(5.0)
+    body = block(object=Plane(tilt=tilt), friction=Coulomb(0.0), legs=(Leg(0.5, steps=2),))
+    problem, frames = run(body)
+    world = problem.points.with_basis_of(frames[-1].state).to_global(frames[-1].state.force).sum(axis=0)
+    assert world[0] / -world[1] == pytest.approx(np.tan(tilt), rel=1e-12)
+    assert world[1] < 0
+
+
+def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build(block(object=Plane(), legs=(Leg(0.3, steps=1),)))
+    true_rule = RULES["projection"]
+
+    def timid(contact, guess=None):  # fails on strides above a quarter of the leg
+        found = true_rule(contact, guess)
+        if np.abs(contact.free_motion[:, 0] - timid.gap).max() > 0.076:
+            return replace(found, state=contact.previous, outcome=Outcome.NO_CONVERGENCE)
+        timid.gap = contact.free_motion[:, 0]
+        return found
+
+    timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
+    monkeypatch.setitem(RULES, "projection", timid)
+    (cut,) = march(problem)
+    timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
+    with pytest.raises(Finger3dError, match="did not converge"):
+        last_step(problem, cuts=FEW_CUTS)  # as for an estimate: two halvings are needed
+    monkeypatch.undo()
+    four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))
+    assert cut.method == "cut back"
+    assert cut.outcome.ok
+    np.testing.assert_allclose(cut.state.force, four[-1].state.force, atol=1e-14)
+    assert cut.dissipation_mJ == pytest.approx(four[-1].dissipation_mJ, rel=1e-12)
+
+
+def test_an_increment_from_whose_end_the_path_does_not_go_on_is_repeated_in_halves() -> None:
+    """The energies are those of the halves, as on the path with one more station."""
+    problem = build(block(object=Plane(), legs=(Leg(0.6, steps=2),)))
+    press, dead_ends = Press(problem), list[ContactState]()
+    true_increment = press.formulation.increment
+
+    class WithDeadEnds:
+        def __getattr__(self, name: str) -> Any:
+            return getattr(formulation_of(problem.model), name)
+
+        def increment(self, problem: Any, state: Any, move: Move, *rest: Any) -> Any:
+            if any(state.contact is end for end in dead_ends):
+                return ContactSolution(state, Outcome.NEWTON, np.inf, 1, "none")
+            found = true_increment(problem, state, move, *rest)
+            if not state.contact.force.any() and move.end.depth_mm > 0.2:
+                dead_ends.append(found.state.contact)
+            return found
+
+    press.formulation = WithDeadEnds()
+    first, second = (press.advance(station) for station in stations(problem.model.legs))
+    assert first.outcome.ok
+    assert second.outcome.ok
+    other = Press(problem)
+    for depth in (0.15, 0.3, 0.6):
+        last = other.advance(Station(ObjectPose(depth)))
+    np.testing.assert_allclose(second.state.force, last.state.force, rtol=1e-9, atol=1e-12)
+    assert second.external_work_mJ == pytest.approx(last.external_work_mJ, rel=1e-9)
+    assert second.dissipation_mJ == pytest.approx(last.dissipation_mJ, rel=1e-9)
+
+
+def test_the_papers_rule_goes_on_from_a_state_in_which_friction_helps_slip() -> None:
+    legs = (Leg(10.0, steps=1), Leg(10.0, slide_x_mm=0.5, steps=1))
+    mesh, rule = MeshOptions(4.0, 6.0), "paper"
+    model = fig9(domain="plane-strain", mesh=mesh, friction=Coulomb(1e-6), legs=legs, rule=rule)
+    pressed, slid = march(build(replace(model, material=Isotropic(1.0, 0.3))))
+    assert pressed.outcome is Outcome.WRONG_WAY
+    assert pressed.state.force[:, 0].sum() > 1.0
+    assert slid.outcome is Outcome.CONVERGED  # with all points slipping the same way
+    assert slid.state.force[:, 0].sum() == pytest.approx(pressed.state.force[:, 0].sum(), rel=1e-6)
+
+
+def test_held_ends_are_no_contact_points_at_large_deformation() -> None:
+    """Their points cannot move along z, and would have no compliance in that direction."""
+    problem = build(LargeDeformation().apply(fig9(held_ends=True)), margin=math.inf)
+    assert FREE_FACES.index("ends") not in problem.surface.face
+    assert np.diagonal(problem.delassus.reshape(problem.surface.points.size, -1)).min() > 0.0
+
+
+def test_energies_of_parts_add_up() -> None:
+    problem = build(replace(half_cylinder(0.3), object=Cylinder(radius_mm=10.0)))
+    press = Press(problem)
+    frames = [press.advance(station) for station in stations(problem.model.legs)]
+    ends = [(press.formulation.start(problem), problem.origin)]
+    ends += [(state, pose) for frame in frames for pose, state in frame.parts]
+    parts = [Substep(a, b, Move(one, other)) for (a, one), (b, other) in pairwise((s, p) for s, p in ends)]
+    work, lost = energies(problem, parts)
+    assert work == pytest.approx(frames[-1].external_work_mJ, rel=1e-12)
+    assert lost == pytest.approx(frames[-1].dissipation_mJ, rel=1e-12)
+    assert energies(problem, []) == (0, 0)
+
+
+def test_an_increment_begins_at_the_end_of_a_similar_one() -> None:
+    problem = build(large_fig9(0.45, 4.0))
+    press = Press(problem)
+    moves = press.moves_to(ObjectPose(4.0))
+    first, parts = solved_in_turn(problem, press.workspace, press.state, moves, 6)
+    assert len(parts) == len(moves) == 3
+    again, _ = solved_in_turn(problem, press.workspace, press.state, moves, 6, near=parts)
+    assert first.outcome.ok
+    assert again.outcome.ok
+    # one contact solution an iteration: those that remain bring down errors of 5e-9 with the tangent of another part
+    assert again.iterations < 0.5 * first.iterations
+    assert np.allclose(again.state.body.unknowns, first.state.body.unknowns, atol=1e-7)
+
+
+NAMES = ("normal_force_N", "friction_sum_N", "dissipation_mJ")
+COUNTS = (10, 20, 40, 80)
+QUICK = ("section on a bar", "solid on a plane")
+SLOW = ("bar is released", "bar slides", "with viscosity", "solid on a ball", "at large deformation")
+
+
+def numbers(problem: Problem, count: int) -> np.ndarray:
+    legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
+    end = list(march(replace(problem, model=replace(problem.model, legs=legs))))[-1]
+    assert end.outcome.ok
+    measured = measure(problem.points, end)
+    return np.array([measured[name] for name in NAMES])
+
+
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
+def test_errors_fall_at_second_order(name: str) -> None:
+    # points touch one by one, so that single ratios scatter widely about 4: the median is taken, and the whole fall
+    press = next(press for press in increment_errors.presses(quick=False) if press.name == name)
+    problem = build(replace(press.model, friction=Coulomb(press.mu)))
+    exact = numbers(problem, 160 if press.model.finite_strain else 320)
+    errors = np.abs([numbers(problem, count) / exact - 1.0 for count in COUNTS])
+    assert np.median(errors[:-1] / errors[1:]) >= 3.3
+    assert (errors[-1] <= errors[0] / 10.0).all()
+    assert errors[1, 0] <= 1e-3
+    assert errors[1, 1] <= 1e-2
+
+
+def test_a_touch_so_light_that_gaps_are_at_the_round_off_of_coordinates_converges() -> None:
+    # the first part of the increment is 7e-7 mm deep on a block 200 mm high, whose coordinates are exact to 3e-14 mm
+    block = designs()["block"](half_length_mm=200.0, height_mm=200.0, width_mm=1.0)
+    bar = Cylinder(radius_mm=1000.0)
+    model = Model(
+        block, Isotropic(1.0, 0.3), MeshOptions(0.05, 25.0, "swept"), (Leg(1.1e-5, steps=1),), object=bar,
+        friction=Coulomb(0.25), domain="plane-strain",
+    )  # fmt: skip
+    (end,) = march(build(model, margin=-0.5))
+    assert end.outcome.ok
+
+
+def test_automatic_increments_end_within_their_estimate() -> None:
+    problem = build(fig9(domain="plane-strain", object=Cylinder(radius_mm=80.0), legs=(Leg(10.0, steps="auto"),)))
+    seen: list[tuple[int, int]] = []
+    *_, (frames, estimate) = refine(problem, advanced=lambda done, total, step: seen.append((done, total)))
+    assert seen[:6] == [*((k, 5) for k in range(1, 6)), (1, 10)]
+    assert seen[-1] == (len(frames), len(frames))
+    assert estimate is not None
+    assert estimate.met
+    assert max(estimate.normal_force, estimate.friction_sum, estimate.gauges) <= 0.01
+    assert estimate.dissipation <= 0.05
+    assert [count for count, _ in estimate.runs] == [5 * 2**k for k in range(len(estimate.runs))]
+    assert len(estimate.runs) >= 3
+    fine = list(march(replace(problem, model=replace(problem.model, legs=(Leg(10.0, steps=4 * len(frames)),)))))
+    a, b = measure(problem.points, frames[-1]), measure(problem.points, fine[-1])
+    assert a["normal_force_N"] == pytest.approx(b["normal_force_N"], rel=0.01)
+    assert a["friction_sum_N"] == pytest.approx(b["friction_sum_N"], rel=0.01)
+    assert a["dissipation_mJ"] == pytest.approx(b["dissipation_mJ"], rel=0.05)
+    assert a["gauges"]["g36"] == pytest.approx(b["gauges"]["g36"], rel=0.01)
+
+
+def stuck(**changes: object) -> Model:
+    """The Fig. 9 section in plane stress under a bar, at a large coefficient of friction: nearly all of it sticks."""
+    model = fig9(
+        domain="plane-stress", material=Isotropic(1.0, 0.485), friction=Coulomb(0.988), mesh=MeshOptions(2.9, 11.6),
+        object=Cylinder(radius_mm=80.0),
+    )  # fmt: skip
+    return replace(model, **changes)
+
+
+def test_errors_of_a_press_that_sticks_are_within_twice_their_estimate() -> None:
+    model = stuck()
+    problem = build(model)
+    told = {}
+    for steps in (5, 10, 20, 40, 320):
+        trial = replace(problem, model=replace(model, legs=(Leg(10.0, steps=steps),)))
+        told[steps] = press_numbers(trial, list(march(trial))[-1])
+        if steps < 320:
+            bars = step_error(trial, told[steps], press_numbers, 2.0)
+            told[steps] |= {f"bar {name}": bar for name, bar in bars.items()}
+    for steps in (5, 10, 20, 40):
+        for name in ("normal_force_N", "friction_sum_N", "gauge_g36", "external_work_mJ", "dissipation_mJ"):
+            assert abs(told[steps][name] - told[320][name]) <= 2.0 * told[steps][f"bar {name}"], (steps, name)
+
+
+@pytest.mark.parametrize("name", ["rule", "branch"])
+def test_rules_that_have_no_limit_in_increments_take_ten(name: str) -> None:
+    model = block(legs=(Leg(0.3, steps="auto"),), object=Plane(), friction=Coulomb(0.05))
+    literal = {"rule": {"rule": "paper"}, "branch": {"friction": TwoCoefficients(0.1, 0.7, "paper")}}[name]
+    assert automatic(model)
+    frames, estimate = march_automatic(build(replace(model, **literal)))
+    assert estimate is None
+    assert len(frames) == 10
+
+
+def test_a_run_in_few_increments_that_fails_does_not_fail_the_press(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = build(block(object=Plane(), legs=(Leg(0.3, steps="auto"),)))
+    true_rule = RULES["projection"]
+
+    def timid(contact, guess=None):  # fails from an increment above 0.3 / 8 mm on, so that cutting it does not help
+        found = true_rule(contact, guess)
+        timid.failed |= bool(np.abs(contact.free_motion[:, 0] - timid.gap).max() > 0.3 / 8)
+        if timid.failed:
+            return replace(found, state=contact.previous, outcome=Outcome.NO_CONVERGENCE)
+        timid.gap = contact.free_motion[:, 0]
+        return found
+
+    start = problem.gap(problem.origin)
+    timid.gap, timid.failed = start, False
+    monkeypatch.setitem(RULES, "projection", timid)
+    true_march = march
+
+    def anew(problem: Problem, **arguments: Any):
+        timid.gap, timid.failed = start, False
+        return true_march(problem, **arguments)
+
+    monkeypatch.setattr("finger3d.mechanics.march.step_halving.march", anew)
+    frames, estimate = march_automatic(problem)
+    assert frames[-1].outcome.ok
+    assert estimate is not None
+    assert estimate.runs[0][0] == 10
+
+
+def test_a_failure_before_the_automatic_legs_is_not_repeated() -> None:
+    legs = (Leg(0.2, steps=2, force_N=1e6), Leg(0.1))
+    solved = list[StepResult]()
+    ((results, estimate),) = refine(
+        build(block(legs=legs, domain="plane-strain")), advanced=lambda done, total, step: solved.append(step)
+    )
+    assert [step.outcome for step in solved] == [step.outcome for step in results] == [Outcome.FORCE_NOT_REACHED]
+    assert estimate is None
+
+
+@pytest.mark.parametrize("ratio", [0.25, 0.5, 2.0])
+def test_the_error_is_exact_at_first_order(ratio: float) -> None:
+    value, other = (3.0 + 1.0 / n for n in (20.0, 20.0 * ratio))
+    assert increment_error(value, other, ratio) == pytest.approx(1.0 / 20.0, rel=1e-9)
+
+
+def test_two_runs_that_agree_by_chance_do_not_hide_the_error_of_those_before() -> None:
+    runs = [(10, {"x": 1.4, "y": 1.0}), (20, {"x": 1.0, "y": 1.3}), (40, {"x": 1.0, "y": 1.0})]
+    assert errors_of_runs(runs) == pytest.approx({"x": 0.4 * 0.5**1.5, "y": 0.3})
+    assert errors_of_runs(runs[1:]) == pytest.approx({"x": 0.0, "y": 0.3})
+
+
+@pytest.mark.parametrize("domain", ["solid", "plane-strain"])
+def test_most_automatic_increments_fall_with_the_size_of_the_contact(domain: Domain) -> None:
+    model = fig9(domain=domain)
+    found = [
+        limits(model, PressSize(2 if domain == "plane-strain" else 3, 1e4 * points, points))
+        for points in (30, 300, 3000)
+    ]
+    assert all(first == 5 and last >= 20 for first, last in found)
+    assert found[0][1] >= found[1][1] >= found[2][1]
+    assert limits(replace(model, hyperelastic_law=NeoHooke(1.0)), PressSize(3, 1e4, 100)) == (3, 12)
