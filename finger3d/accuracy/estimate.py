@@ -30,7 +30,7 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, by_key, in_space
+from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, SLIP, by_key, in_space
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
@@ -59,9 +59,9 @@ class ErrorEstimate(ErrorBars):
 
 
 def main_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
-    """Return forces, lengths and areas of contact and stick, and readings, by name."""
+    """Return forces, lengths and areas of contact and stick, what is left until slip, and readings, by name."""
     numbers = measure(problem.points, step)
-    return {name: numbers[name] for name in (*MAIN, *AREAS)} | by_key(step.readings)
+    return {name: numbers[name] for name in (*MAIN, *AREAS, *SLIP)} | by_key(step.readings)
 
 
 def press_numbers(problem: Problem, step: StepResult) -> dict[str, float]:

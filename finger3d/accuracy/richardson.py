@@ -69,6 +69,8 @@ def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str)
         return reach
     if kind is Kind.FORCE:
         return force
+    if kind is Kind.SHARE:
+        return 1.0
     if kind is Kind.MOMENT:
         return max(scale, force * reach)
     whole = abs(numbers.get(_IF_ZERO.get(kind, name), 0.0))

@@ -130,7 +130,7 @@ def _rows(summary: TreeView, out: Path, seconds: float) -> Iterator[tuple[str, s
 def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tuple[str, str]]:
     """Yield the quantities of a step by their titles, with their errors and what effects that are off would change."""
     from finger3d.accuracy.error_bars import with_error
-    from finger3d.mechanics.readings.columns import AREAS, MAIN
+    from finger3d.mechanics.readings.columns import AREAS, MAIN, SLIP
     from finger3d.mechanics.readings.quantities import Quantity, named
     from finger3d.results.summary import ROUND_OFF, readings_of
 
@@ -146,7 +146,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
 
     (depth,) = named("depth_mm")
     yield depth.title, f"{line(depth, last[depth.name])}, increment {summary['steps'].index(last) + 1}"
-    for one in named(*MAIN, *AREAS):
+    for one in named(*MAIN, *AREAS, *SLIP):
         yield one.title, line(one, last[one.name])
     for one in named(*_SIDEWAYS):
         if abs(last[one.name]) > ROUND_OFF * (last["friction_sum_N"] if one.unit == "N" else 1.0):

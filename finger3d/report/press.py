@@ -11,7 +11,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.mechanics.readings.columns import AREAS, MAIN, MEASURED
+from finger3d.mechanics.readings.columns import AREAS, MAIN, MEASURED, SLIP
 from finger3d.mechanics.readings.quantities import OF_INCREMENT, Kind, Quantity, named
 from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Part, Table
 from finger3d.report.scene import how_modelled
@@ -19,7 +19,7 @@ from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import PressStep, gauges_of, grip_rows, read_json, steps_of, title_of
 
-_HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, "external_work_mJ", "dissipation_mJ")
+_HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, *SLIP, "external_work_mJ", "dissipation_mJ")
 
 _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",

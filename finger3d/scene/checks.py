@@ -16,6 +16,7 @@ from finger3d.mechanics.readings.columns import (
     GIVEN_BY_FORCE,
     MAIN,
     RESULTANTS,
+    SLIP,
     displacement_columns,
     pressure_column,
     strain_columns,
@@ -123,7 +124,7 @@ def no_such_number(key: str, value: str, names: Iterable[str]) -> str:
 def headline_numbers(tables: SceneTable, solid: bool, under_force: bool) -> list[str]:
     """Return the names of the numbers of a press that have error bars; under a force the depth is one of them."""
     dim = 3 if solid else 2
-    names = [*MAIN, *AREAS, *RESULTANTS[dim], "external_work_mJ", "dissipation_mJ"]
+    names = [*MAIN, *AREAS, *SLIP, *RESULTANTS[dim], "external_work_mJ", "dissipation_mJ"]
     names += ["contact_half_length_end_mm"] if solid else []
     names = ["depth_mm", *(n for n in names if n not in GIVEN_BY_FORCE)] if under_force else names
     names += [strain_columns(g.name)[0].key for g in tables.gauge] + [pressure_column(t.name).key for t in tables.taxel]

@@ -11,6 +11,9 @@ MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_hal
 AREAS = ("contact_area_mm2", "stick_area_mm2")
 """Those that get an error bar besides."""
 
+SLIP = ("stick_ratio_area", "stick_ratio_force", "slip_margin")
+"""How near the contact is to slipping as a whole, from 1 to 0; they get an error bar, too."""
+
 RESULTANTS = {
     2: ("force_x_N", "force_y_N", "moment_z_Nmm", "tangential_force_x_N", "outward_friction_x_N"),
     3: (
