@@ -31,7 +31,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import RESULTANTS, by_key
+from finger3d.mechanics.readings.columns import RESULTANTS, SLIP, by_key
 from finger3d.mechanics.readings.quantities import ORDER
 from finger3d.mechanics.readings.reading import Taxel
 from finger3d.mechanics.results.history import StepResult
@@ -253,7 +253,7 @@ def test_every_number_that_a_press_prints_has_a_bar(tmp_path: Path, capsys: pyte
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
     bars = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["error_estimate"]
     names = {"normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm", "contact_area_mm2"}
-    printed = names | {"stick_area_mm2", "gauge_g"}
+    printed = names | {"stick_area_mm2", "gauge_g", *SLIP}
     others = {"external_work_mJ", "dissipation_mJ", "contact_half_length_end_mm"}
     assert set(bars["discretisation"]) == printed | others | set(RESULTANTS[3])
     assert len(re.findall(r" \+- [0-9]", capsys.readouterr().out)) == len(printed)
