@@ -15,7 +15,11 @@ import pytest
 
 import finger3d.effects
 from finger3d.cli import main
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.friction import SLIP, STICK, Coulomb, TwoCoefficients
+from finger3d.contact.law import ContactLaw
+from finger3d.contact.solve import solve_increment
+from finger3d.contact.state import ContactState
 from finger3d.effects import effect_names, effect_type, warn
 from finger3d.effects.elastic_object import Effect as SoftObject
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
@@ -288,12 +292,6 @@ def test_python_users_are_told_too_that_a_gauge_lies_outside() -> None:
 
 
 def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
-    from finger3d.contact.conditions import ContactProblem
-    from finger3d.contact.friction import SLIP, STICK, TwoCoefficients
-    from finger3d.contact.law import ContactLaw
-    from finger3d.contact.solve import solve_increment
-    from finger3d.contact.state import ContactState
-
     compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs
     law = ContactLaw(TwoCoefficients(0.5, 0.6, "keep"))
     state = ContactState.at_rest(np.array([0.0]), 2)

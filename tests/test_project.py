@@ -62,8 +62,9 @@ def test_the_wheel_carries_the_designs_and_nothing_by_accident(root: Path, wheel
         inside = source.relative_to(root).as_posix()
         assert (f"finger3d/{inside}" if inside.startswith("geometries/") else inside) in names
     for data in (
-        "geometries/fig9.toml", "geometries/gear.stl", "py.typed", "new_scene.toml", "report/style.css", "mold/sheet_template.txt",
-        "report/view3d.js", "report/plotly/plotly-gl3d.min.js", "report/plotly/LICENSE", "materials/silicones.toml",
+        "geometries/fig9.toml", "geometries/gear.stl", "py.typed", "new_scene.toml", "report/style.css",
+        "mold/sheet_template.txt", "report/view3d.js", "report/plotly/plotly-gl3d.min.js", "report/plotly/LICENSE",
+        "materials/silicones.toml",
     ):  # fmt: skip
         assert f"finger3d/{data}" in names
     assert {name.split("/")[0] for name in names} == {"finger3d", f"finger3d-{project(root)['version']}.dist-info"}
