@@ -199,12 +199,12 @@ def refine_mesh(
             stopped = f"max_seconds = {max_seconds:g}"
             break
         options = found
-    found = Refinement(tolerance, options, tuple(rounds), stopped)
+    refined = Refinement(tolerance, options, tuple(rounds), stopped)
     return replace(
-        found,
-        mesh=meshes[rounds.index(found.best)],
-        stopped="met" if found.met else stopped,
-        problem=problem if found.best is rounds[-1] else None,
+        refined,
+        mesh=meshes[rounds.index(refined.best)],
+        stopped="met" if refined.met else stopped,
+        problem=problem if refined.best is rounds[-1] else None,
     )
 
 

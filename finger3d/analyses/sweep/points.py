@@ -195,12 +195,12 @@ def checked_points(
         scenes.append(scene)
     scenes = _with_effects(scenes, report)
     values = joined(*(v.values for v in vary))
-    points, members = [], dict[str, list[tuple[Scene, Variant]]]()
+    checked, members = list[Point](), dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
         body, variant = body_key(scene), Variant.of(scene.model())
         members.setdefault(body, []).append((scene, variant))
         named = {v.key: value for v, value in zip(vary, here, strict=True)}
-        points.append(Point(number, named, body, variant))
+        checked.append(Point(number, named, body, variant))
     grids = _grids({key: of[0][0] for key, of in members.items()})
     shared = {
         key: BodySpec(
@@ -212,7 +212,7 @@ def checked_points(
         )
         for key, of in members.items()
     }
-    return Sweep(bodies.absolute(base, path), vary, tuple(points), shared, scenes[0].title, is_list)
+    return Sweep(bodies.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
 
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:

@@ -101,8 +101,8 @@ def sweep(
         columns, option = drawn(sample, _texts(vary, ":"), seed), "--sample"
     points = checked_points(scene, overrides, columns, option, report)
     store = press_points(points, out, scheduler, workers, report)
-    columns = store.columns()
-    return SweepResult(Path(out), columns, sum(outcome != "converged" for outcome in columns["outcome"]), store)
+    table = store.columns()
+    return SweepResult(Path(out), table, sum(outcome != "converged" for outcome in table["outcome"]), store)
 
 
 def _texts(vary: Mapping[str, Sequence[Value]] | Sequence[str], mark: str) -> Sequence[str]:
