@@ -35,16 +35,16 @@ Solve = Callable[[Array], Array]
 _PRECISION: dict[int, Precision] = {1: np.float64, 2: np.float64, 3: np.float32}
 """Precision of the initial guess and of the first factors, by dimension; matrices of 2D fit into the cache anyway."""
 
-_FLOAT32_ITERATIONS = 4
+FLOAT32_ITERATIONS = 4
 """Newton iterations that are tried in single precision."""
 
 _FLOAT32_MAX_MU = 2.0
 """Largest mu for which single precision is tried; above it round-off often prevents convergence."""
 
-_CHORD_ITERATIONS = 12
+CHORD_ITERATIONS = 12
 """Largest number of chord iterations with one factor."""
 
-_CHORD_RATIO = 0.1
+CHORD_RATIO = 0.1
 """Ratio of mismatches above which another chord iteration does not pay: one costs a tenth of a factorisation."""
 
 _ACTIVE_SETS = 12
@@ -76,7 +76,7 @@ def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, dam
     precision = first_precision(problem)
     spent = 0
     if precision is np.float32:
-        single = newton(problem, start, _FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
+        single = newton(problem, start, FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
         if single.solved:
             return single
         spent = single.iterations
@@ -160,11 +160,11 @@ def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, initial: 
     if initial.at_roundoff(problem) or system.is_exact:
         return initial
     best = Iterate.of(problem, _scale_to_slip_limit(system.active, initial.force))
-    for _ in range(_CHORD_ITERATIONS):
+    for _ in range(CHORD_ITERATIONS):
         if best.at_roundoff(problem) or (best.status != initial.status).any():
             break
         candidate = Iterate.of(problem, chord_step(system, best.force, best.force - best.projected))
-        stalls = not candidate.mismatch <= _CHORD_RATIO * best.mismatch
+        stalls = not candidate.mismatch <= CHORD_RATIO * best.mismatch
         best = min(best, candidate, key=lambda iterate: iterate.mismatch)
         if stalls:
             break

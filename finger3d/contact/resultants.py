@@ -9,6 +9,9 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.acceleration import (
+    CHORD_ITERATIONS,
+    CHORD_RATIO,
+    FLOAT32_ITERATIONS,
     ShortProducts,
     assemble_in_place,
     chord_step,
@@ -24,12 +27,6 @@ from finger3d.errors import Outcome
 
 _BORDERED = 15
 """Largest number of iterations for contact forces and coordinates at once; few that converge need more."""
-
-_SINGLE = 4
-"""Iterations of these whose factors may be in single precision."""
-
-_CHORD_ITERATIONS, _CHORD_RATIO = 12, 0.1
-"""Largest number of chord iterations with one factor, and ratio of errors above which another one does not pay."""
 
 _SOLUTIONS = 6
 """Largest number of solutions in a search for the pose of prescribed forces."""
@@ -214,7 +211,7 @@ def _at_once(
             active = ActiveSet.of(now.problem, now.iterate.status, now.iterate.augmented_force)
             if not active.size:
                 return None
-            precision = first_precision(problem) if iteration < _SINGLE else np.float64
+            precision = first_precision(problem) if iteration < FLOAT32_ITERATIONS else np.float64
             try:
                 bordered = BorderedSystem.of(now.problem, active, conditions, precision)
                 force, step, lacking = bordered.closed(bordered.system.solution())
@@ -229,7 +226,7 @@ def _at_once(
 def _corrected(trial: _Trial, bordered: BorderedSystem, before: Iterate) -> _Trial:
     """Return a trial after chord iterations with the factors of the step to it, while the active set stays the same."""
     conditions = bordered.conditions
-    for _ in range(0 if bordered.system.is_exact else _CHORD_ITERATIONS):
+    for _ in range(0 if bordered.system.is_exact else CHORD_ITERATIONS):
         now = trial.iterate
         if (now.status != before.status).any() or trial.solves(conditions):
             break
@@ -237,7 +234,7 @@ def _corrected(trial: _Trial, bordered: BorderedSystem, before: Iterate) -> _Tri
         after = trial.stepped(conditions, force, step)
         if not after.iterate.mismatch < now.mismatch:
             break
-        pays = after.iterate.mismatch <= _CHORD_RATIO * now.mismatch
+        pays = after.iterate.mismatch <= CHORD_RATIO * now.mismatch
         trial = after
         if not pays:
             break
