@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
-from ._press import fig9_finger
+from ._press import fig9_finger, in_edges
 from ._rows import Result, Row, at_least, columns
 
 SEED = 23
@@ -105,8 +105,7 @@ def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
     """Sections and solids; quick: one section on a coarser mesh."""
     if quick:
         for name, model in itertools.islice(drawn(2, SEED), 1, None):
-            edges = replace(model.mesh, size_mm=1.5 * model.mesh.size_mm, base_size_mm=1.5 * model.mesh.base_size_mm)
-            yield name, replace(model, mesh=edges)
+            yield name, in_edges(model, 1.5)
         return
     yield from drawn(SECTIONS, SEED)
     yield from solids(SOLIDS)

@@ -166,7 +166,7 @@ def _decks(quick: bool) -> Result:
         print(
             "calculix_forces: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
         )
-    source = f"CalculiX, deck of the scene, {'_decks for this' if runs else '2.20, number kept'}"
+    source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
     rows: list[Row] = []
     table: dict[str, list[Any]] = {"case": [], "calculix_N": [], "finger3d_N": []}
     for case in CASES[:3] if quick else CASES:
