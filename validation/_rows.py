@@ -138,7 +138,7 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
-def together(size: tuple[float, float], **parts: Result) -> Result:
+def together(size: tuple[float, float], /, **parts: Result) -> Result:
     """Return the result of a study of several parts: their rows, and tables and figures one below the other.
 
     Parameters
