@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +11,9 @@ import pytest
 
 from validation._cost import SECTION, Case
 from validation._cost_extrapolated import at, constant, extrapolate, rate, unknowns
-from validation._cost_table import KEPT, markdown
+from validation._cost_table import markdown
 from validation._cost_truth import Advice, Truth
+from validation._rows import committed
 
 CASES = [Case(SECTION, size, 4.0 * size) for size in (4.0, 2.0, 1.0, 0.5)]
 TRUTH = Truth(1.0, 1e-3, 1.0, 0.0)
@@ -76,5 +76,4 @@ def test_the_table_says_what_is_extrapolated_and_what_is_the_same() -> None:
 
 def test_the_table_of_the_page_is_made_from_the_kept_results() -> None:
     page = Path(__file__).parents[1] / "docs" / "accuracy.md"
-    with KEPT.open(encoding="utf-8") as file:
-        assert "\n".join(markdown(list(csv.DictReader(file)))) in page.read_text(encoding="utf-8")
+    assert "\n".join(markdown(committed("cost_of_accuracy"))) in page.read_text(encoding="utf-8")

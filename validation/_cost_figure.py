@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ._cost import LARGE, SECTION, SOLID
-
-GRADED = Path(__file__).with_name("results") / "graded_meshes_table.csv"
+from ._rows import committed
 
 Line = Mapping[str, Any]
 
@@ -73,17 +70,15 @@ def _numbers(axes: Any, runs: Sequence[Line]) -> None:
 
 
 def _grading(axes: Any, runs: Sequence[Line]) -> None:
-    if GRADED.exists():
-        with GRADED.open(encoding="utf-8") as file:
-            graded = [line for line in csv.DictReader(file) if line["goal"] == "normal_force_N"]
-        for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
-            for way, mark in (("equal grading", "o-"), ("graded", "s--")):
-                some = [line for line in graded if (line["domain"], line["way"]) == (domain, way)]
-                known = [line for line in some if float(line["true_error"]) > _FLOOR]
-                axes.loglog(
-                    [float(line["dofs"]) for line in known], [100.0 * float(line["true_error"]) for line in known],
-                    mark, color=COLOURS[body], ms=5, label=f"{body}, {'towards it' if way == 'graded' else way}",
-                )  # fmt: skip
+    graded = [line for line in committed("graded_meshes") if line["goal"] == "normal_force_N"]
+    for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
+        for way, mark in (("equal grading", "o-"), ("graded", "s--")):
+            some = [line for line in graded if (line["domain"], line["way"]) == (domain, way)]
+            known = [line for line in some if float(line["true_error"]) > _FLOOR]
+            axes.loglog(
+                [float(line["dofs"]) for line in known], [100.0 * float(line["true_error"]) for line in known],
+                mark, color=COLOURS[body], ms=5, label=f"{body}, {'towards it' if way == 'graded' else way}",
+            )  # fmt: skip
     axes.set(title="What does grading towards the force save?", xlabel="unknowns", ylabel="error, %")
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from ._cost import LARGE, SECTION, SOLID
+from ._rows import committed
 
-KEPT = Path(__file__).with_name("results") / "cost_of_accuracy_table.csv"
 BODIES = (SECTION, SOLID, *LARGE.values())
 NUMBERS = {
     "force": "force", "friction_sum": "friction sum", "gauge_strain": "gauge strain",
@@ -68,5 +66,4 @@ def _short(value: float) -> str:
 
 
 if __name__ == "__main__":
-    with KEPT.open(encoding="utf-8") as file:
-        print("\n".join(markdown(list(csv.DictReader(file)))))
+    print("\n".join(markdown(committed("cost_of_accuracy"))))

@@ -33,6 +33,8 @@ NUS = (0.3, 0.45, 0.49)
 STRESS, STRAIN = "plane stress", "plane strain"
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 """Plane states and Poisson's ratios of the half cylinder."""
+SHOWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
+"""Those that the figures show."""
 BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
 PAPER = "Maeno 2004"
 
@@ -174,3 +176,34 @@ def said(
 ) -> Row:
     """A statement of the paper, measured; `where` is its section or figure."""
     return Row(what, f"{PAPER}, {where}", wanted, float(got), tolerance, reason, "statement", measure)
+
+
+def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: dict[Any, dict[str, Any]]) -> None:
+    """Draw a column for each case of SHOWN and a row for each quantity.
+
+    Parameters
+    ----------
+    figure
+        Figure to draw in.
+    quantities
+        Labels of the rows.
+    legend
+        What the five curves of a case differ by: depth or mu.
+    curves
+        By case and label: places x (mm) and the values of every quantity there.
+    """
+    from matplotlib import colormaps
+
+    colours = colormaps["viridis" if legend == "depth" else "plasma"](np.linspace(0.05, 0.85, 5))
+    panels = figure.subplots(len(quantities), len(SHOWN), sharex=True, sharey="row")
+    for column, case in zip(panels.T, SHOWN, strict=True):
+        for colour, (label, (x, *values)) in zip(colours, curves[case].items(), strict=True):
+            for axes, value in zip(column, values, strict=True):
+                axes.plot(x, value, color=colour, label=label)
+        for axes in column:
+            axes.axhline(0.0, color="#999999", lw=0.7)
+        column[0].set_title(f"{case[0]}, nu = {case[1]:g}")
+        column[-1].set_xlabel("x (mm)")
+    for axes, quantity in zip(panels[:, 0], quantities, strict=True):
+        axes.set_ylabel(quantity)
+    panels[0, 0].legend(title=legend, frameon=False)

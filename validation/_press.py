@@ -15,6 +15,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
 
 
@@ -49,6 +50,12 @@ def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = N
     law = Coulomb(friction) if isinstance(friction, int | float) else friction
     legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
     return converged(changed(problem, friction=law, legs=legs))
+
+
+def in_edges(model: Model, factor: float) -> Model:
+    """Return the model with all edge lengths of its mesh times a factor."""
+    own = model.mesh
+    return replace(model, mesh=replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,7 +138,7 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
-def together(size: tuple[float, float], **parts: Result) -> Result:
+def together(size: tuple[float, float], /, **parts: Result) -> Result:
     """Return the result of a study of several parts: their rows, and tables and figures one below the other.
 
     Parameters
@@ -216,3 +217,9 @@ def committed(name: str) -> list[dict[str, str]]:
         raise MissingError(f"there are no results of {name}; run python -m validation {name}")
     with path.open(newline="", encoding="utf-8") as stream:
         return list(csv.DictReader(stream))
+
+
+def committed_instead(name: str, program: str, install: str) -> list[dict[str, str]]:
+    """Return the lines of the committed table of a study whose other `program` is missing, and say so."""
+    print(f"{name}: {program} is not installed ({install}); the committed results stay", file=sys.stderr)
+    return committed(name)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -33,7 +34,7 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
-from ._press import fig9_finger
+from ._press import fig9_finger, in_edges
 from ._rows import Result, Row, at_least, columns
 
 SEED = 23
@@ -86,7 +87,8 @@ def solids(count: int) -> Iterator[tuple[str, Model]]:
     for number in range(count):
         u = random.uniform(size=4)
         fig9 = fig9_finger(12.0 + 28.0 * u[0])
-        half, block = [], []
+        half = designs()["half_cylinder"](radius_mm=5.0, width_mm=3.0 + 5.0 * u[0])
+        block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=10.0 + 6.0 * u[0])
         shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
             (fig9, Plane(), FAR, 10.0, 3.0),
             (half, Cylinder(radius_mm=10.0), NEAR, 1.0, 0.35),
@@ -105,8 +107,7 @@ def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
     """Sections and solids; quick: one section on a coarser mesh."""
     if quick:
         for name, model in itertools.islice(drawn(2, SEED), 1, None):
-            edges = replace(model.mesh, size_mm=1.5 * model.mesh.size_mm, base_size_mm=1.5 * model.mesh.base_size_mm)
-            yield name, replace(model, mesh=edges)
+            yield name, in_edges(model, 1.5)
         return
     yield from drawn(SECTIONS, SEED)
     yield from solids(SOLIDS)

@@ -13,17 +13,13 @@ project, solved by SciPy's SuperLU; cost_of_accuracy.py times one factorisation 
 
 from __future__ import annotations
 
-import csv
 import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from finger3d._machine import versions
 from finger3d.analyses.calculix.deck import Contact
-from finger3d.errors import MissingError
 from finger3d.mechanics.model import Leg
 
 from ._ccx import Answer, program, version
@@ -31,7 +27,7 @@ from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
 from ._cost_runs import MODULE
-from ._rows import Result, Row, at_least
+from ._rows import Result, Row, at_least, committed_instead
 
 BY_NAME = True
 CALCULIX = "CalculiX 2.20, same mesh"
@@ -88,15 +84,8 @@ def _judged(table: Sequence[Mapping[str, Any]], timed: bool) -> Result:
 
 
 def _committed(quick: bool) -> Result:
-    """What the committed table says, with a word of why."""
-    path = Path(__file__).resolve().parent / "results" / "beside_calculix_table.csv"
-    if not path.is_file():
-        raise MissingError("beside_calculix: needs ccx, and there are no committed results; apt install calculix-ccx")
-    print(
-        "beside_calculix: ccx is not installed (apt install calculix-ccx); the committed results stay", file=sys.stderr
-    )
-    with path.open(newline="", encoding="utf-8") as stream:
-        lines = list(csv.DictReader(stream))
+    """What the committed table says."""
+    lines = committed_instead("beside_calculix", "ccx", "apt install calculix-ccx")
 
     def read(key: str, text: str) -> Any:
         return text if key in TEXT else int(text) if text.isdigit() else float(text)

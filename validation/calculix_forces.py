@@ -24,6 +24,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
+from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
@@ -166,7 +167,7 @@ def _decks(quick: bool) -> Result:
         print(
             "calculix_forces: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
         )
-    source = f"CalculiX, deck of the scene, {'_decks for this' if runs else '2.20, number kept'}"
+    source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
     rows: list[Row] = []
     table: dict[str, list[Any]] = {"case": [], "calculix_N": [], "finger3d_N": []}
     for case in CASES[:3] if quick else CASES:
@@ -240,7 +241,9 @@ _CYLINDER_N = (6.245192, 6.48522, 6.52479, 8.715404, 8.715928, 8.702082, 11.7422
 
 def cases(quick: bool) -> list[Press]:
     """Sections, then solids; the last is timed."""
-    block, cylinder, short = [], [], []
+    block = designs()["block"](half_length_mm=6.0, height_mm=10.0, width_mm=1.0)
+    cylinder = designs()["half_cylinder"](radius_mm=10.0, width_mm=1.0)
+    short = designs()["block"](half_length_mm=5.0, height_mm=10.0, width_mm=8.0)
     finger = fig9_finger()
     found = [
         Press(name, body, "plane-strain", nu, mu, depth, 0.7, force)

@@ -35,6 +35,7 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.quantities import kinds_of
 
 from ._drawn import drawn, drawn_solids
+from ._press import in_edges
 from ._rows import Kind, Result, Row, at_least, columns, zero
 
 SEED = 46
@@ -105,7 +106,7 @@ def _judged(model: Model, row: CostRow, names: tuple[str, ...]) -> Iterator[tupl
     press = _Pressed(own)
     yield "unknowns", float(row.dofs), float(press.dofs), math.nan, math.nan
     yield "seconds", row.solving_s, press.seconds, math.nan, math.nan
-    longer, true = _Pressed(_in_edges(own, SLIGHTLY_LONGER)), _truth(own, press)
+    longer, true = _Pressed(in_edges(own, SLIGHTLY_LONGER)), _truth(own, press)
     for name in names:
         error = abs(true[name] - press.numbers[name]) if true else None
         beside = longer.relative(name, longer.bars.total(name))
@@ -119,14 +120,9 @@ def _truth(model: Model, press: _Pressed) -> dict[str, float]:
     if factor is None:
         return {}
     legs = with_increments_of(model.legs, 2 * press.increments)
-    problem = PressedBody(replace(_in_edges(model, factor), legs=legs)).problem
+    problem = PressedBody(replace(in_edges(model, factor), legs=legs)).problem
     steps, _ = march_automatic(problem)
     return press_numbers(problem, steps[-1]) if steps[-1].outcome.ok else {}
-
-
-def _in_edges(model: Model, factor: float) -> Model:
-    own = model.mesh
-    return replace(model, mesh=replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm))
 
 
 def _rows(lines: list[tuple[Any, ...]], failed: int, quick: bool) -> Iterator[Row]:

@@ -29,18 +29,14 @@ judged.
 
 from __future__ import annotations
 
-import csv
 import importlib.util
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from finger3d.analyses.least_grip import least_grip
-from finger3d.errors import MissingError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.objects import TIME
@@ -48,7 +44,7 @@ from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
 from ._press import changed
-from ._rows import Result, Row, at_least, at_most, columns, zero
+from ._rows import Result, Row, at_least, at_most, columns, committed_instead, zero
 from .held_weights import largest_change
 
 MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
@@ -174,14 +170,9 @@ def _line(grip: Grip, seconds: float) -> tuple[Any, ...]:
 
 
 def _committed() -> list[tuple[Any, ...]]:
-    """MuJoCo's lines of the committed table, with a word of why."""
-    path = Path(__file__).resolve().parent / "results" / "creep_of_a_hold_table.csv"
-    how = "pip install mujoco, or the extra dev"
-    if not path.is_file():
-        raise MissingError(f"creep_of_a_hold: needs MuJoCo, and there are no committed results; {how}")
-    print(f"creep_of_a_hold: MuJoCo is not installed ({how}); the committed results stay", file=sys.stderr)
-    with path.open(newline="", encoding="utf-8") as stream:
-        lines = [line for line in csv.DictReader(stream) if line["program"] == "MuJoCo"]
+    """MuJoCo's lines of the committed table."""
+    kept = committed_instead("creep_of_a_hold", "MuJoCo", "pip install mujoco, or the extra dev")
+    lines = [line for line in kept if line["program"] == "MuJoCo"]
     return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
 
 

@@ -37,7 +37,7 @@ from finger3d.mechanics.results.history import StepResult
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids
-from ._press import changed
+from ._press import changed, in_edges
 from ._rows import Result, Row, at_least, at_most, columns
 
 DEPTHS = (1.0, 0.6)
@@ -160,9 +160,9 @@ def _by_drawn_mesh(seed: int, counts: tuple[int, int, int, int]) -> dict[str, li
         for name, plain in scenes:
             model = _in_increments(with_readings(plain), steps)
             model = at_large_deformation(model) if kind.startswith(LARGE) else model
-            truth, last = _pressed(build(_in_edges(model, finest)))
+            truth, last = _pressed(build(in_edges(model, finest)))
             for factor in factors if last[-1].outcome.ok else ():
-                press, frames = _pressed(build(_in_edges(model, factor)))
+                press, frames = _pressed(build(in_edges(model, factor)))
                 if frames[-1].outcome.ok:
                     depth, right = model.legs[0].depth_mm, press_numbers(truth, last[-1])
                     scene = f"seed {seed}, {kind}, {name}"
@@ -173,12 +173,6 @@ def _by_drawn_mesh(seed: int, counts: tuple[int, int, int, int]) -> dict[str, li
 def _in_increments(model: Model, count: int) -> Model:
     """The model with a number of increments in every leg."""
     return replace(model, legs=tuple(replace(leg, steps=count) for leg in model.legs))
-
-
-def _in_edges(model: Model, factor: float) -> Model:
-    """The model with all edge lengths times a factor."""
-    own = model.mesh
-    return replace(model, mesh=replace(own, size_mm=factor * own.size_mm, base_size_mm=factor * own.base_size_mm))
 
 
 def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:

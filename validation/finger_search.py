@@ -78,24 +78,27 @@ def _draw_shear(figure: Any, nus: Any, radii: Any, edges: Any, found: dict[Any, 
     panels = figure.subplots(len(nus), 2, squeeze=False)
     for row, nu in enumerate(nus):
         for k, what in enumerate(("smallest change of gamma_xy from mu to mu", "change of gamma_xy, mu = .06 to 1")):
-            axes = panels[row, k]
             values = np.array([[found[nu, r, h][k] for r in radii] for h in edges])
-            picture = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
-            for i, j in np.ndindex(values.shape):
-                colour = "w" if values[i, j] < 0.6 * values.max() else "k"
-                axes.text(j, i, f"{values[i, j]:.3f}", ha="center", va="center", fontsize=9, color=colour)
-            axes.add_patch(_frame(radii.index(CHOSEN[0]), edges.index(CHOSEN[1])))
-            axes.set_xticks(range(len(radii)), [f"{r:g}" for r in radii])
-            axes.set_yticks(range(len(edges)), [f"{h:g}" for h in edges])
-            axes.set(xlabel="R (mm)", ylabel="H (mm)", title=f"{what}, nu = {nu:g}")
-            figure.colorbar(picture, ax=axes)
+            _draw_map(panels[row, k], radii, edges, values)
+            panels[row, k].set_title(f"{what}, nu = {nu:g}")
     figure.suptitle("Sensitivity to friction at 10 mm, plane strain; framed: the paper's choice")
 
 
-def _frame(column: int, row: int) -> Any:
+def _draw_map(axes: Any, radii: Any, edges: Any, values: Float, texts: Any = None, label: str = "") -> None:
+    """Draw values (H, R) of fingers with a text in every cell, and a frame around the paper's finger."""
     from matplotlib.patches import Rectangle
 
-    return Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, edgecolor="#e74c3c", lw=2.5)
+    picture = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
+    for (i, j), value in np.ndenumerate(values):
+        told = f"{value:.3f}" + (f"\n{texts[i][j]}" if texts else "")
+        colour = "w" if value < 0.6 * values.max() else "k"
+        axes.text(j, i, told, ha="center", va="center", fontsize=9, color=colour)
+    corner = list(radii).index(CHOSEN[0]) - 0.5, list(edges).index(CHOSEN[1]) - 0.5
+    axes.add_patch(Rectangle(corner, 1.0, 1.0, fill=False, edgecolor="#e74c3c", lw=2.5))
+    axes.set_xticks(range(len(radii)), [f"{r:g}" for r in radii])
+    axes.set_yticks(range(len(edges)), [f"{h:g}" for h in edges])
+    axes.set(xlabel="R (mm)", ylabel="H (mm)")
+    axes.figure.colorbar(picture, ax=axes, label=label)
 
 
 NU = 0.49
@@ -221,20 +224,11 @@ def _draw_gauges(figure: Any, radii: Any, edges: Any, found: dict[Any, Judged], 
     panels = figure.subplots(2, 3, squeeze=False)
     whole, half = RANGES
     for row, (plane, name) in enumerate(DOMAINS.items()):
-        axes = panels[row, 0]
-        values = np.array([[found[plane, r, h].best(x, half)[0] for r in radii] for h in edges])
-        picture = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
-        for i, j in np.ndindex(values.shape):
-            _, at, angle = found[plane, radii[j], edges[i]].best(x, half)
-            colour = "w" if values[i, j] < 0.6 * values.max() else "k"
-            text = f"{values[i, j]:.3f}\n{at:.0f} mm, {angle:.0f}°"
-            axes.text(j, i, text, ha="center", va="center", fontsize=8, color=colour)
-        column, line_ = list(radii).index(CHOSEN[0]), list(edges).index(CHOSEN[1])
-        axes.plot(column, line_, "s", ms=42, mfc="none", mec="#e74c3c", mew=2.5)
-        axes.set_xticks(range(len(radii)), [f"{r:g}" for r in radii])
-        axes.set_yticks(range(len(edges)), [f"{h:g}" for h in edges])
-        axes.set(xlabel="R (mm)", ylabel="H (mm)", title=f"{name}, {half}: each finger's best gauge, x and angle")
-        figure.colorbar(picture, ax=axes, label="least |d strain / d mu|")
+        best = [[found[plane, r, h].best(x, half) for r in radii] for h in edges]
+        values = np.array([[value for value, _, _ in own] for own in best])
+        gauges = [[f"{at:.0f} mm, {angle:.0f}°" for _, at, angle in own] for own in best]
+        _draw_map(panels[row, 0], radii, edges, values, gauges, "least |d strain / d mu|")
+        panels[row, 0].set_title(f"{name}, {half}: each finger's best gauge, x and angle")
         for k, over in enumerate((half, whole), start=1):
             _gauge_map(figure, panels[row, k], found[(plane, *CHOSEN)], x, name, over)
     figure.suptitle(f"Sensitivity to friction, nu = {NU:g}, 10 mm deep; red: the paper's choice")

@@ -12,7 +12,6 @@ too: a bar is what tells a user that a mesh is fine enough.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,10 +28,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, MeshOptions, Model
 
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, at_least, at_most, columns, committed
 
 FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
-UNIFORM = Path(__file__).with_name("results") / "cost_of_accuracy_table.csv"
 STEPS, ROUNDING = 10, 1e-9
 GAUGE = "gauge_g36"
 TOLERANCES = {("plane-strain", GOAL): (1e-2, 3e-3, 1e-3, 3e-4), ("solid", GOAL): (5e-3, 2e-3, 1.5e-3)}
@@ -117,13 +115,12 @@ def _value(problem: Problem, goal: str) -> float:
 def _uniform(domain: str, goal: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return edge lengths, unknowns and values of the mixed elements of cost_of_accuracy, coarse to fine."""
     body = "section" if domain == "plane-strain" else "solid"
-    with UNIFORM.open(encoding="utf-8") as file:
-        rows = [
-            row for row in csv.DictReader(file)
-            if (row["kind"], row["body"], row["element"], row["mesher"]) == ("run", body, "mixed", "swept")
-            and (row["solver"], row["way"], row["steps"]) == ("pardiso", "condensed", str(STEPS))
-            and abs(float(row["base_size_mm"]) / float(row["size_mm"]) - 4.0) < ROUNDING
-        ]  # fmt: skip
+    rows = [
+        row for row in committed("cost_of_accuracy")
+        if (row["kind"], row["body"], row["element"], row["mesher"]) == ("run", body, "mixed", "swept")
+        and (row["solver"], row["way"], row["steps"]) == ("pardiso", "condensed", str(STEPS))
+        and abs(float(row["base_size_mm"]) / float(row["size_mm"]) - 4.0) < ROUNDING
+    ]  # fmt: skip
     unique = {float(row["size_mm"]): row for row in rows}
     sizes = np.array(sorted(unique, reverse=True))
     chosen = [unique[size] for size in sizes]

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from finger3d.fem.mesh.simplex import unfold
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.results.history import StepResult
 
-from ._paper import CASES, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, said
+from ._paper import CASES, SHOWN, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, said
 from ._press import under
 from ._rows import Result, Row, at_most, columns, together, zero
-
-DRAWN_R5 = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 
 
 def _r5(quick: bool) -> Result:
@@ -37,7 +37,7 @@ def _r5(quick: bool) -> Result:
         found[plane, nu] = (problem, frame, profile)
         widest = np.abs((moved(problem, frame) + problem.mesh.points)[:, 0]).max()
         lines.append((plane, nu, profile.force, profile.a, profile.deformed, profile.c, widest))
-    for plane, nu in DRAWN_R5:
+    for plane, nu in SHOWN:
         other = half_cylinder(nu, plane, size / 2.0)
         fine = Profile.of(other, under(other, 0.25)[-1]).force
         rows.append(
@@ -64,16 +64,11 @@ def _r5(quick: bool) -> Result:
 
 
 def _draw_r5(figure: Any, found: dict[Any, Any]) -> None:
-    from matplotlib.collections import PolyCollection
-
     panels = figure.subplots(1, 3, sharey=True)
     figure.suptitle("Pressed 1 mm, mu = .25; grey: at rest, red: the plate")
-    for axes, (plane, nu) in zip(panels, DRAWN_R5, strict=True):
+    for axes, (plane, nu) in zip(panels, SHOWN, strict=True):
         problem, frame, profile = found[plane, nu]
-        mesh, parent, sign = unfold(problem.mesh, (0,))
-        now = mesh.points + moved(problem, frame)[parent] * sign
-        cells = list(now[mesh.cells[:, [0, 3, 1, 4, 2, 5]]])
-        axes.add_collection(PolyCollection(cells, facecolor="#e9eef5", edgecolor="#8296ad", lw=0.2))
+        _deformed(axes, problem, frame, 0.2)
         t = np.linspace(0.0, np.pi, 200)
         axes.plot(5 * np.cos(t), 5 * np.sin(t), color="#999999", lw=0.8)
         axes.axhline(4.0, color="#c0392b", lw=1.2)
@@ -136,17 +131,22 @@ def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:
                    0.5, float(by_mu / by_nu), "79 mm tells nu rather than mu", "sensitivity")  # fmt: skip
 
 
-def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
+def _deformed(axes: Any, problem: Problem, frame: StepResult, lw: float) -> None:
+    """Draw the deformed mesh and its mirror image."""
     from matplotlib.collections import PolyCollection
 
+    mesh, parent, sign = unfold(problem.mesh, (0,))
+    now = mesh.points + moved(problem, frame)[parent] * sign
+    cells = list(now[mesh.cells[:, [0, 3, 1, 4, 2, 5]]])
+    axes.add_collection(PolyCollection(cells, facecolor="#e9eef5", edgecolor="#8296ad", lw=lw))
+
+
+def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
     grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.1))
     for column, nu in enumerate(DRAWN_FIG9):
         axes = figure.add_subplot(grid[0, column])
         problem, frame, profile = drawn[nu]
-        mesh, parent, sign = unfold(problem.mesh, (0,))
-        now = mesh.points + moved(problem, frame)[parent] * sign
-        cells = list(now[mesh.cells[:, [0, 3, 1, 4, 2, 5]]])
-        axes.add_collection(PolyCollection(cells, facecolor="#e9eef5", edgecolor="#8296ad", lw=0.15))
+        _deformed(axes, problem, frame, 0.15)
         x = np.linspace(-50.0, 50.0, 201)
         axes.plot([-50, *x, 50], [0, *problem.model.design.top(x, 0 * x), 0], color="#999999", lw=0.8)
         axes.axhline(problem.model.design.height_mm - 10.0, color="#c0392b", lw=1.2)

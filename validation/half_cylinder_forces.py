@@ -14,12 +14,12 @@ import numpy as np
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Model
 
-from ._paper import CASES, MUS, STRAIN, STRESS, Profile, half_cylinder, said
+from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, draw_shown, half_cylinder, said
 from ._press import under
 from ._rows import Result, Row, columns, together
 
-JUDGED_DEPTHS = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 KNOWN = {0.2: (0.12668, 0.862, 0.639), 0.5: (0.40495, 1.508, 1.376), 1.0: (1.01932, 2.297, 2.230)}
+TRACTIONS = ("normal f_n (MPa)", "friction f_t along x (MPa)")
 REFERENCE = "half cylinder, one method; REFERENCES.md, 2.6"
 
 
@@ -43,7 +43,7 @@ def _depths(quick: bool) -> Result:
             table = zip(profile.x, profile.p, profile.q, profile.status, strict=True)
             lines += [(plane, nu, frame.target.depth_mm, *map(float, row)) for row in table if row[1] > 0.0]
     rows = [*_reference(size)]
-    rows += [row for case in JUDGED_DEPTHS for row in statements_depths(f"{case[0]}, nu = {case[1]:g}", found[case])]
+    rows += [row for case in SHOWN for row in statements_depths(f"{case[0]}, nu = {case[1]:g}", found[case])]
     table = columns("plane nu depth_mm x_mm p_MPa q_MPa status", lines)
     return Result(tuple(rows), table, lambda figure: _draw_depths(figure, found))
 
@@ -111,22 +111,15 @@ def statements_depths(here: str, profiles: Sequence[Profile]) -> list[Row]:
 
 
 def _draw_depths(figure: Any, found: dict[Any, list[Profile]]) -> None:
-    from matplotlib import colormaps
-
-    panels = figure.subplots(2, 3, sharex=True, sharey="row")
     figure.suptitle("Tractions on the finger, mu = .25; the paper computes plane stress and gives no nu")
-    for column, (plane, nu) in enumerate(JUDGED_DEPTHS):
-        for i, profile in enumerate(found[plane, nu]):
-            colour = colormaps["viridis"](0.1 + 0.2 * i)
-            on = np.abs(profile.x) < profile.a + 0.3
-            panels[0, column].plot(profile.x[on], profile.p[on], color=colour, label=f"{0.2 * (i + 1):.1f} mm")
-            panels[1, column].plot(profile.x[on], profile.q[on], color=colour)
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
-        panels[1, column].set_xlabel("x (mm)")
-        panels[1, column].axhline(0.0, color="#999999", lw=0.7)
-    panels[0, 0].set_ylabel("normal f_n (MPa)")
-    panels[1, 0].set_ylabel("friction f_t along x (MPa)")
-    panels[0, 0].legend(title="depth", frameon=False)
+    depths = [f"{0.2 * (i + 1):.1f} mm" for i in range(5)]
+    curves = {case: {d: _near(p, p.a + 0.3) for d, p in zip(depths, found[case], strict=True)} for case in SHOWN}
+    draw_shown(figure, TRACTIONS, "depth", curves)
+
+
+def _near(profile: Profile, reach: float) -> tuple[np.ndarray, ...]:
+    on = np.abs(profile.x) < reach
+    return profile.x[on], profile.p[on], profile.q[on]
 
 
 JUDGED_ZONES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
@@ -202,9 +195,6 @@ def _draw_zones(figure: Any, found: dict[Any, list[Profile]]) -> None:
     panels[2].legend(frameon=False)
 
 
-JUDGED_MUS = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
-
-
 def _mus(quick: bool) -> Result:
     """Does more friction leave the normal force as it is, raise the tangential force and shrink the slip zones?
 
@@ -225,15 +215,13 @@ def _mus(quick: bool) -> Result:
             outward = float((profile.q * np.sign(profile.x)) @ profile.area)
             zones = (profile.a, profile.c, profile.edge_error())
             lines.append((plane, nu, mu, profile.force, float(profile.p.max()), friction, outward, *zones))
-    rows = [row for case in JUDGED_MUS for row in _judged(*case, [found[*case, mu] for mu in MUS])]
+    rows: list[Row] = []
+    for plane, nu in SHOWN:
+        profiles = [found[plane, nu, mu] for mu in MUS]
+        friction = [float(np.abs(p.q) @ p.area) for p in profiles]
+        rows += statements_mus(f"{plane}, nu = {nu:g}", profiles, [p.force for p in profiles], friction)
     names = "plane nu mu force_N_per_mm peak_MPa friction_sum_N_per_mm outward_N_per_mm a_mm c_mm error_mm"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw_mus(figure, found))
-
-
-def _judged(plane: str, nu: float, profiles: list[Profile]) -> list[Row]:
-    force = [p.force for p in profiles]
-    friction = [float(np.abs(p.q) @ p.area) for p in profiles]
-    return statements_mus(f"{plane}, nu = {nu:g}", profiles, force, friction)
 
 
 def statements_mus(
@@ -258,23 +246,9 @@ def statements_mus(
 
 
 def _draw_mus(figure: Any, found: dict[Any, Profile]) -> None:
-    from matplotlib import colormaps
-
-    panels = figure.subplots(2, 3, sharex=True, sharey="row")
     figure.suptitle("Tractions on the finger at 1 mm under five friction coefficients")
-    for column, (plane, nu) in enumerate(JUDGED_MUS):
-        for i, mu in enumerate(MUS):
-            profile = found[plane, nu, mu]
-            on = np.abs(profile.x) < 3.1
-            colour = colormaps["plasma"](0.85 * i / 4)
-            panels[0, column].plot(profile.x[on], profile.p[on], color=colour, label=f"{mu:g}")
-            panels[1, column].plot(profile.x[on], profile.q[on], color=colour)
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
-        panels[1, column].set_xlabel("x (mm)")
-        panels[1, column].axhline(0.0, color="#999999", lw=0.7)
-    panels[0, 0].set_ylabel("normal f_n (MPa)")
-    panels[1, 0].set_ylabel("friction f_t along x (MPa)")
-    panels[0, 0].legend(title="mu", frameon=False)
+    curves = {case: {f"{mu:g}": _near(found[*case, mu], 3.1) for mu in MUS} for case in SHOWN}
+    draw_shown(figure, TRACTIONS, "mu", curves)
 
 
 def run(quick: bool) -> Result:

@@ -13,11 +13,23 @@ import numpy as np
 
 from finger3d.contact.friction import Branch, TwoCoefficients
 
-from ._paper import BELOW_R5, CASES, MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
+from ._paper import (
+    BELOW_R5,
+    CASES,
+    MUS,
+    SHOWN,
+    STRAIN,
+    STRESS,
+    Profile,
+    draw_shown,
+    half_cylinder,
+    line_r5,
+    said,
+    strains,
+)
 from ._press import under
 from ._rows import Result, Row, columns, together
 
-JUDGED_DEPTHS = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 NAMES = ("eps_x", "eps_y", "gamma_xy")
 
 
@@ -44,7 +56,7 @@ def _depths(quick: bool) -> Result:
                 points, depth = zip(x, *values, strict=True), frame.target.depth_mm
                 lines += [(plane, nu, below, depth, *map(float, point)) for point in points]
     x, _ = line_r5(BELOW_R5, count)
-    for plane, nu in JUDGED_DEPTHS:
+    for plane, nu in SHOWN:
         rows += statements_depths(f"{plane}, nu = {nu:g}", *found[BELOW_R5, plane, nu][[1, -1]])
     table = columns("plane nu below_mm depth_mm x_mm eps_x eps_y gamma_xy", lines)
     shown = {k[1:]: v for k, v in found.items() if k[0] == BELOW_R5}
@@ -68,24 +80,13 @@ def _normalised(strain: np.ndarray) -> np.ndarray:
 
 
 def _draw_depths(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
-    from matplotlib import colormaps
-
-    panels = figure.subplots(3, 3, sharex=True, sharey="row")
     figure.suptitle(f"Strains {BELOW_R5:g} mm under the surface, mu = .25")
-    for column, (plane, nu) in enumerate(JUDGED_DEPTHS):
-        for row in range(3):
-            for i in range(1, 10, 2):
-                colour = colormaps["viridis"](0.9 * i / 9)
-                panels[row, column].plot(x, found[plane, nu][i, row], color=colour, label=f"{0.1 * (i + 1):.1f} mm")
-            panels[row, column].axhline(0.0, color="#999999", lw=0.7)
-            panels[row, 0].set_ylabel(NAMES[row])
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
-        panels[2, column].set_xlabel("x (mm)")
-    panels[1, 0].legend(title="depth", frameon=False)
+    shown = range(1, 10, 2)
+    curves = {case: {f"{0.1 * (i + 1):.1f} mm": (x, *found[case][i]) for i in shown} for case in SHOWN}
+    draw_shown(figure, NAMES, "depth", curves)
 
 
 JUDGED_MUS = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
-DRAWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 
 
 def _mus(quick: bool) -> Result:
@@ -157,23 +158,11 @@ def _on_all_lines(found: dict[Any, np.ndarray]) -> Iterator[Row]:
 
 
 def _draw_mus(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
-    from matplotlib import colormaps
-
-    panels = figure.subplots(3, 3, sharex=True, sharey="row")
     figure.suptitle(f"Strains {BELOW_R5:g} mm under the surface at 1 mm under five friction coefficients")
-    for column, (plane, nu) in enumerate(DRAWN):
-        for row in range(3):
-            for i, mu in enumerate(MUS):
-                colour = colormaps["plasma"](0.85 * i / 4)
-                panels[row, column].plot(x, found[plane, nu, mu][row], color=colour, label=f"{mu:g}")
-            panels[row, column].axhline(0.0, color="#999999", lw=0.7)
-            panels[row, 0].set_ylabel(NAMES[row])
-        panels[0, column].set_title(f"{plane}, nu = {nu:g}")
-        panels[2, column].set_xlabel("x (mm)")
-    panels[1, 0].legend(title="mu", frameon=False)
+    curves = {case: {f"{mu:g}": (x, *found[*case, mu]) for mu in MUS} for case in SHOWN}
+    draw_shown(figure, NAMES, "mu", curves)
 
 
-CASES_KINETIC = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 JUDGED_KINETIC = ((STRESS, 0.3), (STRAIN, 0.49))
 RATIOS = (1.0, 0.7, 0.5, 0.1)
 BRANCHES: tuple[Branch, ...] = ("keep", "paper")
@@ -195,7 +184,7 @@ def _kinetic(quick: bool) -> Result:
     size, count = (0.2, 15) if quick else (0.05, 45)
     x, gauges = line_r5(count=count)
     found, lines, rows = {}, [], []
-    for plane, nu in CASES_KINETIC:
+    for plane, nu in SHOWN:
         problem = half_cylinder(nu, plane, size, gauges)
         signal = np.ptp([strains(under(problem, mu)[-1], count)[2] for mu in MUS], axis=0).max()
         for static in (0.25,) if quick else (0.25, 0.125, 0.5):
@@ -240,7 +229,7 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], signal: flo
 def _draw_kinetic(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
     panels = figure.subplots(2, 3, sharex=True, sharey="col")
     figure.suptitle("Shear strain .5 mm under the surface at 1 mm, static mu = .25; rows: the rule for mu_k < mu_s")
-    for column, (plane, nu) in enumerate(CASES_KINETIC):
+    for column, (plane, nu) in enumerate(SHOWN):
         for row, branch in enumerate(BRANCHES):
             axes = panels[row, column]
             for i, ratio in enumerate(RATIOS):
