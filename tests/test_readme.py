@@ -31,7 +31,8 @@ COARSE = {
 
 def commands(root: Path) -> list[str]:
     """Every command that the README and the pages of docs/ show, once; those of docs/molds.md are tested apart."""
-    return commands_of([root / "README.md", *sorted(set(root.glob("docs/*.md")) - {root / "docs" / "molds.md"})])
+    first, apart = [root / "README.md", root / "docs" / "start.md"], root / "docs" / "molds.md"
+    return commands_of([*first, *sorted(set(root.glob("docs/*.md")) - {*first, apart})])
 
 
 def of_readme(root: Path) -> list[str]:
