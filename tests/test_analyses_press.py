@@ -155,13 +155,14 @@ def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: P
 SOLID = solid(SECTION, 0.4)
 STEP_KEYS = set(
     """depth_mm slide_x_mm slide_z_mm time_s normal_force_N tangential_force_x_N tangential_force_z_N friction_sum_N
-    outward_friction_x_N outward_friction_z_N contact_area_mm2 stick_area_mm2 contact_half_length_mm
+    outward_friction_x_N outward_friction_z_N contact_area_mm2 stick_area_mm2 stick_ratio_area
+    stick_ratio_force slip_margin contact_half_length_mm
     stick_half_length_mm largest_penetration_mm force_x_N force_y_N force_z_N moment_x_Nmm moment_y_Nmm moment_z_Nmm
     turn_x_deg turn_y_deg turn_z_deg external_work_mJ dissipation_mJ gauges iterations residual outcome""".split()
 )
 CONTACT_COLUMNS = (
     "face x_mm y_mm z_mm area_mm2 normal_x normal_y normal_z pressure_MPa shear_x_MPa shear_y_MPa shear_z_MPa gap_mm "
-    "slip_x_mm slip_y_mm slip_z_mm status".split()
+    "slip_x_mm slip_y_mm slip_z_mm margin status".split()
 )
 
 

@@ -81,7 +81,7 @@ class Profile:
     def of(cls, problem: Problem, frame: StepResult) -> Profile:
         """From a frame; `moved` is the displacement along x."""
         points = problem.points
-        table = contact_table(points, frame.state)
+        table = contact_table(points, frame)
         on = np.flatnonzero(np.abs(points.points[:, 2]) <= 1e-9)
         on = on[np.argsort(table["x_mm"][on])]
         along = np.zeros((len(points.points), points.dim))

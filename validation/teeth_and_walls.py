@@ -51,7 +51,7 @@ def pressed(degrees: float, size: float) -> dict[str, float]:
     )  # fmt: skip
     problem = build(model)
     last = converged(problem)[-1]
-    found, table = measure(problem.points, last), contact_table(problem.points, last.state)
+    found, table = measure(problem.points, last), contact_table(problem.points, last)
     lowest = np.array([obj.x_mm, problem.system.first_contact_mm - DEPTH])
     axis = lowest + up
     force = np.array([found["force_x_N"], found["force_y_N"]])
