@@ -382,14 +382,17 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
 def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(
     strange: Path, tmp_path: Path, name: str, obj: str, depth: float, sizes: tuple[float, float]
 ) -> None:
+    """Meshes of the body and of its facets agree within the sum of their error bars, 1 % and 2 % on the ridged one."""
+    from finger3d.accuracy.estimate import estimate
     from finger3d.mechanics.results.history import measure
 
-    force = {}
+    force, bars = {}, {}
     for kind in ("step", "stl"):
         problem, frames = pressed(strange / f"{name}.{kind}", tmp_path / f"{kind}.toml", obj, depth, sizes)
         force[kind] = measure(problem.points, frames[-1])["normal_force_N"]
-    # the same mesher on the body and on its facets: their meshes differ by as much as two runs do, within 1 %
-    assert force["stl"] == pytest.approx(force["step"], rel=0.01)
+        bars[kind] = estimate(problem, frames).discretisation["normal_force_N"]
+    assert abs(force["stl"] - force["step"]) <= sum(bars.values())
+    assert sum(bars.values()) < 0.06 * force["step"]
 
 
 @pytest.mark.slow
