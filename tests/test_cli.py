@@ -155,7 +155,7 @@ def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch,
 @pytest.mark.parametrize("command", ["press", "compare", "plan"])
 def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys) -> None:
     out = [] if command == "plan" else ["--out", tmp_path / "out"]
-    refused(capsys, command, tmp_path / "nothing.toml", *out, "--json")
+    assert "nothing.toml" in refused(capsys, command, tmp_path / "nothing.toml", *out, "--json")
 
 
 # --- A command does its work whatever becomes of the terminal, and however narrow that is ----------------------------

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,10 @@ FLOAT32_ITERATIONS = 4
 _FLOAT32_MAX_MU = 2.0
 """Largest mu for which single precision is tried; above it round-off often prevents convergence."""
 
-CHORD_ITERATIONS = 12
+_CHORD_ITERATIONS = 12
 """Largest number of chord iterations with one factor."""
 
-CHORD_RATIO = 0.1
+_CHORD_RATIO = 0.1
 """Ratio of mismatches above which another chord iteration does not pay: one costs a tenth of a factorisation."""
 
 _ACTIVE_SETS = 12
@@ -159,16 +159,33 @@ def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, initial: 
     """
     if initial.at_roundoff(problem) or system.is_exact:
         return initial
-    best = Iterate.of(problem, _scale_to_slip_limit(system.active, initial.force))
-    for _ in range(CHORD_ITERATIONS):
-        if best.at_roundoff(problem) or (best.status != initial.status).any():
+    best = while_it_pays(
+        Iterate.of(problem, _scale_to_slip_limit(system.active, initial.force)),
+        lambda now: Iterate.of(problem, chord_step(system, now.force, now.force - now.projected)),
+        lambda now: now.at_roundoff(problem) or bool((now.status != initial.status).any()),
+    )
+    return min(initial, best, key=lambda iterate: iterate.mismatch)
+
+
+class _HasMismatch(Protocol):
+    @property
+    def mismatch(self) -> float: ...
+
+
+It = TypeVar("It", bound=_HasMismatch)
+
+
+def while_it_pays(best: It, step: Callable[[It], It], ends: Callable[[It], bool]) -> It:
+    """Return the best of an iterate and those to which steps with the same factors lead, until one does not pay."""
+    for _ in range(_CHORD_ITERATIONS):
+        if ends(best):
             break
-        candidate = Iterate.of(problem, chord_step(system, best.force, best.force - best.projected))
-        stalls = not candidate.mismatch <= CHORD_RATIO * best.mismatch
+        candidate = step(best)
+        stalls = not candidate.mismatch <= _CHORD_RATIO * best.mismatch
         best = min(best, candidate, key=lambda iterate: iterate.mismatch)
         if stalls:
             break
-    return min(initial, best, key=lambda iterate: iterate.mismatch)
+    return best
 
 
 def chord_step(system: ActiveSetSystem, force: Float, mismatch: Float) -> Float:

@@ -9,8 +9,6 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.contact.acceleration import (
-    CHORD_ITERATIONS,
-    CHORD_RATIO,
     FLOAT32_ITERATIONS,
     ShortProducts,
     assemble_in_place,
@@ -18,6 +16,7 @@ from finger3d.contact.acceleration import (
     first_precision,
     threads_for,
     warm_start,
+    while_it_pays,
 )
 from finger3d.contact.conditions import ContactProblem, residual
 from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, Precision
@@ -181,6 +180,10 @@ class _Trial(NamedTuple):
     moved: Float
     iterate: Iterate
 
+    @property
+    def mismatch(self) -> float:
+        return self.iterate.mismatch
+
     def stepped(self, conditions: ForceConditions, force: Float, step: Float) -> _Trial:
         problem = conditions.moved(self.problem, step)
         return _Trial(problem, self.moved + step, Iterate.of(problem, force))
@@ -226,19 +229,15 @@ def _at_once(
 def _corrected(trial: _Trial, bordered: BorderedSystem, before: Iterate) -> _Trial:
     """Return a trial after chord iterations with the factors of the step to it, while the active set stays the same."""
     conditions = bordered.conditions
-    for _ in range(0 if bordered.system.is_exact else CHORD_ITERATIONS):
-        now = trial.iterate
-        if (now.status != before.status).any() or trial.solves(conditions):
-            break
-        force, step, _ = bordered.closed(chord_step(bordered.system, now.force, now.force - now.projected))
-        after = trial.stepped(conditions, force, step)
-        if not after.iterate.mismatch < now.mismatch:
-            break
-        pays = after.iterate.mismatch <= CHORD_RATIO * now.mismatch
-        trial = after
-        if not pays:
-            break
-    return trial
+
+    def step(now: _Trial) -> _Trial:
+        force, projected = now.iterate.force, now.iterate.projected
+        return now.stepped(conditions, *bordered.closed(chord_step(bordered.system, force, force - projected))[:2])
+
+    def ends(now: _Trial) -> bool:
+        return bool((now.iterate.status != before.status).any()) or now.solves(conditions)
+
+    return trial if bordered.system.is_exact else while_it_pays(trial, step, ends)
 
 
 def _solution(found: _Trial, iterations: int) -> tuple[ContactSolution[ContactState], Float] | None:

@@ -146,9 +146,9 @@ def grip_rows(summary: TreeView) -> Iterator[tuple[str, str]]:
         moved, turns = (", ".join(f"{without_round_off(pose[key]):.4g}" for key in names) for names in keys)
         yield "object", f"moved by {moved} mm, turned by {turns} deg; each finger closed by {pose['closing_mm']:.4g} mm"
     for finger in summary["fingers"]:
-        last, limit = finger["steps"][-1], finger["slip_limit"]
-        used = f", {100.0 * limit['used']:.3g} % of its friction used" if limit else ""
-        yield f"{finger['finger']} finger", f"normal force {last['normal_force_N']:.5g} N{used}"
+        last = finger["steps"][-1]
+        text = f"normal force {last['normal_force_N']:.5g} N, slip margin {last['slip_margin']:.3g}"
+        yield f"{finger['finger']} finger", text
 
 
 def read_json(path: Path) -> Tree:
