@@ -153,11 +153,10 @@ class ToForces:
         """Return a part of an increment after another one, whose iteration begins at an end that is expected."""
         state, wanted = (before.solution.state if before else self.state), forces[1]
         problem, formulation = self.problem, formulation_of(self.problem.model)
-        if expected:
-            begin, guess = Move(move.start, expected.pose), expected.solution.state.contact.force
-        else:
-            begin = self._begin(before, move, forces)
-            guess = self.guess(begin.end) if before is None else None
+        begin = Move(move.start, expected.pose) if expected else self._begin(before, move, forces)
+        guess: Float | None = expected.solution.state.contact.force if expected else None
+        if before is None:
+            guess = self.guess(begin.end)
         solution = formulation.increment(problem, state, begin, guess, self.workspace, wanted)
         failed = Advanced(replace(solution, state=state), [], move.start)
         asked, fingers = str(wanted), 1
