@@ -138,17 +138,19 @@ class Result:
         return all(row.passed for row in self.rows)
 
 
-def together(size: tuple[float, float], /, **parts: Result) -> Result:
+def together(size: tuple[float, ...], /, **parts: Result) -> Result:
     """Return the result of a study of several parts: their rows, and tables and figures one below the other.
 
     Parameters
     ----------
-    size : of the whole figure, inches
+    size : width of the figure, and its height or that of every part, inches
     """
 
     def draw(figure: Any) -> None:
-        figure.set_size_inches(*size)
-        for part, panel in zip(parts.values(), figure.subfigures(len(parts), 1), strict=True):
+        width, *heights = size
+        figure.set_size_inches(width, sum(heights))
+        ratios = heights if len(heights) > 1 else None
+        for part, panel in zip(parts.values(), figure.subfigures(len(parts), 1, height_ratios=ratios), strict=True):
             part.figure(panel)
 
     lines = [

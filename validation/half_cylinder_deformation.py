@@ -65,7 +65,7 @@ def _r5(quick: bool) -> Result:
 
 def _draw_r5(figure: Any, found: dict[Any, Any]) -> None:
     panels = figure.subplots(1, 3, sharey=True)
-    figure.suptitle("Pressed 1 mm, mu = .25; grey: at rest, red: the plate")
+    figure.suptitle("The half cylinder, pressed 1 mm, mu = .25; grey: at rest, red: the plate")
     for axes, (plane, nu) in zip(panels, SHOWN, strict=True):
         problem, frame, profile = found[plane, nu]
         _deformed(axes, problem, frame, 0.2)
@@ -142,6 +142,7 @@ def _deformed(axes: Any, problem: Problem, frame: StepResult, lw: float) -> None
 
 
 def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
+    figure.suptitle("The finger of Fig. 9, pressed 10 mm, mu = .25; grey: at rest, red: the plate")
     grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.1))
     for column, nu in enumerate(DRAWN_FIG9):
         axes = figure.add_subplot(grid[0, column])
@@ -160,10 +161,10 @@ def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[flo
             axes.plot(NUS, value, style, ms=4, color=f"C{k}", label=f"{plane}, {what}")
     axes.axhline(WANTED, color="k", lw=0.8)
     axes.annotate("the paper: about 79 mm", (0.002, WANTED + 0.4), fontsize=9)
-    axes.set(xlabel="Poisson's ratio (not given in the paper)", ylabel="contact width (mm)", title="mu = .25")
+    axes.set(xlabel="Poisson's ratio (not given in the paper)", ylabel="contact width (mm)")
     axes.legend(frameon=False, fontsize=9)
 
 
 def run(quick: bool) -> Result:
     """The half cylinder, then the finger of Fig. 9."""
-    return together((13.0, 10.0), r5=_r5(quick), fig9=_fig9(quick))
+    return together((13.0, 3.3, 6.2), r5=_r5(quick), fig9=_fig9(quick))

@@ -165,6 +165,7 @@ def _rms(values: Any) -> float:
 
 def draw_line(figure: Any, counts: tuple[int, ...], curves: dict[str, Float]) -> None:
     """Errors over the point spacing, and a pressure against Hertz's."""
+    figure.suptitle("cylinder")
     left, right = figure.subplots(1, 2)
     sizes = 1.0 / np.array(counts)
     for column, kind, theory in ((1, "pressure, L2", 1.0), (0, "half-width", 2.0)):
@@ -276,6 +277,7 @@ def _sphere(quick: bool) -> Result:
 
 def draw_sphere(figure: Any, curves: dict[float, tuple[Float, Float]]) -> None:
     """Errors over the point spacing."""
+    figure.suptitle("ball")
     sizes = next(iter(curves.values()))[0]
     for column, theory, label, axes in zip(
         (0, 1),

@@ -242,8 +242,8 @@ def _draw_flanks(figure: Any, data: dict[str, Any]) -> None:
     left.set(xlabel="edge length (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None), xlim=(0.0, None))
     for k in range(3):
         right.plot(data["sizes"], data["faces"][:, k], "osv"[k] + "-", mfc="none", label=f"face {k + 1}")
-    right.set(xlabel="edge length (mm)", ylabel="normal force on a face of the cube's corner (N)", ylim=(0.0, None))
-    right.set_xlim(0.0, None)
+    right.set(xlabel="edge length (mm)", ylabel="normal force on a face of the cube's corner (N)")
+    right.set(xlim=(0.0, None), ylim=(0.0, 1.1 * data["faces"].max()))
 
 
 def run(quick: bool) -> Result:
