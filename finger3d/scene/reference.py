@@ -20,6 +20,7 @@ from finger3d.scene.tables import (
     GaugeTable,
     GripTable,
     LegTable,
+    LabelsTable,
     MarkerGridTable,
     MarkerTable,
     MaterialTable,
@@ -73,6 +74,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     yield "[[marker]]", _rows(MarkerTable)
     yield "[marker_grid]", _rows(MarkerGridTable)
     yield "[[taxel]]", _rows(TaxelTable)
+    yield "[labels]", _rows(LabelsTable)
     yield "[effects]", _rows(AutoTable)
     for name in effect_names():
         effect = effect_type(name)
