@@ -28,14 +28,13 @@ from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.plotting.calibration import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
-from finger3d.sensor.maps import StrainMap
 
 from ._paper import said
 from ._press import fig9_finger
 from ._rows import Result, Row, at_most, columns
+from ._strain_maps import StrainMap, resolution_panel, slope_panel
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)
