@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -44,7 +44,6 @@ def estimate(
     given: Annotated[ReadingOptions, Parameter(name="*")] = ReadingOptions(),
     out: Path | None = None,
     json_: Json = False,
-    curve: Literal["interpolation", "fit"] = "interpolation",
     tolerances: bool = True,
 ) -> None:
     """Estimate mu and its standard deviation from readings, or report why they do not determine mu.
@@ -60,8 +59,6 @@ def estimate(
         The calibration.json that `finger3d calibrate` wrote.
     out
         CSV file for the estimates from --csv; default: print them.
-    curve
-        Curve of the readings over mu: the monotone interpolation or the second-order fit.
     tolerances
         Include the tolerances of the calibration in the standard deviation.
     """
@@ -74,7 +71,7 @@ def estimate(
     from finger3d.sensor.given_readings import Estimator, csv_line, named_numbers
 
     read = load(calibration)
-    estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), curve, tolerances)
+    estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), tolerances)
     if given.follow is not None:
         for line in estimator.followed(given.follow):
             print(line, flush=True)

@@ -59,7 +59,7 @@ def curve_panel(axes: Axes, calibration: Calibration) -> None:
     _shade_trusted(axes, calibration)
     axes.fill_between(mu, curve - sd, curve + sd, color="#2166ac", alpha=0.25, lw=0, label="±1 sd of a reading")
     axes.plot(mu, curve, color="#2166ac", lw=1.6, label="monotone interpolation")
-    axes.plot(mu, c.at(mu, "fit"), "--", color="#b2182b", lw=1.3, label=f"second order, residual {c.fit.rms:.1e} rms")
+    axes.plot(mu, c.fit.at(mu), "--", color="#b2182b", lw=1.3, label=f"second order, residual {c.fit.rms:.1e} rms")
     axes.plot(c.mu, c.reading, "o", ms=4, color="#222222", label="pressed")
     for i, (at, _) in enumerate(calibration.failed):
         axes.axvline(at, color="#888888", ls=":", lw=1.0, label="did not converge" if i == 0 else None)

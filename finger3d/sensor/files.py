@@ -79,7 +79,7 @@ def write_table(calibration: Calibration, path: Path) -> None:
     for one in c.readings:
         columns |= {
             one.name: one.reading,
-            f"{one.name}_fit": one.at(c.mu, "fit"),
+            f"{one.name}_fit": one.fit.at(c.mu),
             f"{one.name}_per_mu": one.slope(c.mu),
             f"{one.name}_sd": one.reading_sd(c.mu),
             f"{one.name}_resolution": one.resolution(c.mu),

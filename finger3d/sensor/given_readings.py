@@ -19,7 +19,6 @@ from finger3d._types import Float
 from finger3d.csv_table import CsvTable, decoded, is_row, read_table, with_names
 from finger3d.errors import Finger3dError
 from finger3d.sensor.calibration import Calibration
-from finger3d.sensor.curve import Shape
 from finger3d.sensor.estimate import estimate
 from finger3d.sensor.likelihood import Estimate
 
@@ -76,12 +75,11 @@ class Estimator:
     Attributes
     ----------
     stds : standard deviations by the names of readings; the noise of the calibration where there is none
-    curve, tolerances : see `finger3d.sensor.estimate`
+    tolerances : see `finger3d.sensor.estimate`
     """
 
     calibration: Calibration
     stds: Mapping[str, float]
-    curve: Shape = "interpolation"
     tolerances: bool = True
 
     @property
@@ -96,7 +94,7 @@ class Estimator:
 
     def estimates(self, readings: Mapping[str, ArrayLike], stds: Mapping[str, ArrayLike]) -> list[Estimate]:
         """Return an estimate for each set of readings."""
-        return estimate(self.calibration, readings, {**self.stds, **stds}, self.curve, self.tolerances)
+        return estimate(self.calibration, readings, {**self.stds, **stds}, self.tolerances)
 
     def of_file(self, path: Path) -> list[Estimate]:
         """Return an estimate for each row of a CSV file."""
