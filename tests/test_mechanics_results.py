@@ -32,7 +32,7 @@ from finger3d.mechanics.postprocess.penetration import (
 )
 from finger3d.mechanics.results.cavity import CAVITY, cavity_warnings
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_limit import slip_limit
+from finger3d.mechanics.results.slip_margin import largest_force
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose, Plane, RigidObject, Sphere, Wedge
 from finger3d.scene import parse
@@ -184,28 +184,22 @@ def test_a_body_without_an_inner_surface_has_no_warning() -> None:
     assert cavity_warnings(mesh, np.zeros_like(mesh.points)) == []
 
 
-def test_the_slip_limit_of_a_flat_contact() -> None:
-    """mu N along every axis; mu times the pressure's first moment about its centre."""
+def test_the_largest_force_of_a_flat_contact() -> None:
+    """mu N along every axis in its plane."""
     problem = build(block(object=Plane(), legs=(PRESS, held(0.03, 0.04 * 0.5))))
     *_, last = march(problem)
-    limit = slip_limit(problem.points, last.state, problem.model.friction)
-    assert limit is not None
-    assert limit.tangential_force_x_N == pytest.approx(MU * N, rel=1e-9)
-    assert limit.tangential_force_z_N == pytest.approx(MU * N, rel=1e-9)
-    p, x, z = last.state.force[:, 0], problem.points.points[:, 0], problem.points.points[:, 2]
-    arm = np.hypot(x - p @ x / p.sum(), z - p @ z / p.sum())
-    assert limit.moment_y_Nmm == pytest.approx(MU * p @ arm, rel=1e-9)
-    assert np.hypot(0.03, 0.02) / (MU * N) <= limit.used < 1.0
+    for along in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, 0.8]):
+        most, pressure = largest_force(problem.points, last.state, problem.model.friction, np.array(along))
+        assert most == pytest.approx(MU * N, rel=1e-9)
+        assert pressure == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_wall_across_x_has_no_friction_along_x() -> None:
     problem = build(block(object=Plane(), legs=(PRESS,), domain="plane-strain"))
     *_, last = march(problem)
     walls = np.tile(np.eye(2), (len(problem.points.points), 1, 1))  # normals along x, tangents along y
-    limit = slip_limit(replace(problem.points, basis=walls), replace(last.state, bases=None), problem.model.friction)
-    assert limit is not None
-    assert limit.tangential_force_x_N == 0.0
-    assert limit.used == 0.0
+    points, state = replace(problem.points, basis=walls), replace(last.state, bases=None)
+    assert largest_force(points, state, problem.model.friction, np.array([1.0, 0.0, 0.0]))[0] == 0.0
 
 
 HEIGHT, DEPTH = 10.0, 0.6

@@ -19,7 +19,6 @@ from finger3d.mechanics.discretise.size_advice import size_advice
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.grip import FINGERS, Grip
 from finger3d.mechanics.results.history import History, StepResult, measure
-from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.objects import ObjectPose
 
 if TYPE_CHECKING:
@@ -161,8 +160,8 @@ class PressRecord:
             return {}
         held = [step for step in self.converged_steps if step.pose and step.other]
         fingers = [
-            {"finger": name, "slip_limit": _slip_limit(own, steps), "steps": [self.entry(step) for step in steps]}
-            for name, (own, steps) in zip(FINGERS, self.fingers(), strict=True)
+            {"finger": name, "steps": [self.entry(step) for step in steps]}
+            for name, (_, steps) in zip(FINGERS, self.fingers(), strict=True)
             if steps
         ]
         pose, failed = held[-1].pose if held else None, next((s.detail for s in self.steps if not s.outcome.ok), "")
@@ -182,7 +181,6 @@ class PressRecord:
             "warnings": self.warnings,
             "advice": self.advice,
             "steps": [self.entry(step) for step in self.steps],
-            "slip_limit": _slip_limit(self.problem, self.converged_steps),
             **self._grip_summary(outcome),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
@@ -195,12 +193,6 @@ class PressRecord:
             "cost": _cost(self),
             "versions": versions(),
         }
-
-
-def _slip_limit(problem: Problem, steps: Sequence[StepResult]) -> Tree | None:
-    """Return what the contact after the last of converged increments holds before it slips as a whole."""
-    limit = slip_limit(problem.points, steps[-1].state, problem.model.friction) if steps else None
-    return limit.as_dict() if limit else None
 
 
 def _object_pose(pose: ObjectPose) -> Tree:
