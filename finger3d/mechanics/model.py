@@ -96,7 +96,7 @@ class MeshOptions:
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face
-    close to them; at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
+    close to them; at 1 the mesh is not refined.
     `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
     lengths there, once a press has found it.
     """
@@ -106,7 +106,6 @@ class MeshOptions:
     mesher: Mesher = "ftetwild"
     layers: int = 2
     gauge_refinement: float = 1.0
-    refined_gauges: tuple[str, ...] = ()
     stick_refinement: float = 1.0
     borders: SizedPlaces | None = None
 
