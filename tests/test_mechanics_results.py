@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.press_record import depth_warning
 from finger3d.contact.friction import OPEN, SLIP, Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
@@ -291,15 +290,6 @@ def test_penetration_is_compared_with_the_depth_that_a_force_reaches() -> None:
     share = max(check.penetration_mm for check in checks) / reached
     assert 0.01 < share < 0.1
     assert penetration_advice(problem, checks)
-
-
-def test_the_warning_of_a_deep_press_tells_the_depth_that_a_force_reaches() -> None:
-    leg = Leg(9.0, steps=3, force_N=60.0)
-    problem, steps = run(section(Plane(), 1.6, 0.2, leg, base=1.0))
-    depth = steps[-1].target.depth_mm
-    assert 0.3 * HEIGHT < depth < 0.8 * leg.depth_mm
-    (line,) = depth_warning(problem, steps)
-    assert f"is {10.0 * depth:.0f} % of the finger's height" in line
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from finger3d.accuracy.companion_presses import CompanionThread
 from finger3d.analyses.press_files import Fields, ResultWriter
-from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
+from finger3d.analyses.press_record import PressRecord, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody, with_penetration
 from finger3d.analyses.result import PressResult, result_in
 from finger3d.errors import Finger3dError
@@ -255,8 +255,6 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Sta
     begin = time.perf_counter()
     report.stage("writing fields")
     states, good, problem = None, record.converged_steps, record.problem
-    if any(leg.force_N is not None for leg in problem.model.legs):
-        record.warnings += depth_warning(problem, good)
     if good:
         formulation = formulation_of(problem.model)
         fields = [Fields.of(own, *formulation.fields(own, steps[-1].meshed_state)) for own, steps in record.fingers()]
