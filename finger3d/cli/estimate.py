@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -27,7 +28,7 @@ class ReadingOptions:
         CSV file of readings: a column for each, NAME, and optionally NAME_std; of a single reading strain and
         std will do.
     follow
-        The same, with lines still being written: a file, or - for standard input.
+        The same from standard input, -, line by line as it is written, for instance by tail -F readings.csv.
     """
 
     strain: Annotated[list[str] | None, Parameter(negative=(), allow_leading_hyphen=True)] = None
@@ -50,8 +51,8 @@ def estimate(
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
-    With --follow an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A line
-    that is no reading has the status invalid and the reason; a file that is replaced or cut is read from its start.
+    With --follow - an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A
+    line that is no reading has the status invalid and the reason.
 
     Parameters
     ----------
@@ -63,7 +64,9 @@ def estimate(
         Include the tolerances of the calibration in the standard deviation.
     """
     if sum(source is not None for source in (given.strain, given.csv, given.follow)) != 1:
-        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow FILE")
+        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow -")
+    if given.follow not in (None, "-"):
+        raise Finger3dError(f"--follow {given.follow}: must be -, standard input; tail -F FILE writes a file to it")
     if out is not None and given.csv is None:
         raise Finger3dError("estimate: --out goes with --csv")
     from finger3d.io import write_csv
@@ -73,7 +76,7 @@ def estimate(
     read = load(calibration)
     estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), tolerances)
     if given.follow is not None:
-        for line in estimator.followed(given.follow):
+        for line in estimator.followed(sys.stdin.buffer):
             print(line, flush=True)
     elif given.csv is None:
         (result,) = estimator.estimates(named_numbers(read, "--strain", given.strain or ()), {})
