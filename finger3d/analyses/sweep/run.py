@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from finger3d._extras import require
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Point, Sweep, checked_points, columns_of, drawn, rows_of, varied
+from finger3d.analyses.sweep.points import Point, Sweep, checked_points, drawn, rows_of, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
@@ -59,7 +59,7 @@ def sweep(
     sample: str = "grid",
     seed: int = 0,
 ) -> SweepResult:
-    """Press many points of a scene: every combination of some values of keys, a list of points, or random samples.
+    """Press many points of a scene: every combination of some values of keys, the rows of a table, or random samples.
 
     A sweep that was interrupted continues in the same folder.
 
@@ -74,9 +74,8 @@ def sweep(
     scheduler : address of a Dask scheduler; None: processes on this machine
     workers : number of these processes; None: one for each core
     report : receives the progress at every point
-    sample : ``"grid"``, every combination of the values; ``"list"``, values at the same place make a point;
-        ``"lhs:200"`` or ``"random:200"``, that many samples, of a Latin hypercube or independent, where `vary` has the
-        lower and the upper bound of every key
+    sample : ``"grid"``, every combination of the values; ``"lhs:200"`` or ``"random:200"``, that many samples, of a
+        Latin hypercube or independent, where `vary` has the lower and the upper bound of every key
     seed : of the random numbers
 
     Raises
@@ -90,11 +89,6 @@ def sweep(
     report.stage("checking every point")
     if isinstance(vary, str | Path):
         columns, option = rows_of(Path(vary)), "--points"
-    elif isinstance(vary, Mapping) and sample == "list":
-        columns, option = (
-            columns_of({key: [_as_toml(value) for value in values] for key, values in vary.items()}),
-            "vary",
-        )
     elif sample == "grid":
         columns, option = varied(_texts(vary, ",")), "--vary"
     else:
