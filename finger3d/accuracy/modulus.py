@@ -8,9 +8,10 @@ plus its spread.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from finger3d.accuracy.estimate import Measure
 from finger3d.errors import FAILURES, MissingError
 from finger3d.fem.laws.material import Material
 from finger3d.mechanics.discretise.companions import companion
@@ -21,8 +22,6 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import MEASURED
 from finger3d.mechanics.readings.quantities import quantities
 from finger3d.mechanics.results.history import StepResult
-
-Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 _ROUND_OFF = 1e-9
 """Relative error of a number that does not depend on the modulus, such as the prescribed force."""
