@@ -223,9 +223,6 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         "not JSON, or cut short": good[: len(good) // 2],
         "version 9, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 9}),
         "version 2, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 2}),
-        "version 1 of several readings, this finger3d reads version 5; calibrate again": json.dumps(
-            {**data, "format": "finger3d joint calibration", "version": 1}
-        ),
         "no calibration": json.dumps([1, 2]),
     }
     for told, text in cases.items():

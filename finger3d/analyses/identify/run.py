@@ -33,7 +33,7 @@ from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, files, parse, tables_of, tree
+from finger3d.scene import Scene, Source, files, parse, tree
 
 DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
 """What the standard deviations of an identification contain."""
@@ -143,8 +143,7 @@ def identify(
         For a mistake in the file or in the free keys, or if the press fails at the start.
     """
     report = report or Progress()
-    given, path = tables_of(scene, overrides)
-    given = settled_tables(given, path, report)
+    given, path = settled_tables(scene, overrides, report)
     keys = free_keys(free)
     start = _checked_start(given, keys, path)
     model = parse(given, path).model()

@@ -16,7 +16,7 @@ from finger3d.plotting.optimise import draw
 from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, tables_of
+from finger3d.scene import Scene, Source
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,7 @@ def optimise(
     Finger3dError
         For a mistake in the arguments; a MissingError if no design within the bounds gives a number.
     """
-    given, path = tables_of(scene, overrides)
-    given = settled_tables(given, path, report or QUIET)
+    given, path = settled_tables(scene, overrides, report or QUIET)
     problem = OptimisationProblem(
         given=given,
         free=free_keys(free),
