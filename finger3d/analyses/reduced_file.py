@@ -199,7 +199,7 @@ def _header(problem: Problem, about: TreeView) -> _Header:
     header: Tree = {
         "about": dict(about),
         "body": model.design,
-        "material": model.material.isotropic("a reduced model"),
+        "material": model.material,
         "mesh": MeshOptions(**{name: getattr(model.mesh, name) for name in _OF_MESH}),
         "object": {"kind": type(obj).__name__, **placed},
         "friction": {"kind": type(model.friction).__name__, **asdict(model.friction)},

@@ -177,7 +177,7 @@ def _effect(nominal: StrainField, name: str, mus: Sequence[float], sd: float) ->
     if name == "depth_mm":
         changed = under(problem, legs=deeper(model.legs, sd))
     elif name == "nu":
-        material = model.material.isotropic("the tolerance of nu")
+        material = model.material
         step, _ = poisson_steps(material.nu, sd)
         changed = built_like(problem, replace(model, material=replace(material, nu=material.nu + step)))
         sign = math.copysign(1.0, step)

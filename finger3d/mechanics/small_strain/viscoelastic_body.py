@@ -119,8 +119,7 @@ class ConstantBulkModulus:
         """Laws of the parts by their number."""
         problem = self.problem
         materials = problem.model.materials(problem.mesh.part_labels)
-        user, mixed = "effects.viscosity.bulk = false", problem.body.elastic.mixed
-        return [material.isotropic(user).elasticity(mixed=mixed) for material in materials]
+        return [material.elasticity(mixed=problem.body.elastic.mixed) for material in materials]
 
     @cached_property
     def _of_pressures(self) -> tuple[Float, Float]:
