@@ -144,13 +144,14 @@ def test_a_light_press_by_default_has_enough_points(tmp_path: Path) -> None:
     assert not [line for line in summary["warnings"] if " touch" in line]
 
 
-def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:
+def test_a_deep_press_is_advised_of_large_deformation_unless_it_has_it(tmp_path: Path) -> None:
     settings = {"small": [], "large": ["--set", "effects.large_deformation={}"]}
     said = {}
     for name, more in settings.items():
         command = ["press", str(written(tmp_path, changed(SECTION, depth_mm=1.6))), "--out", str(tmp_path / name)]
         assert main([*command, "--no-figures", "--no-error", *more]) == 0
-        said[name] = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["warnings"]
+        advice = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["advice"]
+        said[name] = [line for line in advice if "switch on [effects.large_deformation]" in line]
     assert len(said["small"]) == 1
     assert not said["large"]
 
