@@ -143,8 +143,10 @@ class PressSize:
 
 
 def duration(seconds: float) -> str:
-    """Return seconds in words, in minutes from 90 s on."""
-    return f"{seconds:.2g} s" if seconds < 90.0 else f"{seconds / 60.0:.2g} min"
+    """Return seconds in words, in minutes from 90 s on, in hours from 90 min on."""
+    if seconds < 90.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def meshing_s(cells: float) -> float:

@@ -13,13 +13,13 @@ from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import Element
 from finger3d.fem.mesh.quality import curved_volume
 from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.solvers import mumps, pardiso
+from finger3d.fem.solvers.condense import is_installed
 from finger3d.fem.surface.traces import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 from validation._common import box, shuffled
 from validation._common import mapped as mapped
 
-SOLVERS = ["superlu", *(["pardiso"] if pardiso.available() else []), *(["mumps"] if mumps.available() else [])]
+SOLVERS = ["superlu", *filter(is_installed, ("pardiso", "mumps"))]
 """Solvers of a condensation that are installed."""
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.optimise.task import ObjectiveTable
 from finger3d.scene import parse
 from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 
@@ -79,8 +78,3 @@ def opposite() -> Calibration:
     """Two readings that friction changes in opposite directions, and the depth in the same."""
     depth = tolerance("depth_mm", 0.1, 0.02)
     return together(curve(line(0.01), tolerances=(depth,)), curve(line(-0.006), tolerances=(depth,)))
-
-
-def objective_table(strain: list[float], mu: tuple[float, ...] = (0.1, 0.5, 1.0)) -> ObjectiveTable:
-    """The strain of a gauge against mu, as an objective judges it."""
-    return ObjectiveTable(np.array(mu), {"g": np.array(strain)}, (), 1e-3, "g", None)  # type: ignore[arg-type]

@@ -31,17 +31,18 @@ from finger3d.progress import QUIET
 from finger3d.scene import load, tree
 from finger3d.sensor.likelihood import ReadingEffects, prior
 from tests.scenes import words
-from tests.sensor_cases import NONE, objective_table, scene
+from tests.sensor_cases import NONE, scene
 
 MUS = (0.1, 0.5, 1.0)
 
 
 def test_sensitivity_is_the_least_slope_in_units_of_noise() -> None:
     # slopes 0.1/0.4 and 0.05/0.5 per mu, noise 1e-3
-    assert sensitivity(objective_table([0.0, 0.1, 0.15])) == pytest.approx(100.0)
-    assert sensitivity(objective_table([0.0, -0.1, -0.15])) == pytest.approx(100.0)
+    mu = np.array(MUS)
+    assert sensitivity(mu, np.array([0.0, 0.1, 0.15]), 1e-3) == pytest.approx(100.0)
+    assert sensitivity(mu, np.array([0.0, -0.1, -0.15]), 1e-3) == pytest.approx(100.0)
     # it turns back: two mu share a strain
-    assert sensitivity(objective_table([0.0, 0.1, 0.05])) == pytest.approx(-100.0)
+    assert sensitivity(mu, np.array([0.0, 0.1, 0.05]), 1e-3) == pytest.approx(-100.0)
 
 
 # one body for all angles: refined around its gauge, each press would have another mesh
@@ -62,7 +63,7 @@ def pressed_sensitivity(model: Model, noise: float) -> float:
     for mu in MUS:
         own = build(replace(model, friction=replace(model.friction, mu=mu)))
         strain.append(list(march(own))[-1].gauges["g36"])
-    return sensitivity(replace(objective_table(strain), noise=noise))
+    return sensitivity(np.array(MUS), np.array(strain), noise)
 
 
 def test_gauges_are_searched_in_one_body_and_read_as_a_press_reads_them(problem, tmp_path) -> None:

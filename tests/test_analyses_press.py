@@ -106,11 +106,14 @@ def test_uniqueness_is_reported_and_warned_of(tmp_path: Path) -> None:
     assert any("states" in w for w in found["1000.0"]["warnings"])
 
 
-@pytest.mark.parametrize(("key", "text"), [("press.depth_mm=3.0", "small strain"), ("mesh.size_mm=0.9", "touch")])
-def test_a_scene_beyond_what_can_be_trusted_is_warned_of(tmp_path: Path, key: str, text: str) -> None:
+@pytest.mark.parametrize(
+    ("key", "where", "text"),
+    [("press.depth_mm=3.0", "advice", "large deformation would change"), ("mesh.size_mm=0.9", "warnings", "touch")],
+)
+def test_a_scene_beyond_what_can_be_trusted_is_told(tmp_path: Path, key: str, where: str, text: str) -> None:
     out = tmp_path / "out"
     assert main(["press", str(written(tmp_path, SECTION)), "--out", str(out), "--no-figures", "--set", key]) == 0
-    assert any(text in w for w in json.loads((out / "summary.json").read_text(encoding="utf-8"))["warnings"])
+    assert any(text in line for line in json.loads((out / "summary.json").read_text(encoding="utf-8"))[where])
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
@@ -141,13 +144,14 @@ def test_a_light_press_by_default_has_enough_points(tmp_path: Path) -> None:
     assert not [line for line in summary["warnings"] if " touch" in line]
 
 
-def test_a_deep_press_at_finite_strain_is_not_warned_of_small_strain(tmp_path: Path) -> None:
+def test_a_deep_press_is_advised_of_large_deformation_unless_it_has_it(tmp_path: Path) -> None:
     settings = {"small": [], "large": ["--set", "effects.large_deformation={}"]}
     said = {}
     for name, more in settings.items():
         command = ["press", str(written(tmp_path, changed(SECTION, depth_mm=1.6))), "--out", str(tmp_path / name)]
         assert main([*command, "--no-figures", "--no-error", *more]) == 0
-        said[name] = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["warnings"]
+        advice = json.loads((tmp_path / name / "summary.json").read_text(encoding="utf-8"))["advice"]
+        said[name] = [line for line in advice if "switch on [effects.large_deformation]" in line]
     assert len(said["small"]) == 1
     assert not said["large"]
 

@@ -20,7 +20,7 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
-from finger3d.io import read_arrays, write_arrays
+from finger3d.io import read_arrays
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
@@ -77,10 +77,10 @@ def test_a_saved_body_presses_as_the_scene_does(name: str, tmp_path: Path) -> No
         same(loaded, problem, mu)
 
 
-def test_other_legs_and_a_kinetic_ratio_are_those_of_the_scene() -> None:
+def test_other_legs_are_those_of_the_scene() -> None:
     legs = (Leg(0.3, steps=3), Leg(0.0, steps=2))
     changed = Kinetic(0.6, "paper").apply(small_section(friction=Coulomb(0.4), legs=legs))
-    small = ReducedModel.of(build(small_section())).press(0.4, legs, ratio=0.6, branch="paper")
+    small = ReducedModel.of(build(Kinetic(0.6, "paper").apply(small_section()))).press(0.4, legs)
     whole = list(march(replace(build(small_section()), model=changed)))
     assert small.steps[2].gauges["g"] == pytest.approx(whole[2].gauges["g"], abs=ROUND_OFF)
     assert small.steps[-1].dissipation_mJ == pytest.approx(whole[-1].dissipation_mJ, rel=1e-11)
@@ -104,8 +104,6 @@ def test_fields_are_refused() -> None:
     [
         ({"mu": -0.1}, "from 0 up"),
         ({"mu": float("nan")}, "from 0 up"),
-        ({"ratio": 1.5}, "from 0 to 1"),
-        ({"branch": "keeps"}, '"keep" or "paper"'),
         ({"legs": [Leg(-1.0)]}, "from 0 up"),
         ({"legs": [Leg(float("nan"))]}, "finite"),
         ({"legs": [Leg(0.5, slide_x_mm=0.1)]}, "slide"),
@@ -177,17 +175,6 @@ def test_files_that_are_none_or_were_altered_are_one_line(tmp_path: Path) -> Non
         assert "\n" not in str(found.value)
     with pytest.raises(Finger3dError, match="none.npz"):
         ReducedModel.load(tmp_path / "none.npz")
-
-
-def test_whole_numbers_of_a_header_become_floats(tmp_path: Path) -> None:
-    good = ReducedModel.of(build(small_section())).save(tmp_path / "good.npz")
-    with np.load(good) as stored:
-        arrays = {name: stored[name] for name in stored if name != "checksum"}
-    header = json.loads(arrays["header"].tobytes())
-    header["legs"][0]["slide_x_mm"] = 10**30
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
-    write_arrays(tmp_path / "whole.npz", arrays)
-    assert isinstance(ReducedModel.load(tmp_path / "whole.npz").problem.model.legs[0].slide_x_mm, float)
 
 
 def test_a_file_that_expands_a_thousandfold_is_refused_before_it_is_read(tmp_path: Path) -> None:

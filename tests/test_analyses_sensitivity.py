@@ -9,7 +9,6 @@ import pytest
 
 import finger3d
 from finger3d.analyses.free_keys import FreeKey, check_distinct, scene_with
-from finger3d.analyses.sensitivity import Effect
 from finger3d.errors import Finger3dError
 from tests.sensor_cases import SCENE, scene
 
@@ -149,13 +148,3 @@ def test_at_the_bound_of_a_key_there_is_one_effect() -> None:
     assert math.isnan(effect.growing)
     assert "0.503" in found.failures["material.nu"]
     assert effect.value(0.003) == pytest.approx(-effect.falling / 0.003)
-
-
-def test_a_result_tells_its_effects() -> None:
-    given = scene(**SECTION)
-    result = finger3d.press(given)
-    effects = result.effects("gauge_g36")
-    assert isinstance(effects["friction.mu"], Effect)
-    assert effects == finger3d.sensitivity(given, ["gauge_g36"]).effects["gauge_g36"]
-    with pytest.raises(Finger3dError, match="must be one of"):
-        result.effects("gauge_g3")

@@ -19,15 +19,15 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+import finger3d
 from finger3d.analyses.sweep import local, worker
-from finger3d.analyses.sweep import run as running
 from finger3d.analyses.sweep.cluster import Cluster
 from finger3d.analyses.sweep.points import Sweep, checked_points, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.progress import Progress
 from tests.scenes import HALF_CYLINDER, written
-from tests.sweep_cases import points_of, pressed_here, table
+from tests.sweep_cases import SETS, points_of, pressed_here, table
 
 
 def pressed(sweep: Sweep, folder: Path, workers: int) -> ResultStore:
@@ -88,7 +88,7 @@ def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_sce
         address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
         start = time.monotonic()
         with pytest.raises(MissingError, match="scheduler"):
-            running.press_points(points_of(paper_scene, "friction.mu=0.1"), tmp_path, scheduler=address)
+            finger3d.sweep(paper_scene, ["friction.mu=0.1"], tmp_path, SETS, scheduler=address)
         assert time.monotonic() - start < 60.0
 
 

@@ -177,7 +177,7 @@ def test_compare_as_json_prints_its_file(swept_scene, tmp_path, monkeypatch, cap
 def test_the_command_prints_the_verdict(swept_scene, tmp_path, capsys) -> None:
     assert main(["compare", str(swept_scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 0
     out = capsys.readouterr().out
-    assert "7 of 7" in out
+    assert "6 of 6" in out
     assert all(line in out for line in json.loads((tmp_path / "out" / "compare.json").read_text())["verdict"])
 
 
@@ -196,11 +196,11 @@ def test_a_case_that_fails_is_named_and_the_others_are_kept(swept_scene, tmp_pat
     monkeypatch.setattr(compare_module, "press_with_errors", failing)
     assert main(["compare", str(swept_scene), "--out", str(tmp_path / "out"), "--widths", "50"]) == 3
     captured = capsys.readouterr()
-    assert "2 of 7 cases" in captured.err
+    assert "2 of 6 cases" in captured.err
     assert "solid, 20 mm wide" in captured.out
     told = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert told["outcome"] == str(Outcome.NO_CONVERGENCE)
-    assert sum(bool(c["numbers"]) for c in told["cases"]) == 5
+    assert sum(bool(c["numbers"]) for c in told["cases"]) == 4
 
 
 def test_an_interrupted_comparison_keeps_its_cases(swept_scene, tmp_path, monkeypatch, capsys) -> None:
@@ -211,7 +211,7 @@ def test_an_interrupted_comparison_keeps_its_cases(swept_scene, tmp_path, monkey
 
     monkeypatch.setattr(compare_module, "press_with_errors", interrupted)
     assert main(["compare", str(swept_scene), "--out", str(tmp_path / "out")]) == 130
-    assert "2 of 16 cases" in capsys.readouterr().err
+    assert "2 of 15 cases" in capsys.readouterr().err
     told = json.loads((tmp_path / "out" / "compare.json").read_text())
     assert told["outcome"].startswith("incomplete")
     assert [c["model"] for c in told["cases"]] == ["plane strain", "plane stress"]

@@ -17,6 +17,7 @@ from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.objects import Plane
+from tests.energies import energy
 from tests.models import marched
 from tests.viscous_cases import RAMP_AND_HOLD, TWO, block, mean_relaxation, viscous
 
@@ -50,18 +51,17 @@ LAWS: dict[str, IsochoricLaw] = {
 
 @dataclass(frozen=True)
 class Polynomial(InvariantLaw):
-    """A law with all second derivatives by the invariants, which none of the package has."""
+    """A law that depends on both invariants, and not linearly on the first, as none of the package does."""
 
     is_stable = True
 
     def of_invariants(self, x1: np.ndarray, x2: np.ndarray) -> np.ndarray:
         a, b = x1 - 3.0, x2 - 3.0
-        return self.shear * (0.3 * a + 0.2 * b + 0.02 * a**2 + 0.03 * a * b + 0.01 * b**2)
+        return self.shear * (0.3 * a + 0.2 * b + 0.02 * a**2)
 
     def derivatives(self, x1: np.ndarray, x2: np.ndarray) -> Derivatives:
-        a, b, one = x1 - 3.0, x2 - 3.0, np.full_like(x1, self.shear)
-        first = one * (0.3 + 0.04 * a + 0.03 * b)
-        return Derivatives(first, one * (0.2 + 0.03 * a + 0.02 * b), 0.04 * one, 0.03 * one, 0.02 * one)
+        one = np.full_like(x1, self.shear)
+        return Derivatives(one * (0.3 + 0.04 * (x1 - 3.0)), 0.2 * one, 0.04 * one)
 
 
 EACH = LAWS | {"polynomial": Polynomial(G)}
@@ -97,7 +97,7 @@ def test_stress_is_the_derivative_of_the_energy_and_tangent_that_of_the_stress(l
         for j in range(3):
             change = np.zeros((3, 3))
             change[i, j] = step
-            by_energy = (law.energy(f + change) - law.energy(f - change)) / (2.0 * step)
+            by_energy = (energy(law, f + change) - energy(law, f - change)) / (2.0 * step)
             by_stress = (law.stress(f + change) - law.stress(f - change)) / (2.0 * step)
             assert np.abs(by_energy - stress[:, i, j]).max() < 1e-8 * G  # round-off 1e-16 / 1e-6, and step^2
             assert np.abs(by_stress - tangent[:, :, :, i, j]).max() < 1e-7 * G
@@ -118,7 +118,7 @@ def test_objectivity_isotropy_and_volume(law: IsochoricLaw) -> None:
     turn *= np.linalg.det(turn)
     assert np.abs(law.stress(turn @ f) - turn @ law.stress(f)).max() < 1e-14
     assert np.abs(law.stress(f @ turn) - law.stress(f) @ turn).max() < 1e-14
-    assert np.abs(law.energy(1.7 * f) - law.energy(f)).max() < 1e-14
+    assert np.abs(energy(law, 1.7 * f) - energy(law, f)).max() < 1e-14
     assert np.abs(np.einsum("nij,nij->n", law.stress(f), f)).max() < 1e-14  # no work on a change of volume
 
 
@@ -168,7 +168,7 @@ def test_ogdens_law_with_a_vanishing_exponent_is_that_of_hencky(alpha: float) ->
     law, logs = Ogden(G, ((1.0, alpha),)), np.log(stretches)
     wanted = left @ ((2.0 * G * logs / stretches)[:, None] * right)
     assert np.abs(law.stress(f) - wanted).max() < max(abs(alpha), 1e-14)
-    assert float(law.energy(f)) == pytest.approx(G * (logs**2).sum(), rel=max(abs(alpha), 1e-14))
+    assert float(energy(law, f)) == pytest.approx(G * (logs**2).sum(), rel=max(abs(alpha), 1e-14))
     stress, tangent = law.stress_and_tangent(f)
     step = 1e-6 * np.random.default_rng(2).normal(size=(3, 3))
     slope = (law.stress(f + step) - law.stress(f - step)) / 2.0

@@ -28,6 +28,14 @@ PAD: dict[str, Any] = {
 DRAWN = {"friction.mu": [0.2, 0.9, 0.5], "object.radius_mm": [3.0, 5.0, 4.0], "object.x_mm": [-2.0, 1.5, 1.0]}
 
 
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("points") / "points.csv"
+    lines = [",".join(DRAWN), *(",".join(map(str, row)) for row in zip(*DRAWN.values(), strict=True))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
 def _arrays(folder: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     with h5py.File(folder / "labels.h5") as file:
@@ -36,9 +44,9 @@ def _arrays(folder: Path) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def swept(tmp_path_factory: pytest.TempPathFactory, drawn: Path) -> Path:
     folder = tmp_path_factory.mktemp("labels")
-    sweep(PAD, DRAWN, folder, sample="list")
+    sweep(PAD, drawn, folder)
     return folder
 
 
@@ -75,17 +83,17 @@ def test_the_fields_of_a_flat_pad_add_up_to_its_forces(swept: Path) -> None:
     assert abs(np.nanmin(depth)) < 0.1
 
 
-def test_an_interrupted_sweep_keeps_its_samples_and_ends_with_the_same_file(swept: Path, tmp_path: Path) -> None:
+def test_an_interrupted_sweep_ends_with_the_same_file(swept: Path, drawn: Path, tmp_path: Path) -> None:
     class Interrupted(Progress):
         def step(self, done: int, total: int, remark: str = "") -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sweep(PAD, DRAWN, tmp_path, sample="list", report=Interrupted())
+        sweep(PAD, drawn, tmp_path, report=Interrupted())
     kept = _arrays(tmp_path)["body_1/sample"]
     assert 1 <= len(kept) < 3
     assert (tmp_path / PARTS).is_dir()
-    sweep(PAD, DRAWN, tmp_path, sample="list")
+    sweep(PAD, drawn, tmp_path)
     whole, again = _arrays(swept), _arrays(tmp_path)
     assert not (tmp_path / PARTS).exists()
     assert whole.keys() == again.keys()

@@ -333,13 +333,6 @@ def test_a_larger_factor_makes_no_edge_of_the_contact_face_longer(y: float) -> N
     assert longest[-1] < 0.5 * longest[0]
 
 
-def test_the_gauges_to_refine_around_may_be_named() -> None:
-    gauges = (Gauge("g", 36.0, 40.0), Gauge("far", 10.0, 20.0))
-    only, both = model(8.0, 4.0, gauges=gauges[:1]), model(8.0, 4.0, gauges=gauges)
-    named = replace(both, mesh=replace(both.mesh, refined_gauges=("g",)))
-    assert build(named).body.report.hash == build(only).body.report.hash != build(both).body.report.hash
-
-
 def test_edges_are_short_along_the_whole_gauge_and_its_mirror_image() -> None:
     gauge = Gauge("long", -20.0, 40.0, length_mm=12.0)
     problem = build(model(8.0, 8.0, gauges=(gauge,)))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.press_record import depth_warning
 from finger3d.contact.friction import OPEN, SLIP, Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
@@ -32,7 +31,7 @@ from finger3d.mechanics.postprocess.penetration import (
 )
 from finger3d.mechanics.results.cavity import CAVITY, cavity_warnings
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_limit import slip_limit
+from finger3d.mechanics.results.slip_margin import largest_force
 from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose, Plane, RigidObject, Sphere, Wedge
 from finger3d.scene import parse
@@ -184,28 +183,22 @@ def test_a_body_without_an_inner_surface_has_no_warning() -> None:
     assert cavity_warnings(mesh, np.zeros_like(mesh.points)) == []
 
 
-def test_the_slip_limit_of_a_flat_contact() -> None:
-    """mu N along every axis; mu times the pressure's first moment about its centre."""
+def test_the_largest_force_of_a_flat_contact() -> None:
+    """mu N along every axis in its plane."""
     problem = build(block(object=Plane(), legs=(PRESS, held(0.03, 0.04 * 0.5))))
     *_, last = march(problem)
-    limit = slip_limit(problem.points, last.state, problem.model.friction)
-    assert limit is not None
-    assert limit.tangential_force_x_N == pytest.approx(MU * N, rel=1e-9)
-    assert limit.tangential_force_z_N == pytest.approx(MU * N, rel=1e-9)
-    p, x, z = last.state.force[:, 0], problem.points.points[:, 0], problem.points.points[:, 2]
-    arm = np.hypot(x - p @ x / p.sum(), z - p @ z / p.sum())
-    assert limit.moment_y_Nmm == pytest.approx(MU * p @ arm, rel=1e-9)
-    assert np.hypot(0.03, 0.02) / (MU * N) <= limit.used < 1.0
+    for along in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, 0.8]):
+        most, pressure = largest_force(problem.points, last.state, problem.model.friction, np.array(along))
+        assert most == pytest.approx(MU * N, rel=1e-9)
+        assert pressure == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_wall_across_x_has_no_friction_along_x() -> None:
     problem = build(block(object=Plane(), legs=(PRESS,), domain="plane-strain"))
     *_, last = march(problem)
     walls = np.tile(np.eye(2), (len(problem.points.points), 1, 1))  # normals along x, tangents along y
-    limit = slip_limit(replace(problem.points, basis=walls), replace(last.state, bases=None), problem.model.friction)
-    assert limit is not None
-    assert limit.tangential_force_x_N == 0.0
-    assert limit.used == 0.0
+    points, state = replace(problem.points, basis=walls), replace(last.state, bases=None)
+    assert largest_force(points, state, problem.model.friction, np.array([1.0, 0.0, 0.0]))[0] == 0.0
 
 
 HEIGHT, DEPTH = 10.0, 0.6
@@ -297,15 +290,6 @@ def test_penetration_is_compared_with_the_depth_that_a_force_reaches() -> None:
     share = max(check.penetration_mm for check in checks) / reached
     assert 0.01 < share < 0.1
     assert penetration_advice(problem, checks)
-
-
-def test_the_warning_of_a_deep_press_tells_the_depth_that_a_force_reaches() -> None:
-    leg = Leg(9.0, steps=3, force_N=60.0)
-    problem, steps = run(section(Plane(), 1.6, 0.2, leg, base=1.0))
-    depth = steps[-1].target.depth_mm
-    assert 0.3 * HEIGHT < depth < 0.8 * leg.depth_mm
-    (line,) = depth_warning(problem, steps)
-    assert f"is {10.0 * depth:.0f} % of the finger's height" in line
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])

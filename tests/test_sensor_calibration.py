@@ -14,13 +14,14 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d.analyses import pressed_body as pressing
 from finger3d.errors import Finger3dError
+from finger3d.fem.recovery.strain_reader import StrainReader
 from finger3d.mechanics.discretise.build import build
 from finger3d.sensor import Calibration, Tolerance, estimate, load, save
 from finger3d.sensor.calibration import summary
 from finger3d.sensor.curve import MonotoneCubic
-from finger3d.sensor.maps import Reader, StrainMap
 from tests.commands import run
 from tests.sensor_cases import SCENE, curve, kinked, line, saturating, scene, straight, together, tolerance, turning
+from validation._strain_maps import StrainMap
 
 
 def test_the_interpolation_is_that_of_scipy() -> None:
@@ -222,9 +223,6 @@ def test_calibration_files_that_are_none(tmp_path: Path) -> None:
         "not JSON, or cut short": good[: len(good) // 2],
         "version 9, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 9}),
         "version 2, this finger3d reads version 5; calibrate again": json.dumps({**data, "version": 2}),
-        "version 1 of several readings, this finger3d reads version 5; calibrate again": json.dumps(
-            {**data, "format": "finger3d joint calibration", "version": 1}
-        ),
         "no calibration": json.dumps([1, 2]),
     }
     for told, text in cases.items():
@@ -302,6 +300,6 @@ def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
 def test_a_reader_of_a_linear_field_is_exact() -> None:
     problem = build(scene().model())
     u = problem.mesh.points @ np.array([[0.1, 0.3], [-0.2, 0.05]])
-    read = Reader.at(problem.mesh, np.array([[10.0, 20.0], [0.0, 200.0]]), ()).strain(u)
+    read = StrainReader.at(problem.mesh, np.array([[10.0, 20.0], [0.0, 200.0]]), ()).strain(u)
     assert read[0] == pytest.approx([0.1, 0.05, 0.05], abs=1e-12)
     assert np.isnan(read[1]).all()

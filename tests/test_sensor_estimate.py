@@ -231,15 +231,6 @@ def test_sets_and_deviations_of_one_reading_are_kept(function: Any) -> None:
         assert np.mean(np.abs(z) > 3.0) < 0.02
 
 
-def test_the_fit_may_take_the_place_of_the_interpolation() -> None:
-    made = curve(lambda mu: 0.02 - 0.01 * mu + 0.003 * mu**2)
-    by_curve, by_fit = (estimate(made, made["g"].at(0.5), curve=shape)[0] for shape in ("interpolation", "fit"))
-    assert by_fit.mu == pytest.approx(by_curve.mu, abs=1e-4)
-    bent = curve(saturating)
-    off = estimate(bent, bent["g"].at(0.3), curve="fit")[0]
-    assert off.std > 2.0 * estimate(bent, bent["g"].at(0.3))[0].std  # the residual of the fit is an error of the curve
-
-
 def test_a_tolerance_that_hides_mu_is_named() -> None:
     made = curve(straight, tolerances=(Tolerance("tilt_deg", "degree", 0.5, np.full(25, 0.02), np.zeros(25)),))
     (blind,) = estimate(made, straight(0.5))

@@ -25,9 +25,9 @@ def prepare() -> None:
     from pypardiso import PyPardisoSolver
 
     from finger3d.contact.acceleration import threads_for
-    from finger3d.fem.solvers.pardiso import available
+    from finger3d.fem.solvers.condense import is_installed
 
-    if available():
+    if is_installed("pardiso"):
         PyPardisoSolver().libmkl.MKL_Get_Max_Threads()
     threads_for(1)
     designs()

@@ -30,7 +30,7 @@ def felupe_press(model: Model, mesh: Mesh, stiffer: float = 1.0) -> tuple[float,
     """
     import felupe as fem
 
-    (leg,), linear = model.legs, model.material.isotropic("FElupe")
+    (leg,), linear = model.legs, model.material
     edges = {tuple(sorted(edge)): 3 + k for k, edge in enumerate(mesh.element.edges)}
     order = [0, 1, 2, edges[0, 1], edges[1, 2], edges[0, 2]]
     plane = [0.0, float(mesh.points[:, 1].max())]

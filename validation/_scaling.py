@@ -72,9 +72,9 @@ class Watch(Progress):
 
 def prepare() -> None:
     """Load what every press needs, before the first fork."""
-    from finger3d.fem.solvers.pardiso import available
+    from finger3d.fem.solvers.condense import is_installed
 
-    available()
+    is_installed("pardiso")
 
 
 def _scene(size: float, base: float) -> Scene:

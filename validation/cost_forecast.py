@@ -109,8 +109,8 @@ def _judged(model: Model, row: CostRow, names: tuple[str, ...]) -> Iterator[tupl
     longer, true = _Pressed(in_edges(own, SLIGHTLY_LONGER)), _truth(own, press)
     for name in names:
         error = abs(true[name] - press.numbers[name]) if true else None
-        beside = longer.relative(name, longer.bars.total(name))
-        yield name, row.errors[name], press.relative(name, press.bars.total(name)), press.relative(name, error), beside
+        bar, beside = (one.relative(name, one.bars.totals().get(name)) for one in (press, longer))
+        yield name, row.errors[name], bar, press.relative(name, error), beside
 
 
 def _truth(model: Model, press: _Pressed) -> dict[str, float]:

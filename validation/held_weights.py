@@ -40,7 +40,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_limit import slip_limit
+from finger3d.mechanics.results.slip_margin import largest_force
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press
@@ -124,8 +124,8 @@ def lifted(problem: Problem, calibration: Calibration, weight: float, mu: float,
     if last.outcome is not Outcome.SLIPS:
         assert last.outcome.ok, last.detail
         np.testing.assert_allclose(measure(problem.points, last)["force_x_N"], -load, rtol=1e-9)
-    limit = slip_limit(problem.points, last.state, Coulomb(mu))
-    used = limit.used if limit and last.outcome.ok else math.nan
+    most, _ = largest_force(problem.points, last.state, Coulomb(mu), np.array([1.0, 0.0, 0.0]))
+    used = abs(measure(problem.points, last)["tangential_force_x_N"]) / most if last.outcome.ok else math.nan
     slips = not last.outcome.ok
     return Lift(weight, mu, noise, found.mu, found.std, found.status, normal, least, slips, used, single)
 

@@ -106,11 +106,10 @@ print(result.outcome)
 print(f"the object sinks by {-result.last.slide_x_mm:.2f} mm")
 
 # %% [markdown]
-# `slip_limit` in the summary says how near to slipping the contact is: the largest tangential force that it holds, and
-# the share that it carries.
+# `slip_margin` says how near to slipping the contact is: 1 less the tangential load over the largest that it holds.
 
 # %%
-result.summary()["slip_limit"]
+result.last.slip_margin
 
 # %% [markdown]
 # With a smaller normal force the whole contact slips. The press ends there, and says how much can be held.

@@ -72,16 +72,16 @@ print(f"each finger closes by {pose['closing_mm']:.3f} mm")
 print(f"the ball sinks by {-pose['z_mm']:.3f} mm")
 
 # %% [markdown]
-# `fingers` has the increments of both fingers, and how near each is to slipping: `used` is the share of the largest
-# friction force that it transmits.
+# `fingers` has the increments of both fingers, and how near each is to slipping: `slip_margin` is what is left of the
+# largest tangential load that it holds.
 
 # %%
 for finger in summary["fingers"]:
-    last, limit = finger["steps"][-1], finger["slip_limit"]
+    last = finger["steps"][-1]
     print(
         f"{finger['finger']}: {last['normal_force_N']:.3f} N, "
         f"carries {-last['force_z_N']:.3f} N, "
-        f"{100 * limit['used']:.0f} % of its friction"
+        f"{100 * (1.0 - last['slip_margin']):.0f} % of what it holds"
     )
 
 # %% [markdown]

@@ -233,7 +233,7 @@ def _with_gauges(model: Model, axes: tuple[str, ...], cells: int, size: PressSiz
     for gauge in model.gauges:
         x, y, z = gauge.middle
         depth = float(model.design.top(np.array([x]), np.array([z]))[0] - y)
-        if not depth > 0.0 or (mesh.refined_gauges and gauge.name not in mesh.refined_gauges):
+        if not depth > 0.0:
             continue
         reach, edge = face_near_gauge(depth, mesh.size_mm / mesh.gauge_refinement)
         mirrored = sum(abs(at) < reach for axis, at in (("x", x), ("z", z)) if axis in axes)

@@ -45,14 +45,8 @@ class ErrorBars:
 
     @property
     def covered(self) -> str:
-        """The errors that `total` is the sum of, in words."""
+        """The errors that `totals` are the sums of, in words."""
         return "error of mesh and increments" if self.steps else "error of the mesh without that of the increments"
-
-    def total(self, name: str) -> float | None:
-        """Return the sum of both errors of a number, None without an estimate of its discretisation error."""
-        if name not in self.discretisation:
-            return None
-        return self.discretisation[name] + self.steps.get(name, 0.0)
 
     def totals(self) -> dict[str, float]:
         """Return the sums of both errors by name."""

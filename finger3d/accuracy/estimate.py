@@ -19,7 +19,6 @@ from finger3d.accuracy.companion_presses import CompanionPress, companion_presse
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.richardson import spacing, spread_error
 from finger3d.errors import FAILURES, Finger3dError
-from finger3d.mechanics.discretise.companions import is_unstructured
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import (
     StepEstimate,
@@ -39,9 +38,6 @@ Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 Companions = Callable[[Problem, StepEstimate | None, Progress], list[CompanionPress]]
 """Returns the presses of companions, as `companion_presses` does."""
-
-_MESHED_S = 1.0
-"""Seconds above which a mesh was made by pytetwild and not read from the cache."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,19 +240,11 @@ def _marching_cost(problem: Problem) -> float:
 
 
 def _on_meshes(companions: Sequence[Problem], kind: str) -> str:
-    """Return how the discretisation error was estimated, with the time of meshes that were made for it."""
+    """Return how the discretisation error was estimated."""
     own = companions[0].model
     given = isinstance(own.design, GivenMesh)
     mesher = "bisected" if given else own.mesh.mesher if companions[0].dim == 3 else "structured"
     sizes = f"{mesher}, {', '.join(f'{beside.model.mesh.size_mm:.4g}' for beside in companions)} mm"
     sizes += ", of both bodies" if own.object_compliance else ""
     dofs = ", ".join(str(beside.size.dofs) for beside in companions)
-    text = f"mesh: {dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}spread"
-    made = sum(
-        beside.seconds["cad"] + beside.seconds["mesh"] + beside.seconds.get("object_mesh", 0.0)
-        for beside in companions
-        if is_unstructured(beside.model)
-    )
-    if made > _MESHED_S:
-        text += f" (meshing took {made:.1f} s; kept in the cache, it is paid once)"
-    return text
+    return f"mesh: {dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}spread"

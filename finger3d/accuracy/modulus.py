@@ -8,11 +8,12 @@ plus its spread.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from finger3d.accuracy.estimate import Measure
 from finger3d.errors import FAILURES, MissingError
-from finger3d.fem.laws.material import Material
+from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import with_increments_of
@@ -21,8 +22,6 @@ from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.columns import MEASURED
 from finger3d.mechanics.readings.quantities import quantities
 from finger3d.mechanics.results.history import StepResult
-
-Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 _ROUND_OFF = 1e-9
 """Relative error of a number that does not depend on the modulus, such as the prescribed force."""
@@ -80,9 +79,8 @@ def _by_variants(
 def times_modulus(model: Model, ratio: float, label: str | None = None) -> Model:
     """Return a model with Young's modulus of one part, "" for the main body, or of all of them times a ratio."""
 
-    def scaled(name: str, material: Material) -> Material:
-        own = material.isotropic("the spread of E_MPa")
-        return replace(own, E_MPa=(ratio if label in (None, name) else 1.0) * own.E_MPa)
+    def scaled(name: str, material: Isotropic) -> Isotropic:
+        return replace(material, E_MPa=(ratio if label in (None, name) else 1.0) * material.E_MPa)
 
     parts = tuple((name, scaled(name, one)) for name, one in model.parts)
     return replace(model, material=scaled("", model.material), parts=parts)

@@ -49,11 +49,6 @@ def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind)
     return max((abs(v) for k, v in numbers.items() if kinds[k] is kind), default=0.0)
 
 
-def largest_readings(numbers: Mapping[str, float], kinds: Mapping[str, Kind]) -> dict[Kind, float]:
-    """Return the largest magnitude of every kind of reading, to which errors of readings are relative."""
-    return {kind: largest(numbers, kinds, kind) for kind in Kind if kind.is_reading}
-
-
 def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str) -> float:
     """Return the magnitude to which an error of a number is relative.
 
@@ -62,8 +57,8 @@ def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str)
     Where nothing sticks or slips, it is the area of contact, the normal force and the work for areas, friction and
     dissipation.
     """
-    kind, scale = kinds[name], abs(numbers[name])
-    scale = largest_readings(numbers, kinds).get(kind, scale)
+    kind = kinds[name]
+    scale = largest(numbers, kinds, kind) if kind.is_reading else abs(numbers[name])
     force, reach = abs(numbers.get("normal_force_N", 0.0)), numbers.get("contact_half_length_mm", scale)
     if kind in (Kind.CONTACT_LENGTH, Kind.STICK_LENGTH):
         return reach

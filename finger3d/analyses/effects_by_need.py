@@ -7,7 +7,7 @@ every effect that it names.  What is left out is a part of the model's error.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from finger3d.accuracy.changes import ChangeEstimate
 from finger3d.accuracy.model_error import Enriched, Judged, Judgement
 from finger3d.effects import effect_names
 from finger3d.progress import QUIET, Progress
-from finger3d.scene import Scene, parse
+from finger3d.scene import Scene, Source, parse, tables_of
 
 _NEEDS = {
     "viscosity": "no Prony series",
@@ -91,10 +91,11 @@ def settled(scene: Scene, report: Progress = QUIET) -> tuple[Scene, Need | None]
     return scene.with_effects([*scene.fixed_effects, *need.used]), need
 
 
-def settled_tables(given: TreeView, path: Path | None, report: Progress = QUIET) -> TreeView:
-    """Return the tables of a scene with the effects that it calls for."""
+def settled_tables(source: Source, overrides: Sequence[str], report: Progress) -> tuple[TreeView, Path | None]:
+    """Return the tables of a scene with the effects that it calls for, and its path."""
+    given, path = tables_of(source, overrides)
     scene, need = settled(parse(given, path), report)
-    return given if need is None else {**given, "effects": scene.given["effects"]}
+    return (given if need is None else {**given, "effects": scene.given["effects"]}), path
 
 
 def judge(scene: Scene, report: Progress = QUIET) -> Need:

@@ -1,4 +1,4 @@
-"""Files of a scene's model for other programs: its mesh as .vtu and .msh, and the press as a deck of CalculiX."""
+"""Files of a scene's model for other programs: its mesh as .vtu, and the press as a deck of CalculiX."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from finger3d.io import claimed, holds, write_text
 from finger3d.progress import Progress
 from finger3d.scene import Source, scene_of
 
-MESH_FILES = ("finger.vtu", "finger.msh")
+MESH_FILE = "finger.vtu"
 DECK_FILE = "press.inp"
 
 
@@ -37,9 +37,9 @@ class ModelFiles:
 def export_mesh(
     scene: Source, out: str | Path, report: Progress | None = None, overrides: Sequence[str] = ()
 ) -> ModelFiles:
-    """Write the mesh of the whole finger, its facets and its parts by name, as finger.vtu and finger.msh.
+    """Write the mesh of the whole finger, its facets and its parts by name, as finger.vtu.
 
-    Both may be the finger of another scene.  Where symmetry halves the press, the mesh is unfolded.
+    It may be the finger of another scene.  Where symmetry halves the press, the mesh is unfolded.
 
     Parameters
     ----------
@@ -56,24 +56,22 @@ def export_mesh(
     from finger3d.fem.mesh.simplex import axis_numbers, unfold
     from finger3d.mechanics.discretise.build import mesh_part
     from finger3d.mechanics.discretise.symmetry import symmetry
-    from finger3d.meshing.given.mesh_output import write_mesh_msh, write_mesh_vtu
+    from finger3d.meshing.given.mesh_output import write_mesh_vtu
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     model = scene.model()
     if model.domain != "solid":
         raise Finger3dError(f'--mesh: a section has no tetrahedra; set model.domain = "solid", not "{model.domain}"')
     own = Path(getattr(scene.design, "path", ""))
-    if holds(out, MESH_FILES, own):
+    if holds(out, (MESH_FILE,), own):
         raise Finger3dError(f"--out {out}: holds {own.name}, the finger's own file; name another folder")
     report.stage("meshing")
     axes = symmetry(model)
     part, _ = mesh_part(model, model.first_contact.contact_box, axes, report)
     whole, _, _ = unfold(part, axis_numbers(axes))
     with claimed(out):
-        write_mesh_vtu(out / MESH_FILES[0], whole)
-        write_mesh_msh(out / MESH_FILES[1], whole)
-    files = tuple(out / name for name in MESH_FILES)
-    return ModelFiles(files, len(whole.points), len(whole.cells))
+        write_mesh_vtu(out / MESH_FILE, whole)
+    return ModelFiles((out / MESH_FILE,), len(whole.points), len(whole.cells))
 
 
 def export_deck(

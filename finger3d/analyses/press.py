@@ -8,11 +8,11 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from finger3d.accuracy.companion_presses import CompanionThread
 from finger3d.analyses.press_files import Fields, ResultWriter
-from finger3d.analyses.press_record import PressRecord, depth_warning, point_count_warning
+from finger3d.analyses.press_record import PressRecord, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody, with_penetration
 from finger3d.analyses.result import PressResult, result_in
 from finger3d.errors import Finger3dError
@@ -69,6 +69,7 @@ def press(
     >>> len(finger3d.press("scene.toml", overrides=["material.E_MPa=2.0"]).steps)
     4
     """
+    from finger3d.analyses.effects_by_need import settled
     from finger3d.scene import scene_of
 
     started = time.perf_counter()
@@ -77,52 +78,30 @@ def press(
         raise Finger3dError("--least-grip: only of a scene with [grip]")
     temporary = TemporaryDirectory(prefix="finger3d-") if out is None else None
     figures = temporary is None if figures is None else figures
-    with claimed(temporary.name if temporary else str(out), "press") as folder:
-        wanted = Wanted(error, figures, least_grip)
-        record = run_press(scene, ResultWriter(folder), report or Progress(), started, wanted)
-    return result_in(folder, record.history, temporary)
-
-
-class Wanted(NamedTuple):
-    """What a press is asked for besides its increments: error bars, pictures, the smallest grip that holds."""
-
-    error: bool
-    figures: bool
-    least_grip: bool
-
-
-def run_press(scene: Scene, writer: ResultWriter, report: Progress, started: float, wanted: Wanted) -> PressRecord:
-    """Solve a scene, recover its fields, estimate its errors; write and draw each as it is known.
-
-    Parameters
-    ----------
-    started : `time.perf_counter()` at the start of the job, s
-    wanted : what is estimated and drawn
-    """
-    from finger3d.analyses.effects_by_need import settled
-
-    scene, need = settled(scene, report)
-    with CompanionThread() as companions:
-        record = _solve(scene, writer, report, started, companions.begin if wanted.error else None)
+    report = report or Progress()
+    with claimed(temporary.name if temporary else str(out), "press") as folder, CompanionThread() as companions:
+        writer = ResultWriter(folder)
+        scene, need = settled(scene, report)
+        record = _solve(scene, writer, report, started, companions.begin if error else None)
         record.need = need
         fields = _recover(record, writer, report)
         writer.summary(record, record.outcome())
-        with writer.pictures(record, fields) if wanted.figures and fields else nullcontext(lambda: None) as draw:
-            if wanted.error:
+        with writer.pictures(record, fields) if figures and fields else nullcontext(lambda: None) as draw:
+            if error:
                 _estimate_errors(record, report, companions)
                 writer.markers(record)
                 _estimate_changes(record, report)
                 writer.summary(record, record.outcome())
-            if wanted.least_grip:
+            if least_grip:
                 _find_least_grip(record, report)
                 writer.summary(record, record.outcome())
-            if wanted.figures:
+            if figures:
                 from finger3d.report.press import press_page
 
                 report.stage("drawing")
                 draw()
-                press_page(writer.folder)
-    return record
+                press_page(folder)
+    return result_in(folder, record.history, temporary)
 
 
 # --- solve --------------------------------------------------------------------------------------------------------
@@ -255,8 +234,6 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Sta
     begin = time.perf_counter()
     report.stage("writing fields")
     states, good, problem = None, record.converged_steps, record.problem
-    if any(leg.force_N is not None for leg in problem.model.legs):
-        record.warnings += depth_warning(problem, good)
     if good:
         formulation = formulation_of(problem.model)
         fields = [Fields.of(own, *formulation.fields(own, steps[-1].meshed_state)) for own, steps in record.fingers()]

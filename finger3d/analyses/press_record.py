@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,7 +20,6 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.grip import FINGERS, Grip
 from finger3d.mechanics.results.history import History, StepResult, measure
 from finger3d.mechanics.results.slip_events import slip_events
-from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.objects import ObjectPose
 
 if TYPE_CHECKING:
@@ -34,9 +33,6 @@ if TYPE_CHECKING:
     from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
     from finger3d.mechanics.postprocess.penetration import SurfaceCheck
     from finger3d.scene import Scene
-
-_SMALL_STRAIN_DEPTH = 0.3
-"""Largest press depth over the finger's height without a warning at small strain; 0.2 in Maeno et al. 2004, Fig. 9."""
 
 _RESOLVED_POINTS = {2: 6, 3: 100}
 """Fewest contact points of a resolved contact zone, by dimension: six on a line, ten by ten on a surface."""
@@ -99,12 +95,7 @@ class PressRecord:
         self.workspace = formulation_of(self.problem.model).workspace()
         self.coupling = self.problem.coupling()
         self.seconds = {"cad": 0.0, "mesh": 0.0, **self.problem.seconds, "contact": 0.0, "output": 0.0}
-        forced = any(leg.force_N is not None for leg in self.problem.model.legs)  # the depth is not known yet
-        self.warnings += [
-            *self.problem.model.warnings,
-            *_coupling_warning(self.coupling),
-            *([] if forced else depth_warning(self.problem, [])),
-        ]
+        self.warnings += [*self.problem.model.warnings, *_coupling_warning(self.coupling)]
         self.warnings += resolution.warnings(self.problem)
         if self.refinement and self.refinement.warning:
             self.warnings.append(self.refinement.warning)
@@ -157,12 +148,9 @@ class PressRecord:
         return str(self.history.outcome) if failed is None else failed.failure
 
     def _slip(self, problem: Problem, steps: Sequence[StepResult]) -> Tree:
-        """Return what the contact holds before it slips as a whole, what is left of it, and where and when it slips."""
-        good = [step for step in steps if step.outcome.ok]
-        limit = slip_limit(problem.points, good[-1].state, problem.model.friction) if good else None
+        """Return where and when the contact slips, and what is left of it until it does."""
         margin = [self.entry(step)["slip_margin"] for step in steps]
-        events = slip_events(problem.points, steps, margin, problem.model.readings)
-        return {"slip_limit": limit.as_dict() if limit else None, **events}
+        return slip_events(problem.points, steps, margin, problem.model.readings)
 
     def _grip_summary(self, outcome: str) -> Tree:
         """Return what two fingers have besides: the increments of each, the object's pose, and whether it is held."""
@@ -242,22 +230,6 @@ def _coupling_warning(coupling: float) -> list[str]:
     return [
         f"The largest mu |K_tt^-1 K_tn| is {coupling:.3g}, above 1: several contact states may satisfy all conditions. "
         "The one reported follows from the load history."
-    ]
-
-
-def depth_warning(problem: Problem, steps: Sequence[StepResult]) -> list[str]:
-    """Return a warning if a press in small strain is deep; `steps` tell the depth of one whose force is given."""
-    from finger3d.mechanics.postprocess.penetration import reached_depth
-
-    if problem.model.finite_strain:
-        return []
-    height = problem.model.design.height_mm
-    ratio = reached_depth(problem.model, steps) / height
-    if ratio <= _SMALL_STRAIN_DEPTH:
-        return []
-    return [
-        f"The press depth is {100.0 * ratio:.0f} % of the finger's height of {height:.4g} mm: small strain is a poor "
-        "model there, however small the residual. Press less, or switch on [effects.large_deformation]."
     ]
 
 

@@ -11,13 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
 
 from finger3d._machine import versions
 from finger3d._types import TreeView
 from finger3d.analyses.pressed_body import under
 from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, write
-from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.errors import Finger3dError
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
@@ -98,21 +96,13 @@ class ReducedModel:
         """Contact points of the meshed part."""
         return len(self.problem.surface.nodes)
 
-    def press(
-        self,
-        mu: float | None = None,
-        legs: Sequence[Leg] | None = None,
-        ratio: float | None = None,
-        branch: str | None = None,
-    ) -> History:
+    def press(self, mu: float | None = None, legs: Sequence[Leg] | None = None) -> History:
         """Press once; an argument that is None is as in the scene.
 
         Parameters
         ----------
         mu : coefficient of friction, from 0 up
         legs : path of the object
-        ratio : mu_kinetic / mu_static, 0 to 1
-        branch : "keep" or "paper", the state of a slipping point in the next step (`finger3d.effects.kinetic_friction`)
 
         Returns
         -------
@@ -126,8 +116,6 @@ class ReducedModel:
         """
         model = self.problem.model
         law = model.friction if mu is None else model.friction.with_mu(mu)
-        if ratio is not None or branch is not None:
-            law = _kinetic(law, ratio, branch)
         if legs is not None:
             self._check(tuple(legs))
         problem = under(self.problem, law, tuple(legs or ()))
@@ -180,14 +168,3 @@ class ReducedModel:
             In one line, if the file is not there, of another kind or version, or damaged.
         """
         return cls(*read(path))
-
-
-def _kinetic(law: FrictionLaw, ratio: float | None, branch: str | None) -> FrictionLaw:
-    """Return the law with another kinetic coefficient or branch; None leaves either as it is."""
-    from finger3d.contact.friction import TwoCoefficients
-
-    if not isinstance(law, Coulomb | TwoCoefficients):
-        raise Finger3dError(f"ratio and branch: {type(law).__name__} has no kinetic coefficient")
-    before = law if isinstance(law, TwoCoefficients) else TwoCoefficients(law.mu, 1.0, "keep")
-    ratio = before.ratio if ratio is None else float(ratio)
-    return replace(before, ratio=ratio, branch=cast(Any, branch) or before.branch)

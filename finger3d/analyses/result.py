@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import pandas
     import pyvista
 
-    from finger3d.analyses.sensitivity import Effect
-
 
 @dataclass(frozen=True)
 class Picture:
@@ -189,21 +187,6 @@ class PressResult:
         if table == "markers" and not self._tables[table]:
             raise Finger3dError("to_dataframe('markers'): the scene has no [[marker]] and no [marker_grid]")
         return pandas.DataFrame(self._tables[table])
-
-    def effects(self, number: str) -> dict[str, Effect]:
-        """Return what a change of each key of the scene does to a number at the end of the press, with its error.
-
-        See `finger3d.analyses.sensitivity.sensitivity`, which presses the scene again for each key.
-
-        Raises
-        ------
-        Finger3dError
-            If the press has no such number.
-        """
-        from finger3d.analyses.sensitivity import sensitivity  # a press needs none of it
-        from finger3d.scene.material import with_moduli_only
-
-        return dict(sensitivity(with_moduli_only(self._numbers["scene"]), [number]).effects[number])
 
     def plot_contact(self) -> Picture:
         """Draw pressure, friction, its limit and the zones of stick and slip along x in the last good increment."""

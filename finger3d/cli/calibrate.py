@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Flag, Json, Noise, Out, Set, app, job, load, print_json, print_rows
+from finger3d.cli.common import Json, Noise, Out, Set, app, job, load, print_json, print_rows
 from finger3d.cli.tolerances import Tolerances, parsed_tolerances
 from finger3d.errors import MissingError
 
@@ -30,8 +30,6 @@ class CalibrationOptions:
         Standard deviation of a reading of a taxel, MPa.
     resolution
         Largest standard deviation of mu at which the sensor is usable.
-    map
-        Also map the sensitivity of strain to mu over the section.
     """
 
     gauge: str
@@ -41,7 +39,6 @@ class CalibrationOptions:
     taxel_noise: float = 1e-3
     resolution: float = 0.1
     tolerance: Tolerances = None
-    map: Flag = False
 
 
 @app.command
@@ -82,7 +79,6 @@ def calibrate(
             options.resolution,
             parsed_tolerances(options.tolerance),
             report=report,
-            maps=options.map,
             marker_noise_mm=options.marker_noise,
             taxel_noise_MPa=options.taxel_noise,
         )

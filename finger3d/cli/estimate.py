@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -27,7 +28,7 @@ class ReadingOptions:
         CSV file of readings: a column for each, NAME, and optionally NAME_std; of a single reading strain and
         std will do.
     follow
-        The same, with lines still being written: a file, or - for standard input.
+        The same from standard input, -, line by line as it is written, for instance by tail -F readings.csv.
     """
 
     strain: Annotated[list[str] | None, Parameter(negative=(), allow_leading_hyphen=True)] = None
@@ -44,15 +45,14 @@ def estimate(
     given: Annotated[ReadingOptions, Parameter(name="*")] = ReadingOptions(),
     out: Path | None = None,
     json_: Json = False,
-    curve: Literal["interpolation", "fit"] = "interpolation",
     tolerances: bool = True,
 ) -> None:
     """Estimate mu and its standard deviation from readings, or report why they do not determine mu.
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
-    With --follow an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A line
-    that is no reading has the status invalid and the reason; a file that is replaced or cut is read from its start.
+    With --follow - an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A
+    line that is no reading has the status invalid and the reason.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ def estimate(
         The calibration.json that `finger3d calibrate` wrote.
     out
         CSV file for the estimates from --csv; default: print them.
-    curve
-        Curve of the readings over mu: the monotone interpolation or the second-order fit.
     tolerances
         Include the tolerances of the calibration in the standard deviation.
     """
     if sum(source is not None for source in (given.strain, given.csv, given.follow)) != 1:
-        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow FILE")
+        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow -")
+    if given.follow not in (None, "-"):
+        raise Finger3dError(f"--follow {given.follow}: must be -, standard input; tail -F FILE writes a file to it")
     if out is not None and given.csv is None:
         raise Finger3dError("estimate: --out goes with --csv")
     from finger3d.io import write_csv
@@ -74,9 +74,9 @@ def estimate(
     from finger3d.sensor.given_readings import Estimator, csv_line, named_numbers
 
     read = load(calibration)
-    estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), curve, tolerances)
+    estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), tolerances)
     if given.follow is not None:
-        for line in estimator.followed(given.follow):
+        for line in estimator.followed(sys.stdin.buffer):
             print(line, flush=True)
     elif given.csv is None:
         (result,) = estimator.estimates(named_numbers(read, "--strain", given.strain or ()), {})

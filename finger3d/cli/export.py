@@ -53,7 +53,7 @@ class ExportOptions:
     tolerance_mm
         Largest distance between triangles and surface, in mm; 0.05, or with --mold the printer's.
     mesh
-        Write the mesh as .vtu and .msh instead, with its facets and parts by name.
+        Write the mesh as .vtu instead, with its facets and parts by name.
     solver
         Write the press as an input deck of this solver instead: calculix.
     """

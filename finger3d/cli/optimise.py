@@ -30,10 +30,8 @@ class OptimiseOptions:
         a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg.
     spacing
         Least distance of two of these, mm: their length, so that none overlap.
-    objective
-        sensitivity, or a Python file with objective(table) -> number; the largest is best.
     gauge
-        Gauge that the objective uses; default: the first.
+        Gauge whose sensitivity to friction is to be largest; default: the first.
     mu
         Ascending values of mu, with commas; default: nine from 0.05 to 1.
     budget
@@ -46,7 +44,6 @@ class OptimiseOptions:
     gauges: int | None = None
     spacing: float = 3.0
     tolerance: Tolerances = None
-    objective: str = "sensitivity"
     gauge: str | None = None
     mu: str | None = None
     noise: Noise = 1.5e-4
@@ -98,7 +95,7 @@ def _find_design(scene: Path, out: Path, o: OptimiseOptions, set_: list[str], js
 
     kept = f"every evaluated design is kept in {out}; the same command continues"
     with job(json_, lambda _: kept) as report:
-        result = run(scene, o.free or (), out, o.objective, o.gauge, o.mus, o.noise, o.budget, o.seed, set_, report)
+        result = run(scene, o.free or (), out, o.gauge, o.mus, o.noise, o.budget, o.seed, set_, report)
     design = read_json(out / "design.json")
     chosen = zip(result.keys, result.best.values, strict=True)
     rows = [

@@ -135,7 +135,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
     from finger3d.results.summary import ROUND_OFF, readings_of
 
     def number(one: Quantity, value: float) -> str:
-        error = bars.total(one.name)
+        error = bars.totals().get(one.name)
         return with_error(one.factor * value, None if error is None else one.factor * error, sign="+-")
 
     def line(one: Quantity, value: float) -> str:
@@ -168,7 +168,7 @@ def _of_model(summary: TreeView, one: Quantity, bars: ErrorBars) -> str:
     """Return what the effects that are off would change, where that is more than the error bar."""
     from finger3d.accuracy.changes import two_digits
 
-    least, said = bars.total(one.name) or 0.0, []
+    least, said = bars.totals().get(one.name, 0.0), []
     for name, changes in summary.get("model_error", {}).items():
         change, low, high = (changes.get(one.name, {}).get(part, 0.0) for part in ("change", "low", "high"))
         if abs(change) > least and low * high > 0.0:

@@ -73,10 +73,8 @@ class SweepOptions:
             )
         if self.range is not None and self.sample is None:
             raise Finger3dError("--range: only with --sample, for instance --sample lhs:200")
-        if self.sample in ("grid", "list"):
-            raise Finger3dError(
-                f"--sample {self.sample}: must be lhs:NUMBER or random:NUMBER; --vary and --points list points"
-            )
+        if self.sample == "grid":
+            raise Finger3dError("--sample grid: must be lhs:NUMBER or random:NUMBER; --vary gives a grid")
 
 
 @app.command

@@ -57,8 +57,6 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Set the hyperelastic law of the model."""
-        for material in (model.material, *(material for _, material in model.parts)):
-            material.isotropic(_TABLE)
         law = self._isochoric_law()
         for mode, strain in {} if law.is_stable else unstable_from(law).items():
             if abs(strain) < _LEAST_STABLE_STRAIN:

@@ -14,8 +14,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.fem.laws.material import LinearElasticity
 from finger3d.fem.mesh.elements import quadrature
+from finger3d.fem.mesh.parts import LinearElasticity
 from finger3d.fem.mesh.simplex import Mesh
 
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
@@ -224,7 +224,7 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
     pattern = Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
     hats = bary  # the linear shape functions
-    scale = pressure_scale(mesh, elastic.shear_modulus) if elastic.mixed else 1.0
+    scale = pressure_scale(mesh, elastic.shear) if elastic.mixed else 1.0
     for part in cell_parts(mesh):
         gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells[part]], bary)
         weights = det * (w * thickness)
@@ -234,7 +234,7 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
             weighted = np.swapaxes(weights[:, :, None] * hats, 1, 2)  # (e, p, q)
             e, q, k, _ = gradients.shape
             coupling = np.matmul(scale * weighted, gradients.reshape(e, q, k * d)).reshape(e, -1, k, d)
-            compressibility = 1.0 / np.reshape(law.pressure_modulus, (-1, 1, 1))
+            compressibility = 1.0 / np.reshape(law.lame, (-1, 1, 1))
             mass = -(scale**2) * compressibility * np.matmul(weighted, hats)
             pattern.add_pressure(data, part, coupling, mass)
     return Stiffness(pattern.matrix(data), pattern.vertices, scale)

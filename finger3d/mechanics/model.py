@@ -11,7 +11,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.design import Design
 from finger3d.mechanics.readings.columns import Column
@@ -96,7 +96,7 @@ class MeshOptions:
 
     `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
     free end.  `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face
-    close to them; at 1 the mesh is not refined.  `refined_gauges` are the names of the gauges concerned; empty for all.
+    close to them; at 1 the mesh is not refined.
     `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
     lengths there, once a press has found it.
     """
@@ -106,7 +106,6 @@ class MeshOptions:
     mesher: Mesher = "ftetwild"
     layers: int = 2
     gauge_refinement: float = 1.0
-    refined_gauges: tuple[str, ...] = ()
     stick_refinement: float = 1.0
     borders: SizedPlaces | None = None
 
@@ -162,7 +161,7 @@ class Model:
     """
 
     design: Design
-    material: Material
+    material: Isotropic
     mesh: MeshOptions
     legs: tuple[Leg, ...]
     object: RigidObject = field(default_factory=Plane)
@@ -180,7 +179,7 @@ class Model:
     held_ends: bool = False
     symmetry: tuple[str, ...] | None = None
     centre_of_mass_mm: tuple[float, float, float] | None = None
-    parts: tuple[tuple[str, Material], ...] = ()
+    parts: tuple[tuple[str, Isotropic], ...] = ()
     filled: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -230,7 +229,7 @@ class Model:
         materials = (self.material, *(material for _, material in self.parts))
         return self.domain != "plane-stress" and any(material.is_nearly_incompressible for material in materials)
 
-    def materials(self, labels: Sequence[str]) -> tuple[Material, ...]:
+    def materials(self, labels: Sequence[str]) -> tuple[Isotropic, ...]:
         """Return the material of the main body, and those of the parts with these labels."""
         own = dict(self.parts)
         return (self.material, *(own.get(label, self.material) for label in labels))
@@ -254,11 +253,7 @@ class Model:
     @property
     def stresses_scale_with_modulus(self) -> bool:
         """Whether all stresses at given displacements are proportional to Young's modulus of the finger."""
-        finger, parts = self.material, [material for _, material in self.parts]
-        rigid = all(
-            isinstance(finger, Isotropic) and isinstance(part, Isotropic) and part.E_MPa == RIGID_RATIO * finger.E_MPa
-            for part in parts
-        )
+        rigid = all(part.E_MPa == RIGID_RATIO * self.material.E_MPa for _, part in self.parts)
         return rigid and self.inclusions is None and self.object_compliance is None
 
     @property

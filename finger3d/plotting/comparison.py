@@ -15,7 +15,7 @@ from finger3d.results.comparison import FORCE, SHOWN, Case
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222", "solid, ends held": "#e08214"}
+_COLOURS = {"plane strain": "#b2182b", "plane stress": "#2166ac", "solid": "#222222"}
 _MOST_QUANTITIES = 9  # groups of bars
 
 
@@ -60,12 +60,8 @@ def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
         lw=1.3,
         capsize=3,
         color=_COLOURS["solid"],
-        label="solid, ends free",
+        label="solid",
     )
-    for case in own:
-        if case.model == "solid, ends held":
-            colour = _COLOURS[case.model]
-            axes.plot(case.width_mm, case.numbers[FORCE], "D", ms=7, mfc="none", color=colour, label=case.model)
     if len(width) > 1:
         axes.set_xscale("log")
         axes.set_xticks(width, [f"{w:g}" for w in width])
@@ -85,14 +81,13 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
         column.key: f"gauge\n{column.sensor}" for column in solid.strains
     }
     keys = [k for k in names if solid.numbers.get(k)][:_MOST_QUANTITIES]
-    shown = [c for c in own if c.model != "solid, ends held"]
-    at, step = np.arange(len(keys)), 0.8 / max(len(shown), 1)
-    for i, case in enumerate(shown):
+    at, step = np.arange(len(keys)), 0.8 / len(own)
+    for i, case in enumerate(own):
         scale = np.array([solid.numbers[k] for k in keys])
         value = np.array([case.numbers[k] for k in keys]) / scale
         error = np.array([case.errors.get(k, 0.0) for k in keys]) / np.abs(scale)
         axes.bar(
-            at + (i - 0.5 * (len(shown) - 1)) * step,
+            at + (i - 0.5 * (len(own) - 1)) * step,
             value,
             0.92 * step,
             yerr=error,
@@ -111,8 +106,6 @@ def _bars(axes: Axes, own: Sequence[Case]) -> None:
 def _along(axes: Axes, own: Sequence[Case], key: str, label: str) -> None:
     """Draw a traction against x for each model; for the solid at its middle and at its end."""
     for case in own:
-        if case.model == "solid, ends held":
-            continue
         for line, columns in case.lines.items():
             dashes, where = ("-", "") if line == "z = 0" else (":", ", end")
             where = ", z = 0" if case.model == "solid" and line == "z = 0" else where

@@ -61,7 +61,6 @@ def calibrate_page(folder: str | Path) -> Path:
         ],
         [
             Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance"),
-            Figure("map.png", "Sensitivity of strain to friction over the section"),
         ],
         command="calibrate",
         outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",

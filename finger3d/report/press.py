@@ -68,7 +68,6 @@ def press_page(folder: str | Path) -> Path:
         *([_proof(steps, states, good)] if steps else []),
         *([_error_bars(bars)] if summary.get("error_estimate") else []),
         *_changes(summary),
-        *([_slip_limit(limit)] if (limit := summary.get("slip_limit")) else []),
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
@@ -163,29 +162,6 @@ def _changes(summary: TreeView) -> list[PageSection]:
             title = f"Model error: what {name.replace('_', ' ')} would change"
             out.append(PageSection(title, [text, Table(head, changed)], folded=True))
     return out
-
-
-def _slip_limit(limit: TreeView) -> PageSection:
-    """Return the largest tangential forces and torque that the last contact holds, and the share that it transmits."""
-    names = {
-        "tangential_force_x_N": "net friction along x (N)",
-        "tangential_force_z_N": "net friction along z (N)",
-        "moment_y_Nmm": "moment of friction about the press axis (N mm)",
-    }
-    rows = [(text, limit[key]) for key, text in names.items() if limit[key] is not None]
-    used = f"{round(100.0 * limit['used'], 6):.3g} % of the friction available is used."
-    said = (
-        "What the last contact transmits at most before it slips as a whole: every point at its friction limit, with "
-        "its normal force as it is. "
-    )
-    if limit["moment_y_Nmm"] is None:
-        said += used[0].upper() + used[1:]
-    else:
-        said += (
-            "The moment is about the press axis through the centre of pressure. Each value is that of the resultant "
-            f"alone; together they bound an ellipsoid (Howe and Cutkosky 1996), by which {used}"
-        )
-    return PageSection("How near to slipping", [said, Table(("resultant", "largest"), rows)])
 
 
 def _proof(steps: Sequence[PressStep], states: States | None, good: Sequence[PressStep]) -> PageSection:

@@ -31,7 +31,7 @@ class Case:
 
     Attributes
     ----------
-    model : plane stress, plane strain, solid, or solid with held ends
+    model : plane stress, plane strain, or solid
     size_mm : edge length at the contact
     numbers : quantity -> value, forces per width; see `finger3d.analyses.compare.cases.quantities`
     strains : columns of the strains among the numbers

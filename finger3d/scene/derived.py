@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float, TreeView
-from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, Material
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.geometry.design import Design
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Leg, contact_path
@@ -29,7 +29,7 @@ by some 20 %, and were then meshed and pressed again."""
 _NU_OF_RIGID = 0.3  # of a material that hardly deforms, any does
 
 
-def parts_of(tables: SceneTable) -> tuple[tuple[str, Material], ...]:
+def parts_of(tables: SceneTable) -> tuple[tuple[str, Isotropic], ...]:
     """Return label and material of every part with a table of its own.
 
     Young's modulus of a rigid part is `RIGID_RATIO` times the largest of the elastic materials.

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float, TreeView
 from finger3d.errors import MissingError
-from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, Shape
+from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve
 from finger3d.sensor.likelihood import Estimate, estimator, ranges_text
 from finger3d.sensor.model import SensorModel
 
@@ -64,14 +64,12 @@ class Calibration(SensorModel):
         rows = [(name.strip(), str(said)) for name, said in summary(self)]
         return card(self.title.capitalize(), f"{len(self.mu)} values of mu", rows, [self.verdict()])
 
-    def estimates(
-        self, readings: Float, noise: Float | None = None, tolerances: bool = True, shape: Shape = "interpolation"
-    ) -> list[Estimate]:
+    def estimates(self, readings: Float, noise: Float | None = None, tolerances: bool = True) -> list[Estimate]:
         """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
         stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
         model = self if tolerances else self.without_tolerances
         return [
-            estimator(model, self.limit, tuple(std.tolist()), shape).estimate(reading)
+            estimator(model, self.limit, tuple(std.tolist())).estimate(reading)
             for reading, std in zip(readings, stds, strict=True)
         ]
 

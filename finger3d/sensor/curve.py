@@ -74,8 +74,6 @@ def _end_slope(near: float, far: float, secant: float, next_secant: float) -> fl
     return slope
 
 
-Shape = Literal["interpolation", "fit"]
-
 Kind = Literal["gauge", "marker", "taxel"]
 
 QUANTITIES: dict[Kind, tuple[str, str]] = {
@@ -113,6 +111,11 @@ class Fit:
     coefficients: tuple[float, float, float]
     rms: float
     largest: float
+
+    def at(self, mu: ArrayLike) -> Float:
+        """Return the strain at mu."""
+        c0, c1, c2 = self.coefficients
+        return np.asarray(c0 + c1 * np.asarray(mu) + c2 * np.asarray(mu) ** 2)
 
 
 @dataclass(frozen=True)
@@ -166,24 +169,18 @@ class ReadingCurve:
     def _pchip(self) -> MonotoneCubic:
         return MonotoneCubic.of(self.mu, self.reading)
 
-    def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return the reading at mu in the calibrated range, by monotone cubic interpolation (PCHIP) or by the fit."""
-        if shape == "fit":
-            c0, c1, c2 = self.fit.coefficients
-            return np.asarray(c0 + c1 * np.asarray(mu) + c2 * np.asarray(mu) ** 2)
+    def at(self, mu: ArrayLike) -> Float:
+        """Return the reading at mu in the calibrated range, by monotone cubic interpolation (PCHIP)."""
         return np.asarray(self._pchip(mu))
 
-    def slope(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+    def slope(self, mu: ArrayLike) -> Float:
         """Return d reading / d mu."""
-        if shape == "fit":
-            _, c1, c2 = self.fit.coefficients
-            return np.asarray(c1 + 2.0 * c2 * np.asarray(mu))
         return np.asarray(self._pchip(mu, 1))
 
-    def resolution(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+    def resolution(self, mu: ArrayLike) -> Float:
         """Return the standard deviation of mu due to the noise alone, noise / |d reading / d mu|."""
         with np.errstate(divide="ignore"):
-            return np.asarray(self.noise / np.abs(self.slope(mu, shape)))
+            return np.asarray(self.noise / np.abs(self.slope(mu)))
 
     @cached_property
     def _missed(self) -> Float:
@@ -199,14 +196,9 @@ class ReadingCurve:
         # a kink between two of the points is seen from either of them, or from the next
         return np.asarray(np.max([errors, np.append(errors[1:], 0.0), np.append(0.0, errors[:-1])], axis=0))
 
-    def curve_error(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
-        """Return the error (m,) of the curve at mu (m,).
-
-        For the fit it is the rms residual; for the interpolation a quarter of the change at points that are left out,
-        every second one.
-        """
-        mus = np.asarray(mu, dtype=float)
-        return np.full(mus.shape, self.fit.rms) if shape == "fit" else np.interp(mus, self.mu, self._missed)
+    def curve_error(self, mu: ArrayLike) -> Float:
+        """Return the error (m,) of the curve at mu (m,), a quarter of the change at every second point if left out."""
+        return np.asarray(np.interp(np.asarray(mu, dtype=float), self.mu, self._missed))
 
     @cached_property
     def grid(self) -> Float:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.sensor.calibration import Calibration
-from finger3d.sensor.curve import LARGEST_STRAIN, QUANTITIES, Shape
+from finger3d.sensor.curve import LARGEST_STRAIN, QUANTITIES
 from finger3d.sensor.files import load
 from finger3d.sensor.likelihood import Estimate
 
@@ -20,7 +20,6 @@ def estimate(
     calibration: Calibration | str | Path,
     strain: ArrayLike | Mapping[str, ArrayLike],
     std: ArrayLike | Mapping[str, ArrayLike] | None = None,
-    curve: Shape = "interpolation",
     tolerances: bool = True,
 ) -> list[Estimate]:
     """Estimate the friction coefficient from readings.
@@ -31,7 +30,6 @@ def estimate(
     strain : one reading, or (m,) of them; of several calibrated readings a mapping with those of each by its name,
         where readings of broken sensors may be left out
     std : standard deviation of each, 0 allowed; None: the noise of the calibration
-    curve : whether the likelihood is that of the monotone interpolation or of the second-order fit
     tolerances : whether tolerances count; they do not for a sensor whose own curve was measured
 
     Returns
@@ -58,7 +56,7 @@ def estimate(
         if len(std_row) not in (1, count):
             raise Finger3dError(f"std of {name}: {len(std_row)} for {count} readings; give one for all, or each")
     noise = np.stack([np.broadcast_to(std_row, count) for std_row in stds], axis=-1)
-    return chosen.estimates(np.stack(rows, axis=-1), noise, tolerances, curve)
+    return chosen.estimates(np.stack(rows, axis=-1), noise, tolerances)
 
 
 def _named(calibration: Calibration, readings: ArrayLike | Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:

@@ -15,8 +15,6 @@ from finger3d.sensor.curve import QUANTITIES, ReadingCurve, Tolerance
 
 FORMAT, VERSION = "finger3d calibration", 5
 
-_FORMER_FORMAT = "finger3d joint calibration"
-
 
 def save(calibration: Calibration, path: str | Path) -> Path:
     """Write calibration.json."""
@@ -79,7 +77,7 @@ def write_table(calibration: Calibration, path: Path) -> None:
     for one in c.readings:
         columns |= {
             one.name: one.reading,
-            f"{one.name}_fit": one.at(c.mu, "fit"),
+            f"{one.name}_fit": one.fit.at(c.mu),
             f"{one.name}_per_mu": one.slope(c.mu),
             f"{one.name}_sd": one.reading_sd(c.mu),
             f"{one.name}_resolution": one.resolution(c.mu),
@@ -109,11 +107,10 @@ def load(path: str | Path) -> Calibration:
         raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError):
         raise Finger3dError(f"{path}: not JSON, or cut short; {again}") from None
-    if not isinstance(data, dict) or data.get("format") not in (FORMAT, _FORMER_FORMAT):
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise Finger3dError(f"{path}: no calibration; finger3d calibrate writes calibration.json")
-    if data["format"] != FORMAT or data.get("version") != VERSION:
-        version = data.get("version") if data["format"] == FORMAT else f"{data.get('version')} of several readings"
-        raise Finger3dError(f"{path}: version {version}, this finger3d reads version {VERSION}; {again}")
+    if data.get("version") != VERSION:
+        raise Finger3dError(f"{path}: version {data.get('version')}, this finger3d reads version {VERSION}; {again}")
     if data.pop("checksum", None) != checksum(data):
         raise Finger3dError(f"{path}: is damaged or was changed, by its checksum; {again}")
     return Calibration(

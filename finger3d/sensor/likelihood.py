@@ -31,7 +31,6 @@ from typing import Literal
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.sensor.curve import Shape
 from finger3d.sensor.model import Errors, SensorModel
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
@@ -177,13 +176,11 @@ class Estimator:
     ----------
     limit : standard deviation of mu beyond which an estimate is called coarse
     noise : (k,)
-    shape : of the curves
     """
 
     model: SensorModel
     limit: float
     noise: tuple[float, ...]
-    shape: Shape = "interpolation"
 
     @cached_property
     def _on_grid(self) -> tuple[Float, Errors]:
@@ -191,7 +188,7 @@ class Estimator:
 
     def _at(self, mu: Float) -> tuple[Float, Errors]:
         """Return the readings (m, k) at mu (m,) without errors, and the errors."""
-        return self.model.at(mu, self.shape), self.model.errors(mu, np.array(self.noise), shape=self.shape)
+        return self.model.at(mu), self.model.errors(mu, np.array(self.noise))
 
     def estimate(self, reading: Float) -> Estimate:
         """Return the estimate from readings (k,)."""
@@ -289,7 +286,7 @@ class Estimator:
         for name in self.model.names if len(reading) > 2 else ():
             others = [j for j, other in enumerate(self.model.names) if other != name]
             model, noise = self.model.of([self.model.names[j] for j in others]), tuple(self.noise[j] for j in others)
-            part = Estimator(model, self.limit, noise, self.shape).estimate(reading[others])
+            part = Estimator(model, self.limit, noise).estimate(reading[others])
             if part.p_value >= LEAST_P:
                 text += f"; without {name}: {part.verdict}"
         return (
@@ -299,9 +296,9 @@ class Estimator:
 
 
 @lru_cache(maxsize=8)
-def estimator(model: SensorModel, limit: float, noise: tuple[float, ...], shape: Shape = "interpolation") -> Estimator:
+def estimator(model: SensorModel, limit: float, noise: tuple[float, ...]) -> Estimator:
     """Return the estimator for readings with noise (k,); a few are kept, so that readings one by one are quick."""
-    return Estimator(model, limit, noise, shape)
+    return Estimator(model, limit, noise)
 
 
 def ranges_text(intervals: Sequence[tuple[float, float]]) -> str:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.sensor.curve import ReadingCurve, Shape
+from finger3d.sensor.curve import ReadingCurve
 
 SHARED = ("depth_mm", "E_percent", "nu", "tilt_deg")
 """Tolerances that change all readings together."""
@@ -83,28 +83,25 @@ class SensorModel:
         """Return the same with some of the readings, in this order."""
         return replace(self, readings=tuple(self[name] for name in names))
 
-    def at(self, mu: ArrayLike, shape: Shape = "interpolation") -> Float:
+    def at(self, mu: ArrayLike) -> Float:
         """Return the readings (m, k) at mu (m,)."""
-        return np.stack([c.at(mu, shape) for c in self.readings], axis=-1)
+        return np.stack([c.at(mu) for c in self.readings], axis=-1)
 
     def slope(self, mu: ArrayLike) -> Float:
         """Return d reading / d mu (m, k) at mu (m,)."""
         return np.stack([c.slope(mu) for c in self.readings], axis=-1)
 
-    def errors(
-        self, mu: ArrayLike, noise: Float | None = None, without: str = "", shape: Shape = "interpolation"
-    ) -> Errors:
+    def errors(self, mu: ArrayLike, noise: Float | None = None, without: str = "") -> Errors:
         """Return what changes the readings at mu (m,) besides friction.
 
         Parameters
         ----------
         noise : (k,) standard deviations in place of those of the calibration
         without : name of a tolerance that is known exactly, or ``"noise"``
-        shape : the curve whose error counts
         """
         mus = np.atleast_1d(np.asarray(mu, dtype=float))
         scale = self.noise
-        variance = np.array([c.curve_error(mus, shape) ** 2 for c in self.readings]).T
+        variance = np.array([c.curve_error(mus) ** 2 for c in self.readings]).T
         if without != "noise":
             variance = variance + np.maximum(scale if noise is None else noise, _LEAST_NOISE * scale) ** 2
         shared = [name for name in SHARED if name in self.tolerance_names and name != without]

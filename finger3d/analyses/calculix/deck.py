@@ -16,7 +16,7 @@ import numpy as np
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.laws.material import Material
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import Mesh
 
 MOST_TERMS = 3
@@ -29,7 +29,7 @@ that is not given, and puts in one of its own."""
 _ONE_CARD = 8  # constants on a line of a deck
 
 
-def law_cards(material: Material, law: IsochoricLaw | None) -> tuple[str, ...]:
+def law_cards(own: Isotropic, law: IsochoricLaw | None) -> tuple[str, ...]:
     """Return the cards of a material: linear elasticity without a hyperelastic `law`.
 
     Raises
@@ -37,7 +37,6 @@ def law_cards(material: Material, law: IsochoricLaw | None) -> tuple[str, ...]:
     Finger3dError
         If CalculiX has no such law.
     """
-    own = material.isotropic("--solver calculix")
     if own.nu >= 0.5:
         raise Finger3dError(
             "--solver calculix: CalculiX has no elements for nu = 0.5; lower material.nu, for instance to 0.49"

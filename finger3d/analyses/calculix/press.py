@@ -80,8 +80,7 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
     depth = model.largest_depth_mm
     low, high = _box(mesh, axes, _MARGIN * depth)
     elements, motion = object_elements(placed, low, high, _SAGITTA * depth, mesh.dim)
-    moduli = [material.isotropic("--solver calculix").E_MPa for material in model.materials(())]
-    penalty = PENALTY * moduli[0] / depth
+    penalty = PENALTY * model.material.E_MPa / depth
     steps = tuple(
         DeckStep(_rigid(moved), increments) for moved, (_, increments) in zip(motion[1:], stretches, strict=True)
     )

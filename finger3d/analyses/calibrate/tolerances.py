@@ -252,7 +252,7 @@ def _vary_modulus(body: ReferenceBody, readings: Sequence[CalibratedReading], sd
 
 def _vary_poisson(body: ReferenceBody, readings: Sequence[CalibratedReading], sd: float) -> Iterator[Effect]:
     """Lower and raise Poisson's ratio."""
-    material = body.problem.model.material.isotropic("the tolerance of nu")
+    material = body.problem.model.material
     for step in poisson_steps(material.nu, _NODE * sd):
         yield step, body.change(body.rebuilt(material=replace(material, nu=material.nu + step)))
 

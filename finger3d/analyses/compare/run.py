@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,7 +83,7 @@ def compare(
     Parameters
     ----------
     scene : path of a TOML file, a dict with its tables, or a loaded scene; its domain is ignored
-    out : folder for compare.csv, compare.json, lines.csv, compare.png, report.html and scene.toml
+    out : folder for compare.csv, compare.json, compare.png, report.html and scene.toml
     widths : further widths of the finger, mm; None takes multiples of its height
     report : progress of the cases
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
@@ -114,7 +114,7 @@ def compare(
 
 def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Path, report: Progress) -> Comparison:
     """Solve every case and write all of them after each, so that an interruption loses none."""
-    for name in ("compare.csv", "compare.json", "lines.csv", "compare.png", "report.html"):
+    for name in ("compare.csv", "compare.json", "compare.png", "report.html"):
         (folder / name).unlink(missing_ok=True)
     write_text(folder / "scene.toml", solid.to_toml())
     variants = list(_variants(model, widths))
@@ -181,7 +181,6 @@ def _variants(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Mode
     yield "plane strain", strain
     yield "plane stress", stress
     yield "solid", model
-    yield "solid, ends held", replace(model, held_ends=True, mesh=replace(model.mesh, mesher="swept"))
     for width in widths:
         wide = widened(model, width)
         yield "plane strain", section_of(wide, "plane-strain")
@@ -234,7 +233,6 @@ def _write(comparison: Comparison, scene: Scene, height_mm: float, complete: boo
     rows = [_row(case, height_mm) for case in cases]
     names = list(dict.fromkeys(key for row in rows for key in row))
     write_csv(folder / "compare.csv", {key: [row.get(key, "") for row in rows] for key in names})
-    _write_lines(folder, cases)
     by_width = {name: deviations(name, cases) for name in ("plane strain", "plane stress")}
     write_json(
         folder / "compare.json",
@@ -270,21 +268,3 @@ def _row(case: Case, height: float) -> Tree:
         row[key] = value
         row[f"{key}_error"] = case.errors.get(key, "")
     return row | {"seconds": case.seconds}
-
-
-def _write_lines(folder: Path, cases: Sequence[Case]) -> None:
-    columns: dict[str, list[float | str]] = {}
-    for case in cases:
-        for line, values in case.lines.items():
-            count = len(values["x_mm"])
-            same: dict[str, float | str] = {
-                "model": case.model,
-                "width_mm": case.width_mm,
-                "size_mm": case.size_mm,
-                "line": line,
-            }
-            for key, value in same.items():
-                columns.setdefault(key, []).extend([value] * count)
-            for key, column in values.items():
-                columns.setdefault(key, []).extend(column)
-    write_csv(folder / "lines.csv", columns)

@@ -117,7 +117,6 @@ def verdict(cases: Sequence[Case], own_width_mm: float, height_mm: float, turns:
     if solid is None or not planes:
         return [*out, "No verdict: the solid and a plane model are needed."]
     out.append(_force(planes, solid, height_mm))
-    out += _ends(own)
     out += [_width_within(name, cases) for name in ("plane strain", "plane stress")]
     out += _across(solid)
     out += _torsion(solid) if turns else []
@@ -137,17 +136,6 @@ def _force(planes: Sequence[Case], solid: Case, height: float) -> str:
 
 def _with_error(case: Case, key: str) -> str:
     return with_error(case.numbers[key], case.errors.get(key), digits=4)
-
-
-def _ends(own: dict[str, Case]) -> list[str]:
-    held, strain = own.get("solid, ends held"), own.get("plane strain")
-    if held is None or strain is None:
-        return []
-    away = 100 * (held.numbers[FORCE] / strain.numbers[FORCE] - 1.0)
-    return [
-        f"With its end faces held along z the solid gives {held.numbers[FORCE]:.4g} N per mm, {abs(away):.1g} % from "
-        "plane strain: the difference comes from the free ends, not from the mesh."
-    ]
 
 
 def deviations(model: str, cases: Sequence[Case]) -> list[Deviation]:

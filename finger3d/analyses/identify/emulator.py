@@ -82,6 +82,13 @@ class Emulator:
             shares[self.pressed] = point
         return found
 
+    def ends(self, designed: Sequence[Float]) -> list[Float]:
+        """Return designed shares, and those with the least and the largest of all that need no press."""
+        still = [i for i in range(len(self.free)) if i not in self.pressed]
+        found = np.tile(designed, (3, 1))
+        found[len(designed) :, still] = np.repeat([0.0, 1.0], len(designed))[:, None]
+        return list(found)
+
     def press(self, shares: Float) -> None:
         """Press at shares (k,)."""
         point = tuple(float(s) for s in shares[self.pressed])
@@ -164,15 +171,3 @@ class Emulator:
         if not self.pressed:
             return np.zeros((len(shares), len(self._size)))
         return 0.5 * (self(shares) - self(shares, "linear"))
-
-
-def ends(emulator: Emulator, designed: Sequence[Float]) -> list[Float]:
-    """Return designed shares, and those with the least and the largest of all that need no press."""
-    still = [i for i in range(len(emulator.free)) if i not in emulator.pressed]
-    found = [*designed]
-    for share in (0.0, 1.0):
-        for one in designed:
-            other = one.copy()
-            other[still] = share
-            found.append(other)
-    return found

@@ -74,35 +74,21 @@ class MeasuredPress:
         """Number of measured values."""
         return len(self.at) * len(self.columns)
 
-    def check_signs(self, simulated: Sequence[Mapping[str, Float]]) -> None:
-        """Raise an error for a column that has the opposite sign of all simulated ones (n,), by name."""
-        for name, values in self.columns.items():
-            if np.abs(values).max() > SHARPEST and all(
-                values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
-            ):
-                row = int(np.argmax(np.abs(values)))
-                raise Finger3dError(
-                    f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives "
-                    f"{simulated[0][name][row]:.2g}, of the opposite sign; a force that presses is positive, and so is "
-                    "a strain that lengthens"
-                )
-
-    def check_units(self, magnitudes: Mapping[str, Sequence[float]]) -> None:
-        """Raise an error for a column whose magnitude is far from that of the simulated ones.
-
-        Parameters
-        ----------
-        magnitudes : by name, the largest of a column over the press, for each of the free keys at their bounds
-        """
+    def check_against(self, simulated: Sequence[Mapping[str, Float]]) -> None:
+        """Raise an error for a column whose sign or magnitude is far from those of all simulated ones (n,), by name."""
         for name, values in self.columns.items():
             row = int(np.argmax(np.abs(values)))
-            found = abs(float(values[row]))
-            least, most = min(magnitudes[name]), max(magnitudes[name])
-            if not least / _UNIT_RATIO - SHARPEST <= found <= most * _UNIT_RATIO + SHARPEST:
+            found, extents = abs(float(values[row])), [float(np.abs(one[name]).max()) for one in simulated]
+            least, most = min(extents), max(extents)
+            opposed = found > SHARPEST and all(
+                values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
+            )
+            if opposed or not least / _UNIT_RATIO - SHARPEST <= found <= most * _UNIT_RATIO + SHARPEST:
                 raise Finger3dError(
                     f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
-                    f"{least:.2g} to {most:.2g}; is the unit that of the name (strain is a plain "
-                    "number, not percent), and the sensor the right one?"
+                    f"{least:.2g} to {most:.2g}{', of the opposite sign' * opposed}; are unit and sign those of the "
+                    "name (strain is a plain number, not percent; forces that press are positive), and is it this "
+                    "sensor?"
                 )
 
 

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag, solve_triangular
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
-from finger3d.analyses.identify.emulator import Emulator, ends
+from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
 from finger3d.analyses.identify.simulated import (
@@ -33,7 +33,7 @@ from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, files, parse, tables_of, tree
+from finger3d.scene import Scene, Source, files, parse, tree
 
 DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
 """What the standard deviations of an identification contain."""
@@ -143,8 +143,7 @@ def identify(
         For a mistake in the file or in the free keys, or if the press fails at the start.
     """
     report = report or Progress()
-    given, path = tables_of(scene, overrides)
-    given = settled_tables(given, path, report)
+    given, path = settled_tables(scene, overrides, report)
     keys = free_keys(free)
     start = _checked_start(given, keys, path)
     model = parse(given, path).model()
@@ -308,7 +307,8 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     for shares in designed:
         emulator.press(shares)
     emulator.check()
-    _check_columns(emulator, ends(emulator, designed))
+    tried = [shares for shares in emulator.ends(designed) if not emulator.fails(shares[None])[0]]
+    data.check_against([emulator.columns(shares) for shares in tried])
     misfit = _Misfit.of(emulator, start)
     shares = misfit.explored(report, 2)
     report.stage("errors of mesh and increments")
@@ -345,15 +345,6 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         notes=tuple(notes),
         presses=simulation.solved,
     )
-
-
-def _check_columns(emulator: Emulator, tried: Sequence[Float]) -> None:
-    """Raise an error for a column of another sign or unit than the scene gives at all shares (k,) that are tried."""
-    good = [shares for shares in tried if not emulator.fails(shares[None])[0]]
-    curves = [emulator.columns(shares) for shares in good]
-    emulator.data.check_signs(curves)
-    magnitudes = {n: [float(np.abs(curve[n]).max()) for curve in curves] for n in emulator.data.columns}
-    emulator.data.check_units(magnitudes)
 
 
 def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> float:

@@ -17,6 +17,7 @@ from finger3d.accuracy.richardson import gain
 from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.recovery.strain_reader import StrainReader
 from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
@@ -27,7 +28,6 @@ from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects
-from finger3d.sensor.maps import Reader
 from finger3d.sensor.model import SHARED
 
 _STEPS, _STEPS_OF_SECTION = 20, 80
@@ -65,7 +65,7 @@ class StrainField:
     def strain(self, points: Float, angles: Float) -> Float:
         """Return the strain (p, a, m) at points (p, 3) along directions (a,), rad; NaN outside the body."""
         d, finite = self.problem.dim, self.problem.model.finite_strain
-        reader = Reader.at(self.problem.mesh, points[:, :d], self.problem.axes)
+        reader = StrainReader.at(self.problem.mesh, points[:, :d], self.problem.axes)
         every = np.stack([reader.green_lagrange(u) if finite else reader.strain(u) for u in self.u], axis=-1)
         c, s = np.cos(angles), np.sin(angles)
         along = np.einsum("pkm,ka->pam", every, np.stack([c * c, s * s, 2.0 * s * c]))
@@ -177,7 +177,7 @@ def _effect(nominal: StrainField, name: str, mus: Sequence[float], sd: float) ->
     if name == "depth_mm":
         changed = under(problem, legs=deeper(model.legs, sd))
     elif name == "nu":
-        material = model.material.isotropic("the tolerance of nu")
+        material = model.material
         step, _ = poisson_steps(material.nu, sd)
         changed = built_like(problem, replace(model, material=replace(material, nu=material.nu + step)))
         sign = math.copysign(1.0, step)

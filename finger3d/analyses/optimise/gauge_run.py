@@ -23,7 +23,7 @@ from finger3d.mechanics.model import Model
 from finger3d.plotting.optimise import GaugeMap, draw_places
 from finger3d.progress import Progress
 from finger3d.report.gauge_places import gauge_places_page
-from finger3d.scene import Scene, Source, parse, tables_of, tree
+from finger3d.scene import Scene, Source, parse, tree
 from finger3d.scene.derived import largest_spread
 
 MOST = 8
@@ -113,8 +113,7 @@ def place_gauges(
         For a mistake in the scene or the numbers, or if a press fails.
     """
     report = report or Progress()
-    given, path = tables_of(scene, overrides)
-    given = settled_tables(given, path, report)
+    given, path = settled_tables(scene, overrides, report)
     keys, mus = free_keys(free or ()), MUS if mus is None else mus
     if not 1 <= count <= MOST:
         raise Finger3dError(f"--gauges {count}: must be from 1 to {MOST}")

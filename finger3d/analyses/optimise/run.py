@@ -9,20 +9,14 @@ from pathlib import Path
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, free_keys
 from finger3d.analyses.optimise.search import Search
-from finger3d.analyses.optimise.task import (
-    MUS,
-    Evaluation,
-    OptimisationProblem,
-    checked_start,
-    objective_of,
-)
+from finger3d.analyses.optimise.task import MUS, Evaluation, OptimisationProblem, checked_start
 from finger3d.errors import MissingError
 from finger3d.io import claimed, write_json, write_text
 from finger3d.plotting.optimise import draw
 from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, tables_of
+from finger3d.scene import Scene, Source
 
 
 @dataclass(frozen=True)
@@ -45,7 +39,6 @@ def optimise(
     scene: Source,
     free: Bounds,
     out: str | Path,
-    objective: str | Path = "sensitivity",
     gauge: str | None = None,
     mus: Sequence[float] | None = None,
     noise: float = 1.5e-4,
@@ -54,7 +47,7 @@ def optimise(
     overrides: Sequence[str] = (),
     report: Progress | None = None,
 ) -> OptimisationResult:
-    """Search for the values of free keys with the largest objective.
+    """Search for the values of free keys with the largest sensitivity of a gauge to friction.
 
     Parameters
     ----------
@@ -62,8 +55,7 @@ def optimise(
     free : key -> lower and upper bound, for instance ``{"gauge.g36.x_mm": (10.0, 48.0)}``, or texts such as
         ``"gauge.g36.x_mm=10:48"``
     out : folder for evaluations.csv, best.toml and report.html; the same search is continued there
-    objective : "sensitivity", or a Python file with a function ``objective(table) -> number``
-    gauge : name of the gauge that the objective reads; None: the first
+    gauge : name of the gauge whose sensitivity counts; None: the first
     mus : friction coefficients, ascending; None: nine from 0.05 to 1
     noise : standard deviation of a strain reading
     budget : number of designs, or of bodies if gauges are searched in each
@@ -81,12 +73,10 @@ def optimise(
     Finger3dError
         For a mistake in the arguments; a MissingError if no design within the bounds gives a number.
     """
-    given, path = tables_of(scene, overrides)
-    given = settled_tables(given, path, report or QUIET)
+    given, path = settled_tables(scene, overrides, report or QUIET)
     problem = OptimisationProblem(
         given=given,
         free=free_keys(free),
-        objective=str(objective),
         path=path,
         gauge=gauge,
         mus=MUS if mus is None else tuple(mus),
@@ -110,7 +100,6 @@ def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | 
     Finger3dError
         For a mistake in the problem; a MissingError if no design within the bounds gives a number.
     """
-    objective = objective_of(problem.objective)
     start = checked_start(problem)
     with (
         claimed(out, "optimise") as folder,
@@ -118,7 +107,7 @@ def find_best(problem: OptimisationProblem, out: str | Path, report: Progress | 
     ):
         for name in ("design.png", "report.html"):
             (folder / name).unlink(missing_ok=True)
-        search = Search(problem, report or Progress(), objective, journal)
+        search = Search(problem, report or Progress(), journal)
         _run_search(search, folder, start)
         return _write_result(search, folder)
 
@@ -127,7 +116,6 @@ def _run_search(search: Search, folder: Path, start: tuple[float, ...]) -> None:
     """Search from the evaluation of the start, and write the best design even if interrupted."""
     if search.known:
         search.report.say(f"{len(search.known)} designs are kept from an earlier run")
-        search.restore_increments(start)
     search.report.stage("searching")
     try:
         search.evaluate(start)
@@ -153,7 +141,7 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
         [e.values for e in known],
         [e.value for e in known],
         first.values,
-        Path(problem.objective).stem,
+        "sensitivity",
     )
     optimise_page(folder)
     return OptimisationResult(
@@ -174,7 +162,7 @@ def _write_best(search: Search, folder: Path, best: Evaluation, increments: Mapp
     write_json(
         folder / "design.json",
         {
-            "objective": problem.objective,
+            "objective": "sensitivity",
             "best": best.value,
             "values": dict(zip(names, best.values, strict=True)),
             "start": first.value,

@@ -14,7 +14,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
-from finger3d.analyses.optimise.task import Evaluation, Objective, ObjectiveTable, OptimisationProblem, evaluation_of
+from finger3d.analyses.optimise.task import Evaluation, OptimisationProblem, evaluation_of, sensitivity
 from finger3d.analyses.pressed_body import PressedBody, kept, under
 from finger3d.analyses.shared_body import body_key
 from finger3d.errors import Finger3dError
@@ -26,7 +26,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene
@@ -35,13 +35,8 @@ _GAUGE_BUDGET = 60  # evaluations of gauges on one body
 _INFEASIBLE = 1e30  # cost of a design that cannot be built: finite, as annealing asks
 
 
-@dataclass(frozen=True)
-class _PressedDesign:
-    """Increments of a body for every mu, which gauges are read from, or the reason why there are none."""
-
-    steps: tuple[dict[str, float], ...] = ()
-    read: Callable[[Gauge], Float] | None = None
-    outcome: str = "converged"
+GaugeReader = Callable[[Gauge], Float]
+"""Returns the strain (m,) of any gauge of a body that was pressed with several values of mu (m,)."""
 
 
 class _DesignBody(PressedBody):
@@ -51,8 +46,8 @@ class _DesignBody(PressedBody):
         self._own_press = model.inclusions is not None  # a gauge that stiffens the body
         super().__init__(model if self._own_press else replace(model, gauges=()), report)
 
-    def reader(self, ends: Sequence[StepResult]) -> Callable[[Gauge], Float]:
-        """Return a function that gives the strain (m,) of any gauge in increments (m,)."""
+    def reader(self, ends: Sequence[StepResult]) -> GaugeReader:
+        """Return what reads gauges in increments (m,)."""
         if self._own_press:
             return lambda g: np.array([end.readings[strain_columns(g.name)[0]] for end in ends])
         mesh, axes = self.problem.mesh, self.problem.axes  # all that is kept of the body
@@ -79,17 +74,18 @@ class Search:
 
     problem: OptimisationProblem
     report: Progress
-    objective: Objective
     journal: Journal
     known: dict[tuple[float, ...], Evaluation] = field(init=False)
     done: list[Evaluation] = field(default_factory=list)
     bodies: int = 0
-    chosen: tuple[int | Literal["auto"], ...] | None = None
-    _stored: dict[str, _PressedDesign] = field(default_factory=dict)
+    chosen: tuple[int | Literal["auto"], ...] | None = field(init=False)
+    _stored: dict[str, GaugeReader | str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Take over the evaluations of an earlier run."""
+        """Take over the evaluations of an earlier run, and its increments."""
         self.known = {found.values: found for found in map(evaluation_of, self.journal.rows)}
+        chosen = (row.get("steps") for row in self.journal.rows)
+        self.chosen = next((tuple(steps) for steps in chosen if isinstance(steps, list) and steps), None)
 
     def evaluate(self, values: Sequence[float] | Float) -> Evaluation:
         """Evaluate a design unless it is known; a new evaluation is appended to the journal at once."""
@@ -97,7 +93,8 @@ class Search:
         if point not in self.known:
             new = self._evaluate_new(point)
             self.known[point] = new
-            self.journal.append({"values": list(point), "objective": new.value, "outcome": new.outcome})
+            row = {"values": list(point), "objective": new.value, "outcome": new.outcome}
+            self.journal.append(row | {"steps": list(self.chosen or ())})
         found = self.known[point]
         self.done.append(found)
         return found
@@ -107,23 +104,21 @@ class Search:
             scene = self.problem.scene(point)
         except Finger3dError as error:
             return Evaluation(point, math.nan, " ".join(str(error).split()))
-        pressed = self._press(scene)
-        if pressed.read is None:
-            return Evaluation(point, math.nan, pressed.outcome)
-        strain = {g.name: pressed.read(g) for g in scene.model().gauges}
-        gauge, mus = self.problem.gauge or next(iter(strain)), np.array(self.problem.mus)
-        value = self.objective(ObjectiveTable(mus, strain, pressed.steps, self.problem.noise, gauge, scene))
+        read = self._press(scene)
+        if isinstance(read, str):
+            return Evaluation(point, math.nan, read)
+        value = sensitivity(np.array(self.problem.mus), read(self._gauge(scene.model())), self.problem.noise)
         return Evaluation(point, value, "converged" if math.isfinite(value) else "the objective is no finite number")
 
-    def _press(self, scene: Scene) -> _PressedDesign:
-        """Return the increments of a body, pressed anew unless it is one of the last."""
+    def _press(self, scene: Scene) -> GaugeReader | str:
+        """Return what reads the gauges of a body, pressed anew unless it is one of the last, or why nothing does."""
         model, tables = scene.model(), scene.as_dict()
         key = json.dumps([body_key(scene), tables["press"], tables["contact"]])
         if model.inclusions is not None:
             key += repr(model.gauges)
         return kept(self._stored, key, lambda: self._press_body(model))
 
-    def _press_body(self, model: Model) -> _PressedDesign:
+    def _press_body(self, model: Model) -> GaugeReader | str:
         mus = self.problem.mus
         self.bodies += 1
         try:
@@ -131,42 +126,31 @@ class Search:
             legs = self._legs(body, model)
             ends = body.ends(mus, legs)
         except Finger3dError as error:
-            return _PressedDesign(outcome=" ".join(str(error).split()))
+            return " ".join(str(error).split())
         for mu, frame in zip(mus, ends, strict=True):
             if not frame.outcome.ok:
-                return _PressedDesign(outcome=f"mu = {mu:g}: {frame.failure}")
-        steps = tuple(measure(body.problem.points, frame) for frame in ends)
-        return _PressedDesign(steps, body.reader(ends))
+                return f"mu = {mu:g}: {frame.failure}"
+        return body.reader(ends)
 
-    def _gauge(self, model: Model) -> Gauge | None:
-        """Return the gauge that is optimised, if the scene has one."""
-        return next((g for g in model.gauges if self.problem.gauge in (None, g.name)), None)
+    def _gauge(self, model: Model) -> Gauge:
+        """Return the gauge that is optimised."""
+        return next(g for g in model.gauges if self.problem.gauge in (None, g.name))
 
     def _legs(self, body: _DesignBody, model: Model) -> tuple[Leg, ...]:
         """Return the path with the increments chosen for the first design, so that errors are comparable."""
-        gauge = self._gauge(model)
-        if gauge is None or not automatic(model):
+        if not automatic(model):
             return model.legs
         if self.chosen is None:
-            mus, noise = _first_middle_last(self.problem.mus), self.problem.noise
+            gauge, mus, noise = self._gauge(model), _first_middle_last(self.problem.mus), self.problem.noise
             found = choose_increments(body.problem, lambda p: body.strain(gauge, mus, p.model.legs) / noise)
             self.report.say(str(found))
             self.chosen = tuple(leg.steps for leg in found.legs)
         return tuple(replace(leg, steps=n) for leg, n in zip(model.legs, self.chosen, strict=True))
 
-    def restore_increments(self, start: Sequence[float]) -> None:
-        """Choose the increments at the start design, whose evaluation in the journal does not store them."""
-        with suppress(Finger3dError):  # as in a new search, they are chosen at the first design that can be built
-            model = self.problem.scene(start).model()
-            if automatic(model):
-                self._legs(_DesignBody(model, self.report), model)
-
     def increments(self, values: Sequence[float]) -> Tree:
-        """Return the increments of a design and the resulting error of its strain; none where no gauge is read."""
+        """Return the increments of a design and the resulting error of its strain."""
         model = self.problem.scene(values).model()
         gauge, mus = self._gauge(model), _first_middle_last(self.problem.mus)
-        if gauge is None:
-            return {}
         body = _DesignBody(model, self.report)
         problem = with_steps(under(body.problem, legs=self._legs(body, model)), AUTO_START)
 

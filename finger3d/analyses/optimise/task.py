@@ -1,10 +1,8 @@
-"""Problem of a design search: free keys, bounds, objective and evaluations; checked before anything is solved."""
+"""Problem of a design search: free keys, bounds and evaluations; checked before anything is solved."""
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -18,74 +16,22 @@ from finger3d.results.journal import Row, number_in
 from finger3d.scene import Scene, files, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN
 
-Objective = Callable[["ObjectiveTable"], float]
-
 MUS = tuple(float(v) for v in np.round(np.linspace(0.05, 1.0, 9), 5))
-_OBJECTIVE_ERRORS = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 
 
-@dataclass(frozen=True)
-class ObjectiveTable:
-    """Argument of an objective: one design, pressed with several values of mu.
-
-    Attributes
-    ----------
-    mu : (n,)
-    strain : gauge name -> (n,)
-    steps : (n,) numbers of the last step at each mu, named as in summary.json
-    noise : standard deviation of a strain reading
-    gauge : name of the gauge that is designed
-    scene : as it was pressed; its own friction.mu does not matter
-    """
-
-    mu: Float
-    strain: Mapping[str, Float]
-    steps: Sequence[Mapping[str, float]]
-    noise: float
-    gauge: str
-    scene: Scene
-
-
-def sensitivity(table: ObjectiveTable) -> float:
+def sensitivity(mu: Float, strain: Float, noise: float) -> float:
     """Return the criterion of Maeno 2004, Sec. III-B: sensitive to mu throughout a large range.
 
     It is the smallest change of strain per mu between neighbouring values of mu, in units of the noise, which is the
     inverse of the worst resolution of mu.  It is negative where the strain is not monotone.
+
+    Parameters
+    ----------
+    mu, strain : (n,)
+    noise : standard deviation of a strain reading
     """
-    strain = table.strain[table.gauge]
-    slope = np.diff(strain) / np.diff(table.mu)
-    return float((slope * np.sign(strain[-1] - strain[0])).min() / table.noise)
-
-
-OBJECTIVES: dict[str, Objective] = {"sensitivity": sensitivity}
-
-
-def objective_of(text: str) -> Objective:
-    """A named objective, or the function ``objective`` of a Python file."""
-    if text in OBJECTIVES:
-        return OBJECTIVES[text]
-    path = Path(text)
-    if path.suffix != ".py" or not path.is_file():
-        raise Finger3dError(f"--objective {text}: must be {' or '.join(OBJECTIVES)}, or a Python file that is there")
-    spec = importlib.util.spec_from_file_location("finger3d_objective", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except (*_OBJECTIVE_ERRORS, ImportError, SyntaxError) as error:
-        raise Finger3dError(f"--objective {text}: {type(error).__name__}: {error}") from None
-    found = getattr(module, "objective", None)
-    if not callable(found):
-        raise Finger3dError(f"--objective {text}: has no function objective(table) -> number, the larger the better")
-
-    def objective(table: ObjectiveTable) -> float:
-        try:
-            return float(found(table))
-        except _OBJECTIVE_ERRORS as error:
-            raise Finger3dError(f"--objective {text}: objective(table): {type(error).__name__}: {error}") from None
-
-    return objective
+    slope = np.diff(strain) / np.diff(mu)
+    return float((slope * np.sign(strain[-1] - strain[0])).min() / noise)
 
 
 @dataclass(frozen=True)
@@ -101,7 +47,6 @@ class OptimisationProblem:
 
     given: TreeView
     free: tuple[FreeKey, ...]
-    objective: str = "sensitivity"
     path: Path | None = None
     gauge: str | None = None
     mus: tuple[float, ...] = MUS
@@ -119,13 +64,10 @@ class OptimisationProblem:
 
     def identity(self) -> Tree:
         """Return what two runs must have in common to continue each other's evaluations; the budget may differ."""
-        path = Path(self.objective)
-        objective = hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else self.objective
         return {
             "scene": tree.plain(self.given),
             "files": files.contents(self.given, self.path),
             "free": [[f.key, f.low, f.high] for f in self.free],
-            "objective": objective,
             "gauge": self.gauge,
             "mu": list(self.mus),
             "noise": self.noise,
@@ -153,10 +95,10 @@ def checked_start(problem: OptimisationProblem) -> tuple[float, ...]:
     if problem.seed < 0:
         raise Finger3dError(f"--seed {problem.seed}: must be a whole number from 0 up")
     names = [g.name for g in parse(problem.given, problem.path).tables.gauge]
-    if problem.objective == "sensitivity" and not names:
+    if not names:
         raise Finger3dError("optimise: the objective reads a gauge, and the scene has no [[gauge]]; add one")
     if problem.gauge is not None and problem.gauge not in names:
-        raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names) or 'none'}")
+        raise Finger3dError(f"--gauge {problem.gauge}: no such gauge; the scene has {', '.join(names)}")
     values = [free.start(problem.given) for free in problem.free]
     # a key that no scene has is refused now, a design that cannot be built is a line of the table
     try:

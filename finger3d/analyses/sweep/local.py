@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from finger3d._machine import cores, end_with, reserve_for_linear_algebra
+from finger3d._machine import end_with, reserve_for_linear_algebra
 from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.store import DIED, BodyPoints, SweepProgress
 from finger3d.errors import MissingError
@@ -112,20 +112,10 @@ def _take(
         deaths[id(body)] += 1
         one.replace()
         if deaths[id(body)] == ATTEMPTS:
-            _give_up(body, progress, f"{DIED} ({' '.join(str(error).split())})")
+            progress.give_up(body, f"{DIED} ({' '.join(str(error).split())})")
     except Exception as error:  # noqa: BLE001 - whatever a worker raised is reported with the points that are lost
-        _give_up(body, progress, f"{type(error).__name__}: {' '.join(str(error).split())}")
+        progress.give_up(body, f"{type(error).__name__}: {' '.join(str(error).split())}")
     else:
         body.advance(rows)
         for row in rows:
             progress.add(row)
-
-
-def _give_up(body: BodyPoints, progress: SweepProgress, reason: str) -> None:
-    progress.give_up(body, reason)
-    body.left = []
-
-
-def default_workers(bodies: int) -> int:
-    """Return the number of cores, or of bodies if these are fewer."""
-    return max(1, min(cores(), bodies))

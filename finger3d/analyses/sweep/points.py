@@ -280,20 +280,6 @@ def rows_of(path: Path) -> tuple[Vary, ...]:
     return tuple(Vary(key, tuple(texts[key])) for key in table.names)
 
 
-def columns_of(columns: Mapping[str, Sequence[str]]) -> tuple[Vary, ...]:
-    """Return points from a column of values for each key.
-
-    Raises
-    ------
-    Finger3dError
-        If there is none, or if their lengths differ.
-    """
-    lengths = {key: len(texts) for key, texts in columns.items()}
-    if not lengths or min(lengths.values()) < 1 or len(set(lengths.values())) > 1:
-        raise Finger3dError(f"sweep: a list of points needs as many values of every key; it has {lengths}")
-    return tuple(Vary(key, tuple(texts)) for key, texts in columns.items())
-
-
 def drawn(sample: str, ranges: Sequence[str], seed: int) -> tuple[Vary, ...]:
     """Return samples within ranges; the same ones for the same arguments.
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finger3d._extras import require
+from finger3d._machine import cores
 from finger3d.analyses.sweep import worker
-from finger3d.analyses.sweep.points import Point, Sweep, checked_points, columns_of, drawn, rows_of, varied
+from finger3d.analyses.sweep.points import Point, checked_points, drawn, rows_of, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
 from finger3d.report.sweep import sweep_page
@@ -59,7 +60,7 @@ def sweep(
     sample: str = "grid",
     seed: int = 0,
 ) -> SweepResult:
-    """Press many points of a scene: every combination of some values of keys, a list of points, or random samples.
+    """Press many points of a scene: every combination of some values of keys, the rows of a table, or random samples.
 
     A sweep that was interrupted continues in the same folder.
 
@@ -69,14 +70,14 @@ def sweep(
     vary : key -> values, for instance ``{"friction.mu": [0.06, 0.25, 1.0], "material.nu": [0.45, 0.49]}``, or texts
         such as ``"friction.mu=0.06,0.25,1"``, of samples ``"friction.mu=0.06:1"``; or the path of a CSV file with a
         column for each key and a row for each point
-    out : folder for the results
+    out : folder for points.jsonl, results.csv, report.html and, with pyarrow, results.parquet
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
     scheduler : address of a Dask scheduler; None: processes on this machine
-    workers : number of these processes; None: one for each core
+    workers : number of these processes; None: one for each core, at most one for each body. One worker is this process,
+        as for a single body.
     report : receives the progress at every point
-    sample : ``"grid"``, every combination of the values; ``"list"``, values at the same place make a point;
-        ``"lhs:200"`` or ``"random:200"``, that many samples, of a Latin hypercube or independent, where `vary` has the
-        lower and the upper bound of every key
+    sample : ``"grid"``, every combination of the values; ``"lhs:200"`` or ``"random:200"``, that many samples, of a
+        Latin hypercube or independent, where `vary` has the lower and the upper bound of every key
     seed : of the random numbers
 
     Raises
@@ -90,19 +91,26 @@ def sweep(
     report.stage("checking every point")
     if isinstance(vary, str | Path):
         columns, option = rows_of(Path(vary)), "--points"
-    elif isinstance(vary, Mapping) and sample == "list":
-        columns, option = (
-            columns_of({key: [_as_toml(value) for value in values] for key, values in vary.items()}),
-            "vary",
-        )
     elif sample == "grid":
         columns, option = varied(_texts(vary, ",")), "--vary"
     else:
         columns, option = drawn(sample, _texts(vary, ":"), seed), "--sample"
     points = checked_points(scene, overrides, columns, option, report)
-    store = press_points(points, out, scheduler, workers, report)
+    folder = Path(out)
+    if any(body.labels for body in points.bodies.values()):
+        require("[labels]", "h5py")
+    with ResultStore(points, folder).open() as store:
+        progress = SweepProgress(store, report)
+        try:
+            _press(store, scheduler, workers, progress)
+        finally:
+            store.reload()
+            report.steps_done = len(store.rows)
+            store.write()
+        with store.room("report.html"):
+            sweep_page(folder)
     table = store.columns()
-    return SweepResult(Path(out), table, sum(outcome != "converged" for outcome in table["outcome"]), store)
+    return SweepResult(folder, table, sum(outcome != "converged" for outcome in table["outcome"]), store)
 
 
 def _texts(vary: Mapping[str, Sequence[Value]] | Sequence[str], mark: str) -> Sequence[str]:
@@ -114,54 +122,6 @@ def _texts(vary: Mapping[str, Sequence[Value]] | Sequence[str], mark: str) -> Se
 
 def _as_toml(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def press_points(
-    points: Sweep,
-    out: str | Path,
-    scheduler: str | None = None,
-    workers: int | None = None,
-    report: Progress | None = None,
-) -> ResultStore:
-    """Press every point of a sweep that has no row yet.
-
-    Parameters
-    ----------
-    points : from `finger3d.analyses.sweep.points.checked_points`
-    out : folder for points.jsonl, results.csv, report.html and, with pyarrow, results.parquet; a sweep found there is
-        continued
-    scheduler : address of a Dask scheduler; None starts workers on this machine
-    workers : processes on this machine; None: one for each core, at most one for each body. One worker is this process,
-        as for a single body.
-    report : shows the progress
-
-    Returns
-    -------
-    ResultStore
-        The rows by point, and why other points have none.
-
-    Raises
-    ------
-    Finger3dError
-        If the folder holds another sweep.
-    MissingError
-        If a file cannot be written, or the cluster is lost; finished points are kept.
-    """
-    report = report or Progress()
-    folder = Path(out)
-    if any(body.labels for body in points.bodies.values()):
-        require("[labels]", "h5py")
-    with ResultStore(points, folder).open() as store:
-        progress = SweepProgress(store, report)
-        try:
-            _press(store, scheduler, workers, progress)
-        finally:
-            store.reload()
-            progress.report.steps_done = len(store.rows)
-            store.write()
-        with store.room("report.html"):
-            sweep_page(folder)
-        return store
 
 
 def _press(store: ResultStore, scheduler: str | None, workers: int | None, progress: SweepProgress) -> None:
@@ -177,7 +137,7 @@ def _press(store: ResultStore, scheduler: str | None, workers: int | None, progr
         from finger3d.analyses.sweep import local
 
         progress.report.stage("pressing")
-        local.press(bodies, progress, workers or local.default_workers(len(bodies)))
+        local.press(bodies, progress, workers or min(cores(), len(bodies)))
     else:
         progress.report.stage("pressing")
         for body in bodies:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import cast
 
 from finger3d import _extras
+from finger3d._cost import duration
 from finger3d.analyses.sweep.labels import FILE, PARTS, SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
@@ -231,14 +231,8 @@ class SweepProgress:
             )
 
     def give_up(self, body: BodyPoints, reason: str) -> None:
-        """Note and report why the points that are left of a body have no rows."""
+        """Note and report why the points that are left of a body have no rows; no others are pressed."""
         for point in body.left:
             self.store.lose(point, reason)
         self.report.say(f"{len(body.left)} points lost: {reason}")
-
-
-def duration(seconds: float) -> str:
-    """Return a short text such as "12 s", "3 min" or "1.5 h"."""
-    if seconds < 90.0:
-        return f"{math.ceil(seconds)} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+        body.left = []

@@ -25,10 +25,6 @@ class IsochoricLaw(Protocol):
         """Return the law with another shear modulus (MPa); all stresses are proportional to it."""
         ...
 
-    def energy(self, f: Float) -> Float:
-        """Return the energy (...,) MPa of deformation gradients (..., 3, 3), det F > 0."""
-        ...
-
     def stress(self, f: Float) -> Float:
         """Return the first Piola-Kirchhoff stress dW/dF (..., 3, 3) MPa."""
         ...
@@ -82,10 +78,6 @@ class Inhomogeneous:
     def of_points(self, points: slice) -> Inhomogeneous:
         """Return the law at some of the points."""
         return Inhomogeneous(self.law, self.relative[points])
-
-    def energy(self, f: Float) -> Float:
-        """Return the energy (m,) MPa of deformation gradients (m, 3, 3)."""
-        return self.relative * self.law.energy(f)
 
     def stress(self, f: Float) -> Float:
         """Return the first Piola-Kirchhoff stress (m, 3, 3) MPa."""

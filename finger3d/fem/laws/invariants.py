@@ -22,18 +22,16 @@ from finger3d.fem.tensors import cofactor, determinant
 
 
 class Derivatives(NamedTuple):
-    """First and second derivatives (...,) MPa of an energy by two invariants; None for what is zero everywhere."""
+    """Derivatives (...,) MPa of an energy by two invariants, and the second one by the first; None: zero everywhere."""
 
     w1: Float
     w2: Float | None = None
     w11: Float | None = None
-    w12: Float | None = None
-    w22: Float | None = None
 
 
 @dataclass(frozen=True)
 class InvariantLaw(ABC):
-    """Base class; a law gives its energy and its derivatives by the invariants.
+    """Base class; a law gives the derivatives of its energy by the invariants.
 
     Attributes
     ----------
@@ -52,16 +50,8 @@ class InvariantLaw(ABC):
         """Whether the law is known to be stable at all strains."""
 
     @abstractmethod
-    def of_invariants(self, x1: Float, x2: Float) -> Float:
-        """Return the energy (...,) MPa of isochoric invariants (...,)."""
-
-    @abstractmethod
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return the derivatives of the energy by the isochoric invariants (...,)."""
-
-    def energy(self, f: Float) -> Float:
-        """Return the energy (...,)."""
-        return self.of_invariants(*_invariants(f))
 
     def stress(self, f: Float) -> Float:
         """Return the first Piola-Kirchhoff stress (..., 3, 3)."""
@@ -83,10 +73,6 @@ class InvariantLaw(ABC):
         if by.w2 is not None:
             g2 = _gradient_2(f, inverse, x2)
             stress, tangent = stress + _wide(by.w2) * g2, tangent + _wide4(by.w2) * _hessian_2(f, inverse, x2)
-            if by.w12 is not None:
-                tangent += _wide4(by.w12) * (_outer(g1, g2) + _outer(g2, g1))
-            if by.w22 is not None:
-                tangent += _wide4(by.w22) * _outer(g2, g2)
         return stress, tangent
 
     def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
@@ -99,10 +85,7 @@ class InvariantLaw(ABC):
         if by.w2 is not None:
             stress, diagonal = stress + by.w2[..., None] * g2, diagonal - by.w2[..., None] * 2.0 * g2
         out = diagonal[..., None] * np.eye(3)
-        for w, a, b in ((by.w11, g1, g1), (by.w12, g1, g2), (by.w12, g2, g1), (by.w22, g2, g2)):
-            if w is not None:
-                out = out + _wide(w) * a[..., :, None] * b[..., None, :]
-        return stress, out
+        return stress, out if by.w11 is None else out + _wide(by.w11) * g1[..., :, None] * g1[..., None, :]
 
 
 def _wide(scalar: Float) -> Float:
@@ -196,10 +179,6 @@ class NeoHooke(InvariantLaw):
         """True."""
         return True
 
-    def of_invariants(self, x1: Float, x2: Float) -> Float:
-        """Return G/2 (I1 - 3)."""
-        return np.asarray(0.5 * self.shear * (x1 - 3.0))
-
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return the derivative G/2."""
         return Derivatives(np.full_like(x1, 0.5 * self.shear))
@@ -220,11 +199,6 @@ class MooneyRivlin(InvariantLaw):
     def is_stable(self) -> bool:
         """Whether no constant is negative."""
         return 0.0 <= self.c01_share <= 1.0
-
-    def of_invariants(self, x1: Float, x2: Float) -> Float:
-        """Return c10 (I1 - 3) + c01 (I2 - 3)."""
-        half = 0.5 * self.shear
-        return np.asarray(half * ((1.0 - self.c01_share) * (x1 - 3.0) + self.c01_share * (x2 - 3.0)))
 
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return c10 and c01."""
@@ -248,11 +222,6 @@ class Yeoh(InvariantLaw):
     def is_stable(self) -> bool:
         """Whether no constant is negative."""
         return self.c2_over_c1 >= 0.0 and self.c3_over_c1 >= 0.0
-
-    def of_invariants(self, x1: Float, x2: Float) -> Float:
-        """Return the polynomial of I1 - 3."""
-        e = x1 - 3.0
-        return np.asarray(0.5 * self.shear * e * (1.0 + e * (self.c2_over_c1 + e * self.c3_over_c1)))
 
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return the polynomial's derivatives."""

@@ -1,12 +1,8 @@
-"""Materials and the linear elastic law that the stiffness is assembled from.
-
-A new material is one class with the methods of `Material`, and one law with those of `LinearElasticity`.
-"""
+"""Isotropic materials, and the linear elastic law that the stiffness is assembled from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -35,79 +31,12 @@ Forces deviate by some 2e-5 from those of a part that keeps its shape exactly.
 """
 
 
-class LinearElasticity(Protocol):
-    """Linear elastic law of a solid or a section: stress ``C : eps + p I``.
-
-    In the displacement form C is the whole law and p = 0. In the mixed form p is an unknown field with
-    ``p = pressure_modulus div(u)``, and C is the rest.
-    """
-
-    @property
-    def mixed(self) -> bool:
-        """Whether the pressure is an unknown of its own."""
-        ...
-
-    @property
-    def shear_modulus(self) -> float:
-        """A shear modulus, MPa: the size of the stiffness, by which pressures are scaled."""
-        ...
-
-    @property
-    def pressure_modulus(self) -> float | Float:
-        """Pressure per dilatation of the mixed form, MPa; (e,) if it differs between cells."""
-        ...
-
-    def of_cells(self, cells: slice | Int) -> LinearElasticity:
-        """Return the law of some of the cells of the body."""
-        ...
-
-    def contract(self, outer: Float) -> Float:
-        """Return element matrices ``sum_mn C_imjn A_ambn`` (e, k, d, k, d) from A (e, k, d, k, d).
-
-        A are the integrals of ``G_am G_bn``, with the gradients G of the shape functions a and b.
-        """
-        ...
-
-    def stress(self, strain: Float) -> Float:
-        """Return ``C : strain`` (n, d, d), MPa; if laws differ between cells, of equally many strains in each cell."""
-        ...
-
-
-class Material(Protocol):
-    """Elastic material of a body."""
-
-    @property
-    def is_nearly_incompressible(self) -> bool:
-        """Whether solids and plane strain need the mixed form."""
-        ...
-
-    def elasticity(self, plane_stress: bool = False, mixed: bool | None = None) -> LinearElasticity:
-        """Return the small-strain law; in plane stress with the strain across the section condensed.
-
-        Parameters
-        ----------
-        mixed : the form; None chooses it by `is_nearly_incompressible`
-        """
-        ...
-
-    def across(self, strain: Float, stress: Float, plane_strain: bool) -> tuple[Float, Float]:
-        """Return strain and stress (n,) across a section from the in-plane ones (n, 2, 2)."""
-        ...
-
-    def isotropic(self, user: str) -> Isotropic:
-        """Return the material itself if it is isotropic.
-
-        Raises
-        ------
-        Finger3dError
-            If it is not; the message names the `user` that needs it, such as ``"effects.large_deformation"``.
-        """
-        ...
-
-
 @dataclass(frozen=True)
 class Elasticity:
-    """Isotropic linear elasticity, ``lame tr(eps) I + 2 shear eps``, by its constants in MPa."""
+    """Isotropic linear elasticity, ``lame tr(eps) I + 2 shear eps``, by its constants in MPa.
+
+    In the mixed form the pressure ``lame div(u)`` is an unknown field.
+    """
 
     shear: float
     lame: float
@@ -127,22 +56,15 @@ class Elasticity:
             compressibility = min(compressibility, LARGEST_COMPRESSIBILITY / shear)
         return cls(shear, 1.0 / compressibility, is_mixed)
 
-    @property
-    def shear_modulus(self) -> float:
-        """The shear modulus, MPa."""
-        return self.shear
-
-    @property
-    def pressure_modulus(self) -> float:
-        """Lame's first constant, MPa."""
-        return self.lame
-
     def of_cells(self, cells: slice | Int) -> Elasticity:
         """Return the law itself: it is the same in all cells."""
         return self
 
     def contract(self, outer: Float) -> Float:
-        """Return element matrices ``lame A_aibj + shear (A_ajbi + delta_ij A_ambm)``, lame only without pressures."""
+        """Return element matrices ``lame A_aibj + shear (A_ajbi + delta_ij A_ambm)``, lame only without pressures.
+
+        A (e, k, d, k, d) are the integrals of ``G_am G_bn``, with the gradients G of the shape functions a and b.
+        """
         cell = self.shear * np.swapaxes(outer, 2, 4)
         if self.lame and not self.mixed:
             cell += self.lame * outer
@@ -152,7 +74,7 @@ class Elasticity:
         return np.asarray(cell)
 
     def stress(self, strain: Float) -> Float:
-        """Return ``2 shear eps + lame tr(eps) I``, lame only without pressures."""
+        """Return ``2 shear eps + lame tr(eps) I`` (n, d, d), MPa, lame only without pressures."""
         deviator = 2.0 * self.shear * strain
         if self.mixed:
             return deviator
@@ -178,11 +100,16 @@ class Isotropic:
 
     @property
     def is_nearly_incompressible(self) -> bool:
-        """Whether nu is close to 1/2."""
+        """Whether solids and plane strain need the mixed form: nu is close to 1/2."""
         return self.nu >= MIXED_FROM
 
     def elasticity(self, plane_stress: bool = False, mixed: bool | None = None) -> Elasticity:
-        """Return the law of a solid or plane strain, or of plane stress."""
+        """Return the law of a solid or plane strain, or of plane stress.
+
+        Parameters
+        ----------
+        mixed : the form; None chooses it by `is_nearly_incompressible`
+        """
         return Elasticity.of(self.E_MPa, self.nu, plane_stress, mixed)
 
     def across(self, strain: Float, stress: Float, plane_strain: bool) -> tuple[Float, Float]:
@@ -190,7 +117,3 @@ class Isotropic:
         in_plane = np.trace(stress, axis1=1, axis2=2)
         zero = np.zeros(len(stress))
         return (zero, self.nu * in_plane) if plane_strain else (-self.nu / self.E_MPa * in_plane, zero)
-
-    def isotropic(self, user: str) -> Isotropic:
-        """Return the material."""
-        return self

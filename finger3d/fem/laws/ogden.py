@@ -53,13 +53,6 @@ class Ogden:
         """Pairs (mu, alpha)."""
         return [(2.0 * share * self.shear / alpha, alpha) for share, alpha in self.terms]
 
-    def energy(self, f: Float) -> Float:
-        """Return the energy (...,)."""
-        square, _ = _principal(f)
-        logs = 0.5 * np.log(square / np.cbrt(determinant(f))[..., None] ** 2)
-        logs -= logs.mean(axis=-1, keepdims=True)  # their sum is 0, up to round-off that 1 / a multiplies
-        return np.asarray(sum(mu * (a * logs**2 * _second_order(a * logs)).sum(axis=-1) for mu, a in self._constants()))
-
     def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
         """Return the sum of mu (l^alpha - 1), and that of mu alpha l^alpha on the diagonal.
 
@@ -150,11 +143,3 @@ def _ratio(q: float, t: Float) -> Float:
     """expm1(q t) / expm1(t), q at t = 0."""
     safe = np.where(t == 0.0, 1.0, t)
     return np.where(t == 0.0, q, np.expm1(q * safe) / np.expm1(safe))
-
-
-def _second_order(y: Float) -> Float:
-    """(exp(y) - 1 - y) / y^2, 1/2 at y = 0."""
-    small = np.abs(y) < 1e-2
-    safe = np.where(small, 1.0, y)
-    series = 0.5 + y / 6.0 * (1.0 + y / 4.0 * (1.0 + y / 5.0 * (1.0 + y / 6.0 * (1.0 + y / 7.0))))
-    return np.asarray(np.where(small, series, (np.expm1(safe) - safe) / safe**2))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
-from finger3d.fem.laws.material import LinearElasticity, Material
+from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.simplex import Mesh
 
 
-def elasticity_of(materials: Sequence[Material], mesh: Mesh, plane_stress: bool) -> LinearElasticity:
+def elasticity_of(materials: Sequence[Isotropic], mesh: Mesh, plane_stress: bool) -> LinearElasticity:
     """Return the small-strain law of a body.
 
     Parameters
@@ -34,7 +35,7 @@ def elasticity_of(materials: Sequence[Material], mesh: Mesh, plane_stress: bool)
 def moduli_of(elastic: LinearElasticity) -> tuple[float, ...]:
     """Return the shear modulus of each part by its number, MPa."""
     laws = elastic.laws if isinstance(elastic, ElasticityByPart) else (elastic,)
-    return tuple(law.shear_modulus for law in laws)
+    return tuple(law.shear for law in laws)
 
 
 def contact_compliance(elastic: LinearElasticity, mesh: Mesh) -> Float:
@@ -43,7 +44,7 @@ def contact_compliance(elastic: LinearElasticity, mesh: Mesh) -> Float:
     With Lame's constants l and G it is ``(l + 2 G) / (4 G (l + G))``: ``(1 - nu^2) / E``, or ``1 / E`` in plane stress.
     """
     shear = np.array(moduli_of(elastic))[elastic.part if isinstance(elastic, ElasticityByPart) else 0]
-    lame = elastic.pressure_modulus
+    lame = elastic.lame
     of_cell = np.broadcast_to((lame + 2.0 * shear) / (4.0 * shear * (lame + shear)), len(mesh.cells))
     nodes, each = mesh.cells.ravel(), mesh.cells.shape[1]
     count = np.bincount(nodes, minlength=len(mesh.points))
@@ -53,7 +54,7 @@ def contact_compliance(elastic: LinearElasticity, mesh: Mesh) -> Float:
 
 @dataclass(frozen=True)
 class ElasticityByPart:
-    """Linear elastic laws of a body of several parts; see `finger3d.fem.laws.material.LinearElasticity`.
+    """Linear elastic laws of a body of several parts; see `finger3d.fem.laws.material.Elasticity`.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class ElasticityByPart:
     part : (e,) number of the part of each cell
     """
 
-    laws: tuple[LinearElasticity, ...]
+    laws: tuple[Elasticity, ...]
     part: Int
 
     def __post_init__(self) -> None:
@@ -73,14 +74,14 @@ class ElasticityByPart:
         return self.laws[0].mixed
 
     @property
-    def shear_modulus(self) -> float:
-        """Shear modulus of the main body, MPa."""
-        return self.laws[0].shear_modulus
+    def shear(self) -> float:
+        """Shear modulus of the main body, MPa, by which pressures are scaled."""
+        return self.laws[0].shear
 
     @property
-    def pressure_modulus(self) -> Float:
-        """Pressure per dilatation in each cell (e,), MPa."""
-        return np.array([law.pressure_modulus for law in self.laws])[self.part]
+    def lame(self) -> Float:
+        """Lame's first constant in each cell (e,), MPa."""
+        return np.array([law.lame for law in self.laws])[self.part]
 
     def of_cells(self, cells: slice | Int) -> LinearElasticity:
         """Return the law of some cells, that of their part if they belong to one."""
@@ -88,13 +89,17 @@ class ElasticityByPart:
         return self.laws[part[0]] if len(part) and (part == part[0]).all() else ElasticityByPart(self.laws, part)
 
     def contract(self, outer: Float) -> Float:
-        """Return the element matrices of all cells; see `finger3d.fem.laws.material.LinearElasticity.contract`."""
+        """Return the element matrices of all cells; see `finger3d.fem.laws.material.Elasticity.contract`."""
         return _by_part(self.part, lambda number, values: self.laws[number].contract(values), outer)
 
     def stress(self, strain: Float) -> Float:
         """Return the stress (e k, d, d), MPa, of k strains in each cell."""
         part = np.repeat(self.part, len(strain) // max(len(self.part), 1))
         return _by_part(part, lambda number, values: self.laws[number].stress(values), strain)
+
+
+LinearElasticity: TypeAlias = Elasticity | ElasticityByPart
+"""Linear elastic law of a body."""
 
 
 def _by_part(part: Int, function: Callable[[int, Float], Float], values: Float) -> Float:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.laws.material import LinearElasticity
+from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, MeshPart, signed_volumes
 
@@ -48,7 +48,7 @@ def averaged(mesh: Mesh, of_part: Callable[[MeshPart], tuple[Float, ...]]) -> tu
 def strain_and_stress(
     mesh: Mesh,
     unknowns: Float,
-    laws: Sequence[LinearElasticity],
+    laws: Sequence[Elasticity],
     pressure_scale: float,
     across: Sequence[Across] | None = None,
 ) -> tuple[Float, Float]:

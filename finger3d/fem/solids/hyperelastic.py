@@ -369,14 +369,6 @@ class TotalLagrangian:
                 self.pattern.add_pressure(data, part, coupling, np.tensordot(compliance, mass, axes=1))
         return Stiffness(self.pattern.matrix(data), self.pattern.vertices, self.pressure_scale)
 
-    def energy(self, x: Float) -> float:
-        """Return the elastic energy, mJ."""
-        material = self.material
-        f = self.deformation(x)
-        j, p = determinant(f), self.pressures(x)
-        volumetric = 0.5 * material.bulk * (j - 1.0) ** 2 if p is None else p * (j - 1.0) - 0.5 * p**2 / material.bulk
-        return float((material.law.energy(f) + volumetric) @ self._operators[1].ravel())
-
     def elastic_stress(self, x: Float, relaxing: Relaxing | None, volumetric: bool) -> Float:
         """Return the elastic second Piola-Kirchhoff stress (m, 3, 3) MPa at the quadrature points."""
         return self.material.elastic_stress(self.deformation(x, relaxing), self.pressures(x), relaxing, volumetric)

@@ -11,6 +11,7 @@ import math
 import os
 import time
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Stiffness
-from finger3d.fem.solvers.factors import Factor, SuperLUFactor
+from finger3d.fem.solvers.factors import SuperLUFactor
 
 if TYPE_CHECKING:
     from finger3d.fem.solvers import mumps, pardiso
@@ -46,7 +47,7 @@ class Condensation:
     solver: str
     rows: sp.csr_matrix = field(repr=False)
     _free: Int = field(repr=False)
-    _factor: Factor = field(repr=False)
+    _factor: _Augmented | SuperLUFactor = field(repr=False)
     _scale: float = field(repr=False)  # of the stiffness, as it was factored
     _row_scales: Float = field(repr=False)
 
@@ -148,7 +149,7 @@ def condense(
     scaled = sp.csr_matrix((upper.data / unit, upper.indices, upper.indptr), shape=upper.shape)
     entries = padded.data / np.repeat(units, np.diff(padded.indptr))
     read = sp.csr_matrix((entries, padded.indices, padded.indptr), shape=padded.shape)
-    factor: Factor
+    factor: _Augmented | SuperLUFactor
     if solver in ("pardiso", "mumps"):
         before = replaced._factor if replaced and replaced.solver == solver else None
         factor = _Augmented.of(solver, scaled, free, read, before if isinstance(before, _Augmented) else None)
@@ -201,11 +202,18 @@ def stiffened(compliance: Float, springs: Float) -> Float:
     return 0.5 * (reduced + reduced.T)
 
 
+def is_installed(solver: str) -> bool:
+    """Return whether the library of "pardiso" or "mumps" can be loaded on this machine."""
+    try:
+        import_module(f"finger3d.fem.solvers.{solver}").library()
+    except (ImportError, OSError):
+        return False
+    return True
+
+
 def default_solver() -> str:
     """Return the first solver that is installed: "pardiso", "mumps" or "superlu"."""
-    from finger3d.fem.solvers import mumps, pardiso
-
-    return "pardiso" if pardiso.available() else "mumps" if mumps.available() else "superlu"
+    return next(filter(is_installed, ("pardiso", "mumps")), "superlu")
 
 
 @dataclass(frozen=True)
@@ -251,11 +259,11 @@ class _Augmented:
         return self.number == self.factor.factorizations
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """See `Factor`."""
+        """See `WholeSolutions`; PARDISO leaves the solution to `substituted`."""
         return self._current().eliminated(load)
 
     def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """See `Factor`."""
+        """See `WholeSolutions`."""
         return self._current().substituted(eliminated, force)
 
     def _current(self) -> pardiso.PardisoFactor | mumps.MumpsFactor:

@@ -1,14 +1,10 @@
-"""Factors of the stiffness of a body with rows: their interface, and that of SuperLU.
-
-A direct solver that separates forward and backward substitution implements `Factor` itself; one that gives whole
-solutions only derives from `WholeSolutions`.
-"""
+"""Factors of the stiffness of a body with rows: those that give whole solutions only, and that of SuperLU."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,18 +17,6 @@ if TYPE_CHECKING:
 _ROWS_AT_ONCE = 64
 
 
-class Factor(Protocol):
-    """Factor of the stiffness K of the free unknowns, with rows R."""
-
-    def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """Return the intermediate result that `substituted` takes, and ``R K^-1 load`` (r, m), for loads (n, m)."""
-        ...
-
-    def substituted(self, eliminated: Float | None, force: Float) -> Float:
-        """Return ``K^-1 (load + R^T force)`` (n, m) for loads eliminated, if any, and forces (r, m)."""
-        ...
-
-
 class WholeSolutions(ABC):
     """Factor of a stiffness K (n, n) with rows R (r, n) that eliminates loads by whole solutions."""
 
@@ -43,7 +27,7 @@ class WholeSolutions(ABC):
         """Return ``K^-1 load`` (n, m)."""
 
     def eliminated(self, load: Float) -> tuple[Float, Float]:
-        """Return ``K^-1 load`` (n, m) and ``R K^-1 load`` (r, m) of loads (n, m)."""
+        """Return what `substituted` takes, here ``K^-1 load`` (n, m), and ``R K^-1 load`` (r, m), of loads (n, m)."""
         solution = self.solve(load)
         return solution, self.rows @ solution
 

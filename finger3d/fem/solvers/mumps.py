@@ -37,21 +37,8 @@ _AT_ONCE = 64  # right-hand sides
 _LOCK = threading.Lock()  # MUMPS keeps data in global variables
 
 
-def available() -> bool:
-    """Whether MUMPS can be loaded on this machine."""
-    try:
-        _library()
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-class MumpsError(MissingError):
-    """MUMPS refused the matrix; carries its error number."""
-
-
 @functools.cache
-def _library() -> tuple[Any, Any]:
+def library() -> tuple[Any, Any]:
     """Return cffi's description of MUMPS's header, and the library."""
     spec = find_spec("casadi")
     if spec is None or spec.origin is None:
@@ -88,7 +75,7 @@ class MumpsFactor(WholeSolutions):
     """
 
     def __init__(self, upper: sp.csr_matrix, rows: int) -> None:
-        self._ffi, self._lib = _library()
+        self._ffi, self._lib = library()
         self._upper = upper.tocsr()
         self._n = upper.shape[0] - rows
         places = self._upper.tocoo()
@@ -158,7 +145,7 @@ class MumpsFactor(WholeSolutions):
             raise MemoryError(f"MUMPS job {job}")
         if error < 0:
             reason = {-6: "singular pattern", -10: "singular matrix"}.get(error, "see the guide of MUMPS, infog(1)")
-            raise MumpsError(f"MUMPS job {job}: error {error} ({reason})")
+            raise MissingError(f"MUMPS job {job}: error {error} ({reason})")
         return True
 
     def _pointer(self, array: Array) -> object:

@@ -27,7 +27,7 @@ _INT32_MAX = 2**31 - 1
 _NO_MEMORY = -2
 
 
-def _library() -> tuple[Call, Threads, int]:
+def library() -> tuple[Call, Threads, int]:
     """Return PARDISO, the function that sets its threads, and their number now."""
     if "PYPARDISO_MKL_RT" not in os.environ:
         # pypardiso's own search walks the whole environment, which costs more than a small solve.
@@ -49,19 +49,6 @@ def _exit(code: int) -> None:
 
 
 _EXIT_HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_int)(_exit)  # must live as long as MKL may call it
-
-
-def available() -> bool:
-    """Whether PARDISO can be loaded on this machine."""
-    try:
-        _library()
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-class PardisoError(MissingError):
-    """PARDISO refused the matrix; carries its error number."""
 
 
 class PardisoFactor:
@@ -88,9 +75,9 @@ class PardisoFactor:
         upper = upper.tocsr()
         upper.sort_indices()
         if upper.nnz > _INT32_MAX:
-            raise PardisoError("matrix has more entries than 32-bit PARDISO can index")
+            raise MissingError("matrix has more entries than 32-bit PARDISO can index")
         # PARDISO crashes if a matrix is factored again on another number of threads
-        self._call, self._set_threads, self._threads = _library()
+        self._call, self._set_threads, self._threads = library()
         self._n = upper.shape[0]
         self._rows = rows
         self._a = np.ascontiguousarray(upper.data, dtype=np.float64)
@@ -179,7 +166,7 @@ def _run(
         raise MemoryError(f"PARDISO phase {phase}")
     if error.value:
         reason = {-1: "inconsistent input", -3: "reordering", -4: "zero pivot"}
-        raise PardisoError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
+        raise MissingError(f"PARDISO phase {phase}: error {error.value} ({reason.get(error.value, 'see MKL manual')})")
 
 
 def _release(call: Call, pt: Array, n: int, iparm: Array) -> None:

@@ -119,24 +119,8 @@ def contact_geometry(
         Share of an elastic object in the compliance of each point; none is rigid.  Its surface turns towards that of
         the finger by this share: two mirror images meet in a plane.
     """
-    means = contact_means(distance, surface, displacement)
-    return geometry_of_means(means, surface, displacement, axes, object_share)
-
-
-def contact_means(distance: Distance, surface: BoundarySurface, displacement: Float | None = None) -> Float:
-    """Return the means (c, 1 + 2 d) of distance, gradient and displacement at the samples; see `contact_geometry`."""
     moved = np.zeros_like(surface.samples) if displacement is None else surface.interpolation @ displacement
-    return np.asarray(surface.average @ np.column_stack([*distance(surface.samples + moved), moved]))
-
-
-def geometry_of_means(
-    means: Float,
-    surface: BoundarySurface,
-    displacement: Float | None = None,
-    axes: tuple[str, ...] = (),
-    object_share: Float | None = None,
-) -> ContactGeometry:
-    """Return gaps and directions of a surface's points from its means; see `contact_means` and `contact_geometry`."""
+    means = np.asarray(surface.average @ np.column_stack([*distance(surface.samples + moved), moved]))
     d = surface.points.shape[1]
     mean = in_symmetry_planes(means[:, 1 : 1 + d], surface.points, axes)
     length = np.linalg.norm(mean, axis=1)

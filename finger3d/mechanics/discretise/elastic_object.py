@@ -30,12 +30,11 @@ from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.options import Mesher
+from finger3d.meshing.options import Mesher, Zone
 from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress
 
-Zone = tuple[float, float, float, float]
 _SURFACE = 401  # places along x and z where the highest point of a wedge or wave is looked for
 _SWAPPED = {
     "x": "z",

@@ -141,7 +141,7 @@ def _surroundings(model: Model, mesh: Mesh, axes: tuple[str, ...]) -> Isotropic:
             f"effects.embedded_gauge: all foils must lie in one part of the finger, and {where}; move them, or press "
             "with the foils of one part at a time"
         )
-    return materials[next(iter(gauge_of_part), 0)].isotropic("effects.embedded_gauge")
+    return materials[next(iter(gauge_of_part), 0)]
 
 
 def _infinite_body_compliance(model: Model, material: Isotropic, foils: list[FoilPatches]) -> Float:

@@ -70,11 +70,10 @@ def edge_lengths_at_gauges(model: Model, mesh: Mesh, axes: tuple[str, ...] = ())
     shortest = options.size_mm / options.gauge_refinement
     zones: list[SizedPlaces] = []
     for gauge in model.gauges:
-        if not options.refined_gauges or gauge.name in options.refined_gauges:
-            line = _places_along(gauge, shortest, axes, mesh.dim)
-            zones.append(SizedPlaces(line, shortest, _RATE, _AROUND_GAUGE * shortest))
-            places, edge = _places_on_face(mesh, zones[-1].tree, shortest)
-            zones.append(SizedPlaces(places, edge, _RATE, edge))
+        line = _places_along(gauge, shortest, axes, mesh.dim)
+        zones.append(SizedPlaces(line, shortest, _RATE, _AROUND_GAUGE * shortest))
+        places, edge = _places_on_face(mesh, zones[-1].tree, shortest)
+        zones.append(SizedPlaces(places, edge, _RATE, edge))
     return lambda points: np.min([np.full(len(points), np.inf), *(zone.at(points) for zone in zones)], axis=0)
 
 

@@ -15,8 +15,7 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
-from finger3d.fem.laws.material import LinearElasticity
-from finger3d.fem.mesh.parts import moduli_of
+from finger3d.fem.mesh.parts import LinearElasticity, moduli_of
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
 from finger3d.fem.recovery.recover import strain_and_stress
 from finger3d.fem.solids.bars import AddedStiffness

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
-from finger3d.fem.laws.material import LinearElasticity
-from finger3d.fem.mesh.parts import contact_compliance
+from finger3d.fem.mesh.parts import LinearElasticity, contact_compliance
 from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, unfold
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.mechanics.discretise.contact_points import ContactPoints

@@ -64,12 +64,11 @@ class FiniteStrain:
     def _material(self, problem: Problem) -> Hyperelastic:
         mesh, plane_stress = problem.mesh, problem.model.domain == "plane-stress"
         materials = problem.model.materials(mesh.part_labels)
-        linear = [material.isotropic("effects.large_deformation") for material in materials]
         if mesh.part is None:
-            law = self.law.with_shear(linear[0].E_MPa / (2.0 * (1.0 + linear[0].nu)))
-            return Hyperelastic.of(law, linear[0].nu, plane_stress)
+            law = self.law.with_shear(materials[0].E_MPa / (2.0 * (1.0 + materials[0].nu)))
+            return Hyperelastic.of(law, materials[0].nu, plane_stress)
         points = len(quadrature(mesh.dim, 2)[0])
-        return Hyperelastic.of_parts(self.law, linear, np.repeat(mesh.part, points), plane_stress)
+        return Hyperelastic.of_parts(self.law, materials, np.repeat(mesh.part, points), plane_stress)
 
     def start(self, problem: Problem) -> State[DeformedBody]:
         """Return the state at rest."""

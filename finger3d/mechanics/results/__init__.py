@@ -1,1 +1,1 @@
-"""What a press leaves: states, increments and their history, and the limit of slip."""
+"""What a press leaves: states, increments and their history, and the margin to slip."""

@@ -17,7 +17,7 @@ from finger3d.errors import MissingError, Outcome
 from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.readings.columns import MEASURED, Column, by_key, in_space, of_kind
-from finger3d.mechanics.results.slip_limit import margins, slip_margin
+from finger3d.mechanics.results.slip_margin import margins, slip_margin
 from finger3d.mechanics.results.state import State
 from finger3d.objects import ObjectPose
 

@@ -18,7 +18,7 @@ from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.readings.reading import Reading, Taxel
 from finger3d.mechanics.results.history import StepResult, pose_entry
-from finger3d.mechanics.results.slip_limit import limits, margins, slip_margin
+from finger3d.mechanics.results.slip_margin import limits, margins, slip_margin
 from finger3d.objects import Move, ObjectPose
 from finger3d.objects.placed import TIME
 

@@ -36,7 +36,6 @@ from finger3d.mechanics.small_strain.viscoelastic_body import (
     ConstantPoissonRatio,
     RelaxationWorkspace,
     Response,
-    ViscoelasticBody,
 )
 from finger3d.objects import Move, ObjectPose
 
@@ -65,7 +64,7 @@ class Viscoelastic:
         """Return a workspace without a factor."""
         return RelaxationWorkspace()
 
-    def body(self, problem: Problem) -> ViscoelasticBody:
+    def body(self, problem: Problem) -> ConstantPoissonRatio | ConstantBulkModulus:
         """Return the body of a problem."""
         return ConstantPoissonRatio(problem) if self.relaxation.bulk else ConstantBulkModulus(problem)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -59,35 +58,6 @@ class Response:
     compliance: Float
     moved: Float
     shape: Callable[[Float], Float]
-
-
-class ViscoelasticBody(Protocol):
-    """A viscoelastic body with internal variables."""
-
-    @property
-    def size(self) -> int:
-        """Number of internal variables of a branch."""
-        ...
-
-    def respond(self, step: Step, memory: InternalVariables, workspace: RelaxationWorkspace) -> Response:
-        """Return the response of the rows over a step."""
-        ...
-
-    def unknowns(self, now: Float) -> Float:
-        """Return all unknowns (N,) of a shape, with the pressures of the instantaneous modulus."""
-        ...
-
-    def read(self, now: Float) -> Float:
-        """Return the row displacements (r,) of a shape."""
-        ...
-
-    def stress(self, prony: Prony, memory: InternalVariables) -> Float:
-        """Nodal stress (n, 3, 3), MPa."""
-        ...
-
-    def nodal_forces(self, prony: Prony, memory: InternalVariables) -> Float:
-        """Nodal forces (n, d) of the relaxed stress."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -149,8 +119,7 @@ class ConstantBulkModulus:
         """Laws of the parts by their number."""
         problem = self.problem
         materials = problem.model.materials(problem.mesh.part_labels)
-        user, mixed = "effects.viscosity.bulk = false", problem.body.elastic.mixed
-        return [material.isotropic(user).elasticity(mixed=mixed) for material in materials]
+        return [material.elasticity(mixed=problem.body.elastic.mixed) for material in materials]
 
     @cached_property
     def _of_pressures(self) -> tuple[Float, Float]:

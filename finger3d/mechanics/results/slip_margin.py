@@ -1,14 +1,12 @@
-"""Slip limit: the largest tangential forces and the largest torque that a contact transmits before it slips as a whole.
+"""Slip margins: what is left of the largest tangential force that a contact transmits before it slips as a whole.
 
 With normal forces as they are, every point transmits at most mu times its own.  The resultants that these allow are the
-limit surface (Goyal, Ruina and Papadopoulos 1991).  Margins are what is left of it, from 1 to 0, where a point or the
-whole contact slips, or nothing can be held.
+limit surface (Goyal, Ruina and Papadopoulos 1991).  Margins go from 1 to 0, where a point or the whole contact slips,
+or nothing can be held.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -23,28 +21,6 @@ Region: TypeAlias = "NDArray[np.bool_] | slice"
 """Which contact points (m,) a region has."""
 
 EVERYWHERE = slice(None)
-
-
-@dataclass(frozen=True)
-class SlipLimit:
-    """Largest net friction along x and z, and torque about y, each alone; and how much of them a contact uses.
-
-    Attributes
-    ----------
-    tangential_force_x_N, tangential_force_z_N : N; None along z for a section
-    moment_y_Nmm : N mm, about the centre of pressure; None for a section
-    used : from 0 to 1, at which the whole contact slips; friction against the ellipsoid with these semi-axes (Howe and
-        Cutkosky 1996)
-    """
-
-    tangential_force_x_N: float
-    tangential_force_z_N: float | None
-    moment_y_Nmm: float | None
-    used: float
-
-    def as_dict(self) -> dict[str, float | None]:
-        """Return the limits as an entry of summary.json."""
-        return asdict(self)
 
 
 def largest_force(
@@ -79,26 +55,6 @@ def slip_margin(
     direction = load / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
     held = sum(largest_force(points, state, friction, direction, region))
     return min(max(1.0 - size / held, 0.0), 1.0) if held > 0.0 else 0.0
-
-
-def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> SlipLimit | None:
-    """Return the slip limit of the whole finger in a state; None without contact or friction."""
-    limit = limits(points, state, friction)
-    if not limit.any():
-        return None
-    force = points.with_basis_of(state).friction(state.force)
-    x, _ = largest_force(points, state, friction, np.array([1.0, 0.0, 0.0]))
-    used = [(force[:, 0].sum(), x)]
-    z = moment = None
-    if points.dim == 3:
-        z, _ = largest_force(points, state, friction, np.array([0.0, 0.0, 1.0]))
-        arm = points.points - state.force[:, 0] @ points.points / state.force[:, 0].sum()
-        normal = _normals(points, state)
-        around = np.column_stack([arm[:, 2], np.zeros(len(arm)), -arm[:, 0]])  # y x arm
-        moment = float(limit @ np.linalg.norm(around - np.sum(around * normal, axis=1)[:, None] * normal, axis=1))
-        used += [(force[:, 2].sum(), z), (np.sum(around * force), moment)]
-    # a wall across x has no friction along it
-    return SlipLimit(x, z, moment, math.hypot(*(own / most for own, most in used if most)))
 
 
 def limits(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
