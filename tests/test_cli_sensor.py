@@ -474,7 +474,7 @@ def test_an_objective_from_a_file_on_the_command_line(root, tmp_path, capsys) ->
     assert "best.toml" in told
     assert "objective (judge.py)" in told
     judged = (out / "evaluations.csv").read_text().splitlines()[1:]
-    assert f" {len(judged)} designs, " in told
+    assert re.search(rf"designs evaluated +{len(judged)}\b", told)
     assert load_scene(out / "best.toml").tables.gauge[0].angle_deg == pytest.approx(40.0, abs=2.0)
     judge.write_text("def objective(table):\n    return table.strains\n")
     assert main([*arguments[:-1], str(tmp_path / "other"), "--objective", str(judge)]) == 2

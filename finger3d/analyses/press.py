@@ -121,7 +121,7 @@ def run_press(scene: Scene, writer: ResultWriter, report: Progress, started: flo
 
                 report.stage("drawing")
                 draw()
-                press_page(writer.folder)
+                press_page(writer.folder).write(writer.folder)
     return record
 
 

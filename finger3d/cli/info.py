@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from finger3d.cli.common import Json, app, print_json, print_rows
+from finger3d.cli.common import app
+from finger3d.cli.options import Json
+from finger3d.cli.printing import print_json, print_rows
 
 _SOLVERS = {
     "pardiso": "PARDISO of MKL",

@@ -9,13 +9,13 @@ from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
 
-def calibrate_page(folder: str | Path) -> Path:
-    """Write report.html of a calibration from the files in its folder.
+def calibrate_page(folder: str | Path) -> Page:
+    """Return the page of a calibration, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If calibration.json cannot be read or the page cannot be written.
+        If calibration.json cannot be read.
     """
     folder = Path(folder)
     data = read_json(folder / "calibration.json")
@@ -50,7 +50,7 @@ def calibrate_page(folder: str | Path) -> Path:
     given = " ".join(f"--strain {name}={r['curve'][best]:.5g}" for name, r in readings.items())
     failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
     note = data["about"].get("mesh", {}).get("note")
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: {', '.join(readings)} against friction",
         headline,
         [
@@ -69,4 +69,3 @@ def calibrate_page(folder: str | Path) -> Path:
         notes=[*failed, *([note] if note else [])],
         versions=data["about"].get("versions"),
     )
-    return page.write(folder)

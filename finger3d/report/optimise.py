@@ -18,13 +18,13 @@ _SENSITIVITY = (
 )
 
 
-def optimise_page(folder: str | Path) -> Path:
-    """Write report.html of a design search from the files in its folder.
+def optimise_page(folder: str | Path) -> Page:
+    """Return the page of a design search, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If design.json or search.json cannot be read or the page cannot be written.
+        If design.json or search.json cannot be read.
     """
     folder = Path(folder)
     found, search = read_json(folder / "design.json"), read_json(folder / "search.json")
@@ -51,7 +51,7 @@ def optimise_page(folder: str | Path) -> Path:
     failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
     explanation = [_SENSITIVITY] if objective == "sensitivity" else []
     best_scene = folder / "best.toml"
-    page = Page(
+    return Page(
         f"{title_of(search['scene'])}: design for {objective}",
         headline,
         [
@@ -70,7 +70,6 @@ def optimise_page(folder: str | Path) -> Path:
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )
-    return page.write(folder)
 
 
 def _increment_error(steps: Sequence[int] | None, error: float | None) -> list[HeadlineRow]:

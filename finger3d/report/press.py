@@ -40,15 +40,15 @@ _OF_GRIP = (
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
 
-def press_page(folder: str | Path) -> Path:
-    """Write report.html of a press from the files in its folder.
+def press_page(folder: str | Path) -> Page:
+    """Return the page of a press, from the files in its folder.
 
     The file summary.json is required. The 3D view of a solid needs steps.npz; scene.toml and pictures are optional.
 
     Raises
     ------
     Finger3dError
-        If summary.json cannot be read or the page cannot be written.
+        If summary.json cannot be read.
     """
     folder = Path(folder)
     summary = read_json(folder / "summary.json")
@@ -72,7 +72,7 @@ def press_page(folder: str | Path) -> Path:
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
-    page = Page(
+    return Page(
         title_of(summary["scene"]),
         headline(good[-1], bars.totals(), bars.modulus) if good else (),
         sections,
@@ -84,7 +84,6 @@ def press_page(folder: str | Path) -> Path:
         notes=[*summary["warnings"], *summary["advice"], *([_remark(bars)] if bars.discretisation else [])],
         versions=summary["versions"],
     )
-    return page.write(folder)
 
 
 def _remark(bars: ErrorBars) -> str:

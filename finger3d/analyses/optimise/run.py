@@ -155,7 +155,7 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
         first.values,
         Path(problem.objective).stem,
     )
-    optimise_page(folder)
+    optimise_page(folder).write(folder)
     return OptimisationResult(
         keys=tuple(f.key for f in problem.free),
         best=best,

@@ -158,7 +158,7 @@ def press_points(
             progress.report.steps_done = len(store.rows)
             store.write()
         with store.room("report.html"):
-            sweep_page(folder)
+            sweep_page(folder).write(folder)
         return store
 
 

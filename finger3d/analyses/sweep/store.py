@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from finger3d import _extras
+from finger3d._types import Tree
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
@@ -122,6 +123,18 @@ class ResultStore:
         for name in (*names, *_LAST):
             found[name] = [str(row[name]) for row in rows] if name in _TEXTS else [number_in(row, name) for row in rows]
         return found
+
+    def as_dict(self) -> Tree:
+        """Return the folder, the numbers of points and bodies, and the rows of results.csv."""
+        columns = self.columns()
+        return {
+            "results": self.folder,
+            "points": len(self.sweep.points),
+            "kept": len(self.rows),
+            "failed": sum(outcome != "converged" for outcome in columns["outcome"]),
+            "bodies": len(self.sweep.bodies),
+            "rows": [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)],
+        }
 
     def said(self) -> str:
         """Return how many points are kept, and where."""
