@@ -22,7 +22,6 @@ from finger3d.effects import effect_names
 from finger3d.errors import Outcome
 from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
-from finger3d.scene.reference import reference
 from finger3d.scene.schema import schema
 from tests.commands import loaded, refused, run
 from tests.scenes import BLOCK, written
@@ -344,9 +343,9 @@ def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
     assert [leg.depth_mm for leg in loaded.legs] == [10.0]
 
 
-def test_new_explains_every_key(scene) -> None:
-    text = scene.read_text(encoding="utf-8")
-    keys = set(re.findall(r"^\| `(\w+)` \|", reference(), re.MULTILINE))
+def test_new_explains_every_key(scene, root) -> None:
+    text, page = scene.read_text(encoding="utf-8"), (root / "docs" / "scenes.md").read_text(encoding="utf-8")
+    keys = set(re.findall(r"^\| `(\w+)` \|", page.split("<!-- from the tables")[1], re.MULTILINE))
     assert {"depth_mm", "prony", "tolerance"} <= keys
     assert not [key for key in keys if not re.search(rf"\b{key}\b", text)]
     assert not [name for name in effect_names() if f"\n# [effects.{name}]\n" not in text]

@@ -200,9 +200,8 @@ def test_the_examples_of_models_and_objects_in_python_run(root: Path, folder: Pa
 
 
 def test_the_reference_is_the_codes_own(root: Path) -> None:
-    from finger3d.scene.reference import reference
-
-    assert runpy.run_path(str(root / "docs" / "_quoted.py"))["parts"]("docs/scenes.md")[1] == reference()
+    quoted = runpy.run_path(str(root / "docs" / "_quoted.py"))
+    assert quoted["parts"]("docs/scenes.md")[1] == quoted["keys"]()
 
 
 @pytest.mark.slow
