@@ -104,7 +104,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     out = tmp_path / "cal"
     sure = "tilt_deg=0.01 gauge_angle_deg=0.1 gauge_x_mm=0.01 gauge_y_mm=0.01 depth_mm=0.01 nu=1e-4 mesh=0.01".split()
     options = [word for text in sure for word in ("--tolerance", text)]
-    assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", "0:0.8:9", "--map", *options) == 0
+    assert run("calibrate", scene_file, "--gauge", "g36", "--out", out, "--mu", "0:0.8:9", *options) == 0
     told = capsys.readouterr().out
     for text in (
         "mu within 0.1",
@@ -116,7 +116,7 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
         assert text in told
     names = {p.name for p in out.iterdir() if p.name != ".finger3d.lock"}
     assert names == {"calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html",
-                     "scene.toml", "map.png", "map.csv"}  # fmt: skip
+                     "scene.toml"}  # fmt: skip
     data = json.loads((out / "calibration.json").read_text())
     assert (data["format"], data["version"], len(data["hash"])) == ("finger3d calibration", 5, 16)
     assert data["about"]["factorizations"] == 1

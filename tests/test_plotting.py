@@ -19,7 +19,6 @@ from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.plotting import cost, sensitivity
 from finger3d.plotting import solid as render
 from finger3d.plotting.calibration import draw as draw_calibration
-from finger3d.plotting.calibration import draw_map
 from finger3d.plotting.comparison import draw as draw_comparison
 from finger3d.plotting.figures import (
     contact_figure,
@@ -37,11 +36,10 @@ from finger3d.plotting.optimise import draw as draw_search
 from finger3d.report.sweep import sweep_charts
 from finger3d.report.sweep_figure import draw as draw_sweep
 from finger3d.results.comparison import Case
-from finger3d.sensor.maps import StrainMap
 from tests.commands import loaded
 from tests.comparison_cases import case
 from tests.designs import FIG9
-from tests.pictures import CURVE, MU, MUS, STEPS, finger, finger_picture, pixels, pressed, share, solid_finger
+from tests.pictures import CURVE, MU, STEPS, finger, finger_picture, pixels, pressed, share, solid_finger
 from tests.sensor_cases import curve, line, together, tolerance
 
 pytestmark = pytest.mark.usefixtures("fresh_renderer")
@@ -95,12 +93,6 @@ def calibration(path: Path) -> None:
     draw_calibration(path, CURVE)
 
 
-def strain_map(path: Path) -> None:
-    x, y = np.linspace(-50.0, 50.0, 21), np.linspace(0.0, 50.0, 11)
-    strain = 1e-3 * np.random.default_rng(0).random((len(MUS), len(y), len(x), 3))
-    draw_map(path, StrainMap(MUS, x, y, 0.0, strain), Gauge("g36", 36.0, 40.0, 0.0, 0.5), CURVE)
-
-
 def sweep(path: Path) -> None:
     keys = ["friction.mu", "material.nu", "press.depth_mm"]
     rows = [
@@ -125,12 +117,11 @@ def search(path: Path) -> None:
         solid_picture,
         comparison,
         calibration,
-        strain_map,
         sweep,
         search,
         lambda path: force_figure(path, STEPS),
     ],
-    ids=["contact", "section", "solid", "comparison", "calibration", "map", "sweep", "design", "force"],
+    ids=["contact", "section", "solid", "comparison", "calibration", "sweep", "design", "force"],
 )
 def test_a_picture_is_legible_on_a_page_and_its_parts_do_not_overlap(
     tmp_path: Path, figures: list[Any], draw: Callable[[Path], object]
@@ -366,25 +357,6 @@ def test_a_reading_that_never_tells_mu_is_drawn_as_well(tmp_path: Path, figures:
     ((_, middle, right),) = (figure.axes for figure in figures)
     assert [one.get_label() for one in middle.get_lines() if np.isfinite(one.get_ydata()).any()] == ["limit 0.1"]
     assert right.get_legend() is None
-
-
-def test_slopes_and_resolutions_of_a_strain_along_x(tmp_path: Path, figures: list[Any]) -> None:
-    """Strain along x is 1e-3 mu, none along y: a gauge along x resolves noise / 1e-3, one along y nothing."""
-    x, y = np.linspace(-50.0, 50.0, 11), np.linspace(0.0, 50.0, 6)
-    strain = np.zeros((len(MUS), len(y), len(x), 3))
-    strain[..., 0] = 1e-3 * MUS[:, None, None]
-    found = StrainMap(MUS, x, y, 0.0, strain)
-    draw_map(tmp_path / "a.png", found, Gauge("g36", 36.0, 40.0), CURVE)
-    slope, along, best = figures[0].axes[:3]
-    assert np.asarray(slope.collections[0].get_array()) == pytest.approx(np.full((6, 11), 1e-3), rel=1e-6)
-    for axes in (along, best):
-        shown = np.ma.filled(axes.collections[1].get_array(), np.nan)
-        assert shown == pytest.approx(np.full((6, 11), CURVE.noise[0] / 1e-3), rel=1e-3)
-        assert [*axes.get_lines()[-1].get_xydata()[0]] == [36.0, 40.0]
-    arrows = best.collections[-1]
-    assert np.abs(arrows.V) == pytest.approx(np.zeros(len(arrows.V)), abs=1e-2)
-    draw_map(tmp_path / "b.png", found, Gauge("across", 0.0, 25.0, angle=0.5 * np.pi), CURVE)
-    assert np.ma.getmaskarray(figures[1].axes[1].collections[1].get_array()).all()
 
 
 # --- compare.png -----------------------------------------------------------------------------------------------------

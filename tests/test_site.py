@@ -64,7 +64,7 @@ def test_the_page_of_the_other_commands_names_what_they_write(
     marker = '[[marker]]\nname = "m"\nx_mm = 1.0\ny_mm = 4.0\n'
     Path("scene.toml").write_text(HALF_CYLINDER + marker, encoding="utf-8")
     for command in (
-        "calibrate scene.toml --gauge g --map --out one",
+        "calibrate scene.toml --gauge g --out one",
         "calibrate scene.toml --gauge g,m.x --out two",
         "sweep scene.toml --vary friction.mu=0.1,0.2 --out sweep",
         "press scene.toml --out press --no-figures",
@@ -79,7 +79,6 @@ def test_the_page_of_the_other_commands_names_what_they_write(
     assert rows(page, "calibration.json") == {*json.loads(Path("one/calibration.json").read_text(encoding="utf-8"))}
     found = {re.sub(r"\bm\.x|(?<![^_])g(?![^_])", "NAME", name) for name in columns_of(Path("two/calibration.csv"))}
     assert {name.replace("m.x", "NAME") for name in found} == rows(page, "calibration.csv")
-    assert all(f"`{name}`" in page for name in columns_of(Path("one/map.csv")))
     of_a_step = columns_of(Path("press/history.csv"))
     assert columns_of(Path("sweep/results.csv")) - of_a_step == rows(page, "finger3d sweep") - of_a_step - {"KEY"} | {
         "friction.mu"

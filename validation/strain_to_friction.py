@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Float
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
@@ -28,7 +29,6 @@ from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.plotting.calibration import resolution_panel, slope_panel
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 from finger3d.sensor.maps import StrainMap
@@ -210,11 +210,50 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
     right.set(xlabel="mu", ylabel="standard deviation of mu", title="from a strain noise of 1.5e-4", ylim=(5e-4, 50.0))
     right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     for axes, domain in zip(panels[1], NAMES, strict=False):
-        slope_panel(figure, axes, maps[domain], TURN, 0.5)
+        _slope_panel(figure, axes, maps[domain], TURN, 0.5)
         axes.set_title(f"d strain / d mu, 30°, mu = .5, {NAMES[domain]}")
     best, _ = maps["solid"].best(0.0, 0.6)
-    resolution_panel(figure, panels[1, 2], maps["solid"], NOISE / np.maximum(best, 1e-12), LIMIT)
+    _resolution_panel(figure, panels[1, 2], maps["solid"], NOISE / np.maximum(best, 1e-12), LIMIT)
     panels[1, 2].set_title("worst resolution to mu = .6, best direction, 20 mm wide")
     for axes in panels[1]:
         axes.plot(36.0, 40.0, "ko", mfc="none", ms=8)
         axes.set(xlabel="x (mm)", ylabel="y (mm)")
+
+
+def _edges(at: Float) -> Float:
+    """Return the n + 1 edges of the squares around n equidistant positions."""
+    half = 0.5 * (at[1] - at[0])
+    return np.append(at - half, at[-1] + half)
+
+
+def _colour_bar(figure: Any, axes: Any, drawn: Any, label: str, extend: str) -> None:
+    figure.colorbar(drawn, ax=axes, label=label, extend=extend, location="bottom", shrink=0.8, aspect=35)
+
+
+def _slope_panel(figure: Any, axes: Any, found: StrainMap, angle: float, mu: float) -> None:
+    """Draw the slope of strain against mu, per unit of mu, along a direction `angle`, in rad, at one mu."""
+    value = found.slope_at(angle, mu)
+    most = float(np.nanquantile(np.abs(value), 0.99)) or 1.0
+    drawn = axes.pcolormesh(_edges(found.x), _edges(found.y), value, cmap="RdBu_r", vmin=-most, vmax=most)
+    axes.set_aspect("equal")
+    _colour_bar(figure, axes, drawn, "strain per unit of mu", "both")
+
+
+def _resolution_panel(figure: Any, axes: Any, found: StrainMap, value: Float, limit: float) -> None:
+    """Draw a resolution of mu, shape (ny, nx), on a logarithmic scale; grey beyond ten times the limit."""
+    from matplotlib.colors import LogNorm
+
+    norm = LogNorm(0.05 * limit, 10.0 * limit)
+    shown = np.ma.masked_invalid(value)
+    axes.pcolormesh(
+        _edges(found.x), _edges(found.y), np.where(np.isnan(value), np.nan, 1.0), cmap="Greys", vmin=0, vmax=4
+    )
+    drawn = axes.pcolormesh(
+        _edges(found.x),
+        _edges(found.y),
+        np.ma.masked_greater(shown, 10.0 * limit),
+        cmap="viridis_r",
+        norm=norm,
+    )
+    axes.set_aspect("equal")
+    _colour_bar(figure, axes, drawn, "standard deviation of mu", "min")

@@ -54,7 +54,6 @@ def calibrate(
             options.resolution,
             parsed_tolerances(options.tolerance),
             report=report,
-            maps=options.map,
             marker_noise_mm=options.marker_noise,
             taxel_noise_MPa=options.taxel_noise,
         )

@@ -13,6 +13,8 @@ COMMANDS = {
     "validate": "use python -m validation, from a checkout",
 }
 
+OF_CALIBRATE = {"--map": "finger3d optimise --gauges 1 maps how well a gauge at each place tells mu"}
+
 OF_SHOW = {"--gif": "the page of a press has a slider for its increments; finger3d show FOLDER opens it"}
 
 _INSERT = "draw it as a part of the design with [parts.LABEL] rigid = true: it is printed and inserted"
@@ -45,6 +47,6 @@ def gone(error: CycloptsError, arguments: Sequence[str]) -> str:
     command = next(iter(arguments), "")
     if command in COMMANDS:
         return f"{command} is gone: {COMMANDS[command]}"
-    options = {"export": OF_EXPORT, "show": OF_SHOW}.get(command, {})
+    options = {"calibrate": OF_CALIBRATE, "export": OF_EXPORT, "show": OF_SHOW}.get(command, {})
     option = (error.token.keyword or error.token.value).split("=")[0] if isinstance(error, UnknownOptionError) else ""
     return f"{option} is gone: {options[option]}" if option in options else ""

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.options import Flag, Noise
+from finger3d.cli.options import Noise
 from finger3d.cli.tolerances import Tolerances
 
 
@@ -29,8 +29,6 @@ class CalibrationOptions:
         Standard deviation of a reading of a taxel, MPa.
     resolution
         Largest standard deviation of mu at which the sensor is usable.
-    map
-        Also map the sensitivity of strain to mu over the section.
     """
 
     gauge: str
@@ -40,7 +38,6 @@ class CalibrationOptions:
     taxel_noise: float = 1e-3
     resolution: float = 0.1
     tolerance: Tolerances = None
-    map: Flag = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,10 +59,7 @@ def calibrate_page(folder: str | Path) -> Page:
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Use it", [Code(f"finger3d estimate {folder}/calibration.json {given}")]),
         ],
-        [
-            Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance"),
-            Figure("map.png", "Sensitivity of strain to friction over the section"),
-        ],
+        [Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance")],
         command="calibrate",
         outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
         good=not failed,

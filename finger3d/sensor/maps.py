@@ -9,33 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.locate import locate
 from finger3d.fem.mesh.simplex import Mesh, axis_numbers
 from finger3d.fem.recovery.recover import displacement
-from finger3d.io import write_csv
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.model import Model
 from finger3d.mechanics.results.history import StepResult
 
 PIXEL_MM = 1.0
 
 ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 """Gauge directions that are compared for the best one."""
-
-
-def check(model: Model) -> None:
-    """Raise an error for a body whose gauges do not read the small strain of a displacement field."""
-    if model.finite_strain:
-        name = dict(model.filled).get("hyperelastic_law", "finite strain")
-        raise Finger3dError(f"--map: not with effects.{name}; take the effect out, or the map")
 
 
 @dataclass(frozen=True)
@@ -114,7 +103,6 @@ class StrainMap:
         cls, problem: Problem, steps: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
     ) -> StrainMap:
         """Recover the field of every step with the factor at hand, and read it at every square of the plane z_mm."""
-        check(problem.model)
         design = problem.model.design
         half, top = design.half_length_mm, design.height_mm
         nx, ny = math.ceil(half / pixel_mm), math.ceil(top / pixel_mm)
@@ -158,21 +146,3 @@ class StrainMap:
         pick = np.nan_to_num(every, nan=-1.0).argmax(axis=0)
         value = np.take_along_axis(every, pick[None], axis=0)[0]
         return value, np.where(np.isnan(value), np.nan, ANGLES[pick])
-
-    def write(self, path: Path, angle: float, noise: float, mu: float = 0.5) -> None:
-        """Write a line for each square in the body: slope at one mu, worst over all mu, and the best direction's."""
-        inside = np.isfinite(self.strain[0, :, :, 0])
-        x, y = np.meshgrid(self.x, self.y)
-        best, direction = self.best()
-        columns = {
-            "x_mm": x,
-            "y_mm": y,
-            "strain_per_mu": self.slope_at(angle, mu),
-            "worst_strain_per_mu": self.worst_slope(angle),
-            "best_worst_strain_per_mu": best,
-            "best_angle_deg": np.degrees(direction),
-        }
-        table = {name: values[inside] for name, values in columns.items()}
-        with np.errstate(divide="ignore"):
-            table["best_worst_resolution"] = noise / table["best_worst_strain_per_mu"]
-        write_csv(path, table)

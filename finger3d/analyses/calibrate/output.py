@@ -13,7 +13,6 @@ from finger3d.analyses.reduced import ReducedModel
 from finger3d.io import write_csv, write_text
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.plotting.calibration import draw
 from finger3d.progress import Progress
 from finger3d.report.calibrate import calibrate_page
@@ -52,16 +51,6 @@ def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -
         system=replace(problem.system, reading_rows=rows),
     )
     ReducedModel.of(own).save(folder / "reduced.npz")
-
-
-def write_map(folder: Path, calibration: Calibration, curve: CurvePoints, gauge: Gauge) -> None:
-    """Map the sensitivity of strain to mu over the section to map.csv and map.png."""
-    from finger3d.plotting.calibration import draw_map
-    from finger3d.sensor.maps import StrainMap
-
-    found = StrainMap.of(curve.problem, curve.frames, z_mm=gauge.z_mm)
-    found.write(folder / "map.csv", gauge.angle, float(calibration.noise[0]))
-    draw_map(folder / "map.png", found, gauge, calibration)
 
 
 def write_curve(folder: Path, calibration: Calibration) -> None:

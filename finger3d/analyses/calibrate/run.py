@@ -16,12 +16,11 @@ from finger3d._machine import versions
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.increments import choose_increments
 from finger3d.analyses.calibrate.mesh_choice import choose_mesh
-from finger3d.analyses.calibrate.output import write_body, write_curve, write_map, write_points, write_scene
+from finger3d.analyses.calibrate.output import write_body, write_curve, write_points, write_scene
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.settings import MUS, CalibrationSettings, found_readings
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_tolerances, with_defaults
 from finger3d.analyses.pressed_body import PressedBody, presses, under
-from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
@@ -42,7 +41,7 @@ from finger3d.sensor.curve import (
 if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
 
-_FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "map.png", "map.csv", "report.html")
+_FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html")
 
 _SIZES = {"size_mm", "base_size_mm", "tolerance"}
 """Keys of [mesh] with which a scene chooses its own mesh."""
@@ -57,7 +56,6 @@ def calibrate(
     limit: float = RESOLUTION,
     tolerances: Mapping[str, float] | None = None,
     report: Progress | None = None,
-    maps: bool = False,
     marker_noise_mm: float = MARKER_NOISE_MM,
     taxel_noise_MPa: float = TAXEL_NOISE_MPA,
     overrides: Sequence[str] = (),
@@ -68,13 +66,12 @@ def calibrate(
     ----------
     scene : path of a TOML file, a dict with its tables, or a loaded scene; its own friction.mu does not matter
     gauge : name of a [[gauge]]; or names of several readings: gauges, ``m1.x`` of a [[marker]], and taxels
-    out : folder for calibration.json, .csv, .png, reduced.npz (and map.png, map.csv); None writes nothing
+    out : folder for calibration.json, .csv, .png, reduced.npz; None writes nothing
     mus : coefficients of friction, from 0 up
     noise, limit : standard deviation of a strain reading, and largest one of mu at which the sensor is usable
     tolerances : standard deviations by name, in place of the defaults of `TOLERANCES`; 0 omits one. The default of
         E_percent is the largest spread of a modulus, if the scene gives hardnesses or silicones
     report : receives the progress
-    maps : also map the sensitivity of strain to mu over the section
     marker_noise_mm, taxel_noise_MPa : standard deviation of a reading of a marker, and of a taxel
     overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
 
@@ -95,13 +92,7 @@ def calibrate(
     noises: dict[Kind, float] = {"gauge": noise, "marker": marker_noise_mm, "taxel": taxel_noise_MPa}
     readings = found_readings(model, [gauge] if isinstance(gauge, str) else gauge, noises)
     tolerances = with_defaults(tolerances, largest_spread(scene.tables))
-    settings = CalibrationSettings(readings, tuple(mus), limit, tolerances, maps)
-    if maps:
-        from finger3d.sensor.maps import check
-
-        if not settings.only_gauge:
-            raise Finger3dError("--map: maps the strain of one gauge; give a single --gauge")
-        check(model)
+    settings = CalibrationSettings(readings, tuple(mus), limit, tolerances)
     with nullcontext() if out is None else claimed(out, "calibrate") as folder:
         return _calibrate_scene(scene, model, settings, folder, report)
 
@@ -134,9 +125,6 @@ def _calibrate_scene(
     if folder:
         report.stage("writing")
         write_body(folder, model, curve.problem, report)
-        if settings.maps:
-            gauge = next(g for g in model.gauges if g.name == settings.only_gauge)
-            write_map(folder, calibration, curve, gauge)
         write_curve(folder, calibration)
     return calibration
 

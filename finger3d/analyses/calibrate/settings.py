@@ -43,14 +43,12 @@ class CalibrationSettings:
     mus : coefficients of friction, ascending
     limit : largest standard deviation of mu at which the sensor is usable
     tolerances : standard deviation of every uncertain quantity, all above zero
-    maps : whether the sensitivity of strain to mu is mapped over the section
     """
 
     readings: tuple[CalibratedReading, ...]
     mus: tuple[float, ...]
     limit: float
     tolerances: Mapping[str, float]
-    maps: bool = False
 
     def __post_init__(self) -> None:
         """Check the numbers; mu is sorted, and equal values count once."""
@@ -78,11 +76,6 @@ class CalibrationSettings:
     def noise(self) -> Float:
         """Standard deviation (k, 1) of the noise of every reading, in its unit."""
         return np.array([[r.noise] for r in self.readings])
-
-    @property
-    def only_gauge(self) -> str:
-        """Name of the gauge if a gauge is all that is read, else empty."""
-        return self.readings[0].name if len(self.readings) == 1 and self.readings[0].kind == "gauge" else ""
 
 
 def found_readings(model: Model, names: Sequence[str], noises: Mapping[Kind, float]) -> tuple[CalibratedReading, ...]:
