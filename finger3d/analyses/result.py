@@ -258,12 +258,12 @@ class PressResult:
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
         from finger3d.report.build import number
-        from finger3d.report.press import headline
+        from finger3d.report.press_rows import headline
 
         good, bars = self._good(), ErrorBars.of_summary(self._numbers)
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(good[-1], bars.totals(), bars.modulus) if good else ())
+            for row in (headline(good[-1], bars) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])
 

@@ -51,7 +51,7 @@ class HeadlineRow:
     @property
     def text(self) -> str:
         """Value, error and unit, as a terminal shows them."""
-        return f"{number(self.value, self.error)} {self.unit}".rstrip().replace("±", "+-")
+        return f"{number(self.value, self.error)} {self.unit}".rstrip().replace("±", "+-").replace("²", "2")
 
 
 @dataclass(frozen=True)

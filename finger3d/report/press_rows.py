@@ -1,25 +1,56 @@
-"""The closing table of a press: its outcome, and the numbers of its last increment with their errors."""
+"""Numbers of an increment with their errors: the headline of the page of a press, and what the terminal prints."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import groupby
 from pathlib import Path
 
 from finger3d._types import TreeView
 from finger3d.accuracy.changes import two_digits
-from finger3d.accuracy.error_bars import ErrorBars, with_error
+from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.readings.columns import AREAS, MAIN, SLIP
-from finger3d.mechanics.readings.quantities import Quantity, named
+from finger3d.mechanics.readings.quantities import Kind, Quantity, named
 from finger3d.progress import Progress
-from finger3d.results.summary import ROUND_OFF, grip_rows, read_json, readings_of
+from finger3d.report.build import HeadlineRow
+from finger3d.results.summary import ROUND_OFF, PressStep, grip_rows, read_json, readings_of
+
+_HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, *SLIP, "external_work_mJ", "dissipation_mJ")
 
 _SIDEWAYS = (
     "tangential_force_x_N", "tangential_force_z_N", "slide_x_mm", "slide_z_mm",
     "turn_x_deg", "turn_y_deg", "turn_z_deg",
 )  # fmt: skip
 """Numbers of a path that leaves the press axis; they are printed where they are not 0."""
+
+
+def row_of(one: Quantity, value: float | None, bars: ErrorBars) -> HeadlineRow:
+    """Return a number with its errors of mesh and increments, and of the modulus if that is not given."""
+    error, spread = bars.total(one.name), bars.modulus.get(one.name)
+    unit = spelt(one.unit)
+    if spread is not None:
+        unit = f"{unit}, ± {one.factor * spread:.2g} {unit}".rstrip().removeprefix(", ") + " by the modulus"
+    shown = "unknown" if value is None else one.factor * value
+    return HeadlineRow(f"{one.title} {one.where}".rstrip(), shown, unit, None if error is None else one.factor * error)
+
+
+def headline(step: PressStep, bars: ErrorBars) -> list[HeadlineRow]:
+    """Return the main numbers of a step with their errors, without a tangential force of the size of round-off."""
+    numbers = {one: getattr(step, one.name) for one in (*named("depth_mm"), *_HEADLINE)}
+    least = ROUND_OFF * max(step.friction_sum_N, 1e-300)
+    rows = [
+        row_of(one, value, bars)
+        for one, value in numbers.items()
+        if (one.kind is not Kind.DEPTH or bars.total(one.name) is not None)
+        and (one.kind is not Kind.FORCE or abs(value) > least)
+    ]
+    read = step.readings.items()  # a displacement that is zero by symmetry is left out
+    return rows + [row_of(Quantity.of(c), value, bars) for c, value in read if value != 0.0 or c.kind != "marker"]
+
+
+def spelt(text: str) -> str:
+    """Return a text with units as they are printed."""
+    return text.replace("mm2", "mm²").replace("Nmm", "N mm")
 
 
 def increments_kept(folder: Path, report: Progress) -> str:
@@ -50,36 +81,18 @@ def press_rows(summary: TreeView) -> Iterator[tuple[str, str]]:
 
 
 def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tuple[str, str]]:
-    """Yield the quantities of a step by their titles, with their errors and what effects that are off would change."""
-
-    def number(one: Quantity, value: float) -> str:
-        error = bars.total(one.name)
-        return with_error(one.factor * value, None if error is None else one.factor * error, sign="+-")
-
-    def line(one: Quantity, value: float) -> str:
-        text, by_modulus = f"{number(one, value)} {one.unit}".rstrip(), bars.modulus.get(one.name)
-        if by_modulus is not None:
-            text += f", +- {one.factor * by_modulus:.2g} {one.unit}".rstrip() + " by the modulus"
-        return f"{text} {one.where}".rstrip() + _of_model(summary, one, bars)
-
+    """Yield the numbers of a step with their errors and what effects that are off would change."""
     (depth,) = named("depth_mm")
-    yield depth.title, f"{line(depth, last[depth.name])}, increment {summary['steps'].index(last) + 1}"
-    for one in named(*MAIN, *AREAS, *SLIP):
-        yield one.title, line(one, last[one.name])
+    yield depth.title, f"{row_of(depth, last[depth.name], bars).text}, increment {summary['steps'].index(last) + 1}"
+    numbers = {one: last[one.name] for one in named(*MAIN, *AREAS, *SLIP)}
     for one in named(*_SIDEWAYS):
         if abs(last[one.name]) > ROUND_OFF * (last["friction_sum_N"] if one.unit == "N" else 1.0):
-            yield one.title, line(one, last[one.name])
-    read = {c: v for c, v in readings_of(last["gauges"], last["markers"], last["taxels"]).items() if v is not None}
-    for (kind, sensor), group in groupby(read, key=lambda c: (c.kind, c.sensor)):
-        name, columns = f"{'strain' if kind == 'gauge' else kind} {sensor}", list(group)
-        several = [Quantity.of(column) for column in columns]
-        if len(several) == 1:
-            yield name, line(several[0], read[columns[0]])
-            continue
-        yield name, ", ".join(number(Quantity.of(c), read[c]) for c in columns) + f" {several[0].unit}"
-        by_modulus = [bars.modulus.get(one.name, 0.0) for one in several]
-        if any(by_modulus):
-            yield "", ", ".join(f"+- {error:.2g}" for error in by_modulus) + f" {several[0].unit} by the modulus"
+            numbers[one] = last[one.name]
+    read = readings_of(last["gauges"], last["markers"], last["taxels"])
+    numbers |= {Quantity.of(column): value for column, value in read.items() if value is not None}
+    for one, value in numbers.items():
+        row = row_of(one, value, bars)
+        yield row.name, row.text + _of_model(summary, one, bars)
 
 
 def _of_model(summary: TreeView, one: Quantity, bars: ErrorBars) -> str:
