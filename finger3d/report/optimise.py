@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
@@ -39,8 +38,10 @@ def optimise_page(folder: str | Path) -> Page:
         *(HeadlineRow(key, value) for key, value in found["values"].items()),
         HeadlineRow("designs evaluated", str(len(rows))),
         HeadlineRow("bodies condensed", str(found["bodies"])),
-        *_increment_error(increments.get("steps"), increments.get("strain_error")),
     ]
+    if steps := increments.get("steps"):
+        name = f"error of the strain with {', '.join(map(str, steps))} increments"
+        headline.append(HeadlineRow(name, f"{increments.get('strain_error') or math.nan:.2g}"))
     free = [
         (key, *bounds[key], found["start_values"][key], value, _at_a_bound(value, *bounds[key]))
         for key, value in found["values"].items()
@@ -70,14 +71,6 @@ def optimise_page(folder: str | Path) -> Page:
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )
-
-
-def _increment_error(steps: Sequence[int] | None, error: float | None) -> list[HeadlineRow]:
-    """Return the error of strain for the increments of the best design, if it is known."""
-    if steps is None:
-        return []
-    name = f"error of the strain with {', '.join(map(str, steps))} increments"
-    return [HeadlineRow(name, f"{error or math.nan:.2g}")]
 
 
 def _at_a_bound(value: float, low: float, high: float) -> str:
