@@ -26,6 +26,7 @@ from finger3d.scene.tables import (
     FrictionTable,
     GaugeTable,
     GripTable,
+    LabelsTable,
     LegTable,
     MarkerGridTable,
     MarkerTable,
@@ -101,6 +102,7 @@ def _tables() -> Iterator[tuple[str, list[_Row]]]:
     yield "[[marker]]", _rows_of(MarkerTable)
     yield "[marker_grid]", _rows_of(MarkerGridTable)
     yield "[[taxel]]", _rows_of(TaxelTable)
+    yield "[labels]", _rows_of(LabelsTable)
     yield "[effects]", _rows_of(AutoTable)
     for name in effect_names():
         effect = effect_type(name)

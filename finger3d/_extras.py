@@ -29,6 +29,7 @@ EXTRAS = {
     "dask": "cluster",
     "netgen": "netgen",
     "dash": "app",
+    "h5py": "labels",
     "pandas": "table",
     "pyarrow": "table",
 }

@@ -24,7 +24,7 @@ from finger3d._notebook import card
 from finger3d.cli import main
 from tests.scenes import HALF_CYLINDER, SECTION
 
-TUTORIALS = ("section", "objects", "gel_pad", "friction", "pinch", "mold", "accuracy")
+TUTORIALS = ("section", "objects", "gel_pad", "friction", "pinch", "labels", "mold", "accuracy")
 
 
 def rows(page: str, heading: str) -> set[str]:

@@ -1,17 +1,22 @@
-"""Stick ratios and slip margins, against Coulomb's law for a flat contact and Mindlin's for a ball."""
+"""Stick ratios, slip margins and slip events, against Coulomb's law for a flat contact and Mindlin's for a ball."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from finger3d.contact.friction import SLIP, STICK, Coulomb
+from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
+from finger3d.mechanics.readings.reading import Taxel
 from finger3d.mechanics.results.history import contact_table, measure
+from finger3d.mechanics.results.slip_events import slip_events
 from finger3d.objects import Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held
 from tests.models import block
@@ -59,3 +64,44 @@ def test_the_stick_ratio_of_a_line_contact_follows_its_margin() -> None:
     found = measure(problem.points, last)
     assert 0.2 < found["slip_margin"] < 0.8
     assert found["stick_ratio_area"] == pytest.approx(found["slip_margin"] ** 0.5, abs=1.0 / 20.0)
+
+
+def _events(problem: Problem) -> dict[str, Any]:
+    steps = list(march(problem))
+    margin = [measure(problem.points, step)["slip_margin"] for step in steps]
+    return slip_events(problem.points, steps, margin, problem.model.readings)
+
+
+def _slid_ball(steps: int) -> dict[str, Any]:
+    legs = (Leg(0.2, steps=4), Leg(0.2, steps=steps, slide_x_mm=0.4))
+    taxel = Taxel("t1", 0.0, 0.0, 1.0, 1.0)
+    return _events(build(block(object=Sphere(radius_mm=4.0), legs=legs, friction=Coulomb(MU), taxels=(taxel,))))
+
+
+def test_a_ball_that_slides_slips_at_its_rim_then_in_the_middle_then_as_a_whole() -> None:
+    coarse, fine = _slid_ball(8), _slid_ball(32)
+    for found in (coarse, fine):
+        rim, middle = found["first_slip"]["whole"], found["first_slip"]["taxel_t1"]
+        assert rim["slide_x_mm"] < middle["slide_x_mm"] <= found["gross_slip"]["slide_x_mm"]
+        assert abs(middle["x_mm"]) <= 0.5
+        assert found["slip_margins"] == {"whole": 0.0, "taxel_t1": 0.0, "contact": 0.0}
+    increment = 0.4 / 8
+    assert coarse["gross_slip"]["slide_x_mm"] == pytest.approx(fine["gross_slip"]["slide_x_mm"], abs=0.5 * increment)
+    middles = [found["first_slip"]["taxel_t1"]["slide_x_mm"] for found in (coarse, fine)]
+    assert middles[0] == pytest.approx(middles[1], abs=0.5 * increment)
+
+
+def test_under_a_force_beyond_the_limit_gross_slip_is_the_last_pose_that_held() -> None:
+    problem = build(block(object=Plane(), legs=(PRESS, held(1.5 * MU * N, 0.0, steps=3))))
+    *held_steps, failed = march(problem)
+    assert failed.outcome is Outcome.SLIPS
+    found = _events(problem)
+    assert found["gross_slip"]["step"] == len(held_steps) + 1
+    assert found["gross_slip"]["slide_x_mm"] == held_steps[-1].target.slide_x_mm > 0.0
+
+
+def test_nothing_slips_without_friction_or_without_a_motion_along_the_surface() -> None:
+    slide = (Leg(0.1, steps=2), Leg(0.1, steps=2, slide_x_mm=0.2))
+    smooth = _events(build(block(object=Plane(), legs=slide, friction=Coulomb(0.0))))
+    assert (set(smooth["first_slip"].values()), smooth["gross_slip"]) == ({None}, None)
+    assert _events(build(block(object=Plane(), legs=slide[:1], friction=Coulomb(MU_LOW))))["gross_slip"] is None

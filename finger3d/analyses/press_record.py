@@ -19,6 +19,7 @@ from finger3d.mechanics.discretise.size_advice import size_advice
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.grip import FINGERS, Grip
 from finger3d.mechanics.results.history import History, StepResult, measure
+from finger3d.mechanics.results.slip_events import slip_events
 from finger3d.mechanics.results.slip_limit import slip_limit
 from finger3d.objects import ObjectPose
 
@@ -155,13 +156,21 @@ class PressRecord:
         failed = next((step for step in self.steps if not step.outcome.ok), None)
         return str(self.history.outcome) if failed is None else failed.failure
 
+    def _slip(self, problem: Problem, steps: Sequence[StepResult]) -> Tree:
+        """Return what the contact holds before it slips as a whole, what is left of it, and where and when it slips."""
+        good = [step for step in steps if step.outcome.ok]
+        limit = slip_limit(problem.points, good[-1].state, problem.model.friction) if good else None
+        margin = [self.entry(step)["slip_margin"] for step in steps]
+        events = slip_events(problem.points, steps, margin, problem.model.readings)
+        return {"slip_limit": limit.as_dict() if limit else None, **events}
+
     def _grip_summary(self, outcome: str) -> Tree:
         """Return what two fingers have besides: the increments of each, the object's pose, and whether it is held."""
         if self.grip is None:
             return {}
         held = [step for step in self.converged_steps if step.pose and step.other]
         fingers = [
-            {"finger": name, "slip_limit": _slip_limit(own, steps), "steps": [self.entry(step) for step in steps]}
+            {"finger": name, **self._slip(own, steps), "steps": [self.entry(step) for step in steps]}
             for name, (own, steps) in zip(FINGERS, self.fingers(), strict=True)
             if steps
         ]
@@ -182,7 +191,7 @@ class PressRecord:
             "warnings": self.warnings,
             "advice": self.advice,
             "steps": [self.entry(step) for step in self.steps],
-            "slip_limit": _slip_limit(self.problem, self.converged_steps),
+            **self._slip(self.problem, self.steps),
             **self._grip_summary(outcome),
             "step_estimate": self.step_estimate.as_dict() if self.step_estimate else None,
             "error_estimate": self.error_estimate.as_dict() if self.error_estimate else None,
@@ -195,12 +204,6 @@ class PressRecord:
             "cost": _cost(self),
             "versions": versions(),
         }
-
-
-def _slip_limit(problem: Problem, steps: Sequence[StepResult]) -> Tree | None:
-    """Return what the contact after the last of converged increments holds before it slips as a whole."""
-    limit = slip_limit(problem.points, steps[-1].state, problem.model.friction) if steps else None
-    return limit.as_dict() if limit else None
 
 
 def _object_pose(pose: ObjectPose) -> Tree:

@@ -20,7 +20,8 @@ from typing import TypeVar
 from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
-from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.build import build, changed
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.formulation import Workspace
@@ -33,6 +34,7 @@ from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.postprocess.penetration import SurfaceCheck, check_surface
 from finger3d.mechanics.results.history import StepResult
+from finger3d.objects.rigid import RigidObject
 from finger3d.progress import QUIET, Progress
 
 Result = TypeVar("Result")
@@ -77,8 +79,9 @@ def under(
     friction: FrictionLaw | None = None,
     legs: tuple[Leg, ...] | None = None,
     rule: RuleName | None = None,
+    obj: RigidObject | None = None,
 ) -> Problem:
-    """Return a condensed body under another friction law, path or contact rule; None leaves each as it is.
+    """Return a condensed body under another friction law, path, rule or rigid object; None leaves each as it is.
 
     Raises
     ------
@@ -87,10 +90,13 @@ def under(
     """
     own = problem.model
     model = replace(own, friction=friction or own.friction, legs=legs or own.legs, rule=rule or own.rule)
-    if _poses(model.legs) != _poses(own.legs):
-        system = problem.system
-        check(model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
-    return replace(problem, model=model)
+    model = replace(model, object=obj or own.object)
+    other = model.object != own.object
+    found = changed(problem, model) if other else replace(problem, model=model)
+    if other or _poses(model.legs) != _poses(own.legs):
+        system = found.system
+        check(found.model, system.surface, system.first_contact_mm, system.place_mm, problem.axes)
+    return found
 
 
 def _poses(legs: tuple[Leg, ...]) -> list[Leg]:
@@ -166,6 +172,7 @@ class PressedBody:
     model : what is meshed and condensed
     report : receives the messages about meshing and condensation
     problem : the condensed body of the model, if there is one already
+    anywhere : whether objects may touch anywhere on the contact face, see `build`
 
     Attributes
     ----------
@@ -173,8 +180,10 @@ class PressedBody:
     seconds : time of meshing and condensation
     """
 
-    def __init__(self, model: Model, report: Progress = QUIET, problem: Problem | None = None) -> None:
-        self._report, self.seconds = report, 0.0
+    def __init__(
+        self, model: Model, report: Progress = QUIET, problem: Problem | None = None, anywhere: bool = False
+    ) -> None:
+        self._report, self.seconds, self._anywhere = report, 0.0, anywhere
         self.problem = problem or self._built(model)
 
     @classmethod
@@ -254,9 +263,9 @@ class PressedBody:
         self._report.say("contact reached beyond the candidate points; once more with all points of the free faces")
         self.problem = self._built(self.problem.model, math.inf)
 
-    def _built(self, model: Model, *margin: float) -> Problem:
+    def _built(self, model: Model, margin: float = MARGIN) -> Problem:
         start = time.perf_counter()
-        problem = build(model, self._report, *margin)
+        problem = build(model, self._report, margin, self._anywhere)
         self.seconds += time.perf_counter() - start
         return problem
 

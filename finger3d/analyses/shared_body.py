@@ -7,12 +7,13 @@ of a family is meshed for the union of all paths, so that its mesh is graded for
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import dropwhile
 from threading import Event
+from typing import TYPE_CHECKING, cast
 
 from finger3d._machine import made_with
 from finger3d.analyses.pressed_body import PressedBody, under
@@ -20,6 +21,7 @@ from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.step_halving import march_automatic
@@ -30,9 +32,14 @@ from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.objects.rigid import RigidObject
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene
 from finger3d.scene.files import contents
+from finger3d.scene.tables import LabelsTable
+
+if TYPE_CHECKING:
+    from finger3d.mechanics.postprocess.labels import LabelGrid, Sample
 
 _FREE = ("title", "friction", "press", "contact", "gauge")
 """Tables of the scene that do not change the compliance."""
@@ -48,11 +55,12 @@ class Variant:
     legs: tuple[Leg, ...]
     rule: RuleName
     gauges: tuple[Gauge, ...]
+    object: RigidObject
 
     @classmethod
     def of(cls, model: Model) -> Variant:
         """Return the variant of a model."""
-        return cls(model.friction, model.legs, model.rule, model.gauges)
+        return cls(model.friction, model.legs, model.rule, model.gauges, model.object)
 
     def without_gauges(self) -> Variant:
         """Return the variant without gauges; variants with an equal one share a press."""
@@ -70,6 +78,7 @@ class VariantResult:
     numbers : quantities of the last step by their names in summary.json, without readings; empty unless converged
     readings : of the last step, those of a grid of markers included; empty unless converged
     seconds : time of this press; 0 if it is that of another variant, with other gauges
+    sample : labels for learning, if the scene asks for them
     """
 
     outcome: str
@@ -77,19 +86,26 @@ class VariantResult:
     numbers: dict[str, float]
     readings: dict[Column, float]
     seconds: float
+    sample: Sample | None = None
 
 
 def body_key(scene: Scene) -> str:
     """Return a hash of everything that changes the condensed body; scenes of one family have the same."""
     tree = scene.as_dict()
     effects = {k: v for k, v in tree["effects"].items() if k in scene.effects and scene.effects[k].slot != "friction"}
-    kept = {k: v for k, v in tree.items() if k not in _FREE} | {"effects": effects}
+    free = (*_FREE, "object") if may_touch_anywhere(scene) else _FREE
+    kept = {k: v for k, v in tree.items() if k not in free} | {"effects": effects}
     if "embedded_gauge" in effects:
         kept["gauge"] = tree["gauge"]
     given = scene.given.get("mesh", {})
     # Default sizes depend on the depth; a family takes the smallest.
     kept["mesh"] = {k: v for k, v in tree["mesh"].items() if k not in _SIZES or k in given}
     return checksum({**kept, "files": contents(tree), "made_with": made_with()})
+
+
+def may_touch_anywhere(scene: Scene) -> bool:
+    """Whether all rigid objects of a family share a body, whose contact face may be touched anywhere: with labels."""
+    return scene.tables.labels is not None and "elastic_object" not in scene.effects
 
 
 def finest(models: Sequence[Model]) -> MeshOptions:
@@ -107,6 +123,7 @@ class SharedBody(PressedBody):
     variants : all variants that will be pressed
     report : receives the messages
     grid : markers of a grid, whose displacements are among the numbers
+    labels : what is asked for of every sample; the variants may then have different rigid objects
 
     Attributes
     ----------
@@ -120,6 +137,7 @@ class SharedBody(PressedBody):
         variants: Sequence[Variant],
         report: Progress = QUIET,
         grid: Sequence[Marker] = (),
+        labels: LabelsTable | None = None,
     ) -> None:
         gauges = model.gauges
         if model.inclusions is None:
@@ -128,7 +146,12 @@ class SharedBody(PressedBody):
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
         self._gauges_are_inclusions, self._grid = model.inclusions is not None, grid
-        super().__init__(replace(model, legs=shared_legs(variants), gauges=gauges), report)
+        model = replace(model, gauges=gauges)
+        if labels is None:
+            super().__init__(replace(model, legs=shared_legs(variants)), report)
+        else:
+            super().__init__(replace(model, symmetry=()), report, anywhere=model.object_compliance is None)
+        self._labels, self._made = labels, cast("LabelGrid | None", None)
         self._results: dict[Variant, VariantResult | Exception] = {}
 
     def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[VariantResult | Exception]:
@@ -142,7 +165,8 @@ class SharedBody(PressedBody):
         most : int, optional
             Largest number of presses at once.
         """
-        new = [v for v in dict.fromkeys(v.without_gauges() for v in variants) if v not in self._results]
+        counts = Counter(v.without_gauges() for v in variants)
+        new = [v for v in counts if v not in self._results]
         runs, unpaid = self._runs(new, most), set(new)
         for variant in variants:
             press = variant.without_gauges()
@@ -155,6 +179,9 @@ class SharedBody(PressedBody):
                 readings = self.readings_of(variant, result.readings) if result.readings else {}
                 result = replace(result, readings=readings, seconds=seconds)
             unpaid.discard(press)
+            counts[press] -= 1
+            if self._labels and not counts[press]:
+                del self._results[press]  # whose sample has many numbers
             yield result
 
     def readings_of(self, variant: Variant, readings: dict[Column, float]) -> dict[Column, float]:
@@ -175,7 +202,7 @@ class SharedBody(PressedBody):
                 for steps, seconds in runs:
                     result: VariantResult | Exception | None
                     try:
-                        if (result := self._result(steps, seconds)) is None:
+                        if (result := self._result(left[0], steps, seconds)) is None:
                             self.widen()
                             break  # and press the variants that are left on the new body
                     except FAILURES as error:
@@ -189,14 +216,17 @@ class SharedBody(PressedBody):
         start = time.perf_counter()
         steps: tuple[StepResult, ...] | Exception
         try:
-            steps = march_automatic(
-                under(self.problem, variant.friction, variant.legs, variant.rule), workspace, cancel
-            )[0]
+            steps = march_automatic(self._under(variant), workspace, cancel)[0]
         except FAILURES as error:
             steps = error.with_traceback(None)
         return steps, time.perf_counter() - start
 
-    def _result(self, steps: tuple[StepResult, ...] | Exception, seconds: float) -> VariantResult | None:
+    def _under(self, variant: Variant) -> Problem:
+        return under(self.problem, variant.friction, variant.legs, variant.rule, variant.object)
+
+    def _result(
+        self, variant: Variant, steps: tuple[StepResult, ...] | Exception, seconds: float
+    ) -> VariantResult | None:
         """Return the quantities of the last step; None if contact reached beyond the candidate points.
 
         The check of the surface counts as part of the press.
@@ -208,7 +238,8 @@ class SharedBody(PressedBody):
             if not step.outcome.ok:
                 at = f"increment {number} (depth {step.target.depth_mm:.4g} mm)"
                 return VariantResult(f"{at}: {step.outcome}", residual, {}, {}, seconds)
-        (check,) = check_surface(self.problem, steps[-1:])
+        problem = self._under(variant)
+        (check,) = check_surface(problem, steps[-1:])
         if not check.within_candidates:
             return None
         seconds += time.perf_counter() - start
@@ -219,7 +250,18 @@ class SharedBody(PressedBody):
         readings = last.readings
         if self._grid:
             readings = readings | MarkerGrid.at(self.problem, self._grid).readings(self.problem, last)
-        return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), seconds)
+        sample = grid.sample(problem, steps) if (grid := self._label_grid()) else None
+        return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), seconds, sample)
+
+    def _label_grid(self) -> LabelGrid | None:
+        """Return the grid of the labels on the present body, if the scene asks for any."""
+        if self._labels is None:
+            return None
+        from finger3d.mechanics.postprocess.labels import LabelGrid  # other sweeps need none of it
+
+        if self._made is None or self._made.problem is not self.problem:
+            self._made = LabelGrid(self.problem, self._labels.grid_mm, self._labels.increments == "last")
+        return self._made
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

@@ -16,7 +16,7 @@ from finger3d.errors import MissingError
 from finger3d.progress import Progress
 
 _MOST_POINTS = 10  # in the printed table
-_FILES = "results.csv", "results.parquet", "report.html"
+_FILES = "results.csv", "results.parquet", "labels.h5", "report.html"
 
 
 @app.command

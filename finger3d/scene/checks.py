@@ -57,7 +57,9 @@ def check(tables: SceneTable, legs: tuple[LegTable, ...], design: Design) -> lis
     for i, marker in enumerate(tables.marker):
         lines += _place(("marker", i), marker, np.zeros(1), 0.0, design)
     if tables.marker_grid:
-        lines += _marker_grid(tables.marker_grid.spacing_mm, design, solid)
+        lines += _grid("marker_grid.spacing_mm", tables.marker_grid.spacing_mm, design, solid)
+    if tables.labels:
+        lines += _grid("labels.grid_mm", tables.labels.grid_mm, design, solid)
     for i, taxel in enumerate(tables.taxel):
         lines += _taxel(i, taxel, design, solid)
     return lines
@@ -298,14 +300,14 @@ def _place(place: Place, it: GaugeTable | MarkerTable, along: Float, angle: floa
     ]
 
 
-def _marker_grid(spacing_mm: float, design: Design, solid: bool) -> list[str]:
-    """Check that a grid has not too many markers for a file, and more than one."""
+def _grid(key: str, spacing_mm: float, design: Design, solid: bool) -> list[str]:
+    """Check that a grid on the contact face has not too many places for a file, and more than one."""
     sides = (2.0 * design.half_length_mm, design.width_mm) if solid else (2.0 * design.half_length_mm,)
     least = (math.prod(sides) / _MOST_MARKERS) ** (1.0 / len(sides))
     if least <= spacing_mm <= max(sides):
         return []
     allowed = f"must be a number from {at_least(least)} to {at_most(max(sides))}"
-    return [f"marker_grid.spacing_mm = {shown(spacing_mm)}: {allowed}"]
+    return [f"{key} = {shown(spacing_mm)}: {allowed}"]
 
 
 def _taxel(index: int, taxel: TaxelTable, design: Design, solid: bool) -> list[str]:

@@ -274,6 +274,19 @@ class MarkerGridTable(TomlTable):
     spacing_mm: Length
 
 
+class LabelsTable(TomlTable):
+    """[labels]: a sweep writes fields on a regular grid of the contact face into labels.h5.
+
+    Attributes
+    ----------
+    grid_mm : spacing of the grid along x and z
+    increments : "last" or "all": after which increments
+    """
+
+    grid_mm: Length
+    increments: Literal["last", "all"] = "last"
+
+
 class TaxelTable(TomlTable):
     """[[taxel]]: the mean pressure on a rectangle of the base; any number of them.
 
@@ -309,6 +322,7 @@ class SceneTable(TomlTable):
     marker : material points whose displacement is read
     marker_grid : markers all over the contact face
     taxel : pressure cells on the base
+    labels : fields for learning, which a sweep writes
     """
 
     title: Title | None = None
@@ -326,6 +340,7 @@ class SceneTable(TomlTable):
     marker: tuple[MarkerTable, ...] = ()
     marker_grid: MarkerGridTable | None = None
     taxel: tuple[TaxelTable, ...] = ()
+    labels: LabelsTable | None = None
     effects: Tree = {}
 
 

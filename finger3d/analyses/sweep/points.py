@@ -24,7 +24,7 @@ from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies
 from finger3d.scene.messages import shown
-from finger3d.scene.tables import SceneTable
+from finger3d.scene.tables import LabelsTable, SceneTable
 
 MOST = 100_000
 """Points of one sweep; every one is checked before the first is pressed, which takes some 5 to 20 ms."""
@@ -114,6 +114,7 @@ class BodySpec:
     mesh : with the smallest sizes of the points
     given : the scene of one of the points
     grid : markers of its grid
+    labels : what is asked for of every sample
     """
 
     key: str
@@ -121,6 +122,7 @@ class BodySpec:
     mesh: MeshOptions
     given: TreeView = field(compare=False, repr=False)
     grid: tuple[Marker, ...] = field(compare=False, repr=False)
+    labels: LabelsTable | None = None
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,7 @@ def checked_points(
             mesh=finest([scene.model() for scene, _ in of]),
             given=of[0][0].given,
             grid=grids[key],
+            labels=of[0][0].tables.labels,
         )
         for key, of in members.items()
     }

@@ -149,6 +149,8 @@ def press_points(
     """
     report = report or Progress()
     folder = Path(out)
+    if any(body.labels for body in points.bodies.values()):
+        require("[labels]", "h5py")
     with ResultStore(points, folder).open() as store:
         progress = SweepProgress(store, report)
         try:

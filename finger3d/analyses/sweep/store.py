@@ -9,12 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from finger3d import _extras
 from finger3d._types import Tree
+from finger3d.analyses.sweep.labels import FILE, PARTS, SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
+from finger3d.mechanics.postprocess.labels import Sample
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal, Row, journal_rows, number_in, opened
 from finger3d.results.summary import PressStep
@@ -69,6 +72,10 @@ class ResultStore:
         MissingError
             If it cannot be written.
         """
+        if SAMPLE in row:
+            with self.room(PARTS):
+                store_part(self.folder, _number_of(row), cast(Sample, row[SAMPLE]))
+            row = {name: value for name, value in row.items() if name != SAMPLE}
         with self.room(JOURNAL):
             self._journal.append(row)
         self.rows[_number_of(row)] = row
@@ -104,6 +111,8 @@ class ResultStore:
             with self.room(GRID):
                 names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
                 write_csv(self.folder / GRID, {**names, **places})
+        with self.room(FILE):
+            write_labels(self.folder, self.sweep, self.rows, columns)
         if _extras.available("pyarrow"):
             import pyarrow as pa
             import pyarrow.parquet as pq

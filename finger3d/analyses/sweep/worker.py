@@ -8,6 +8,7 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from finger3d.analyses.shared_body import SharedBody, VariantResult, body_key
+from finger3d.analyses.sweep.labels import SAMPLE
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.readings.columns import by_key
@@ -50,7 +51,7 @@ def batch(spec: BodySpec, points: Sequence[Point], size: int) -> list[Row]:
 
 def _build(spec: BodySpec) -> SharedBody:
     model = replace(parse(spec.given).model(), mesh=spec.mesh)
-    return SharedBody(model, spec.variants, grid=spec.grid)
+    return SharedBody(model, spec.variants, grid=spec.grid, labels=spec.labels)
 
 
 def _pressed(body: SharedBody, points: Sequence[Point], threads: int | None) -> Iterator[Row]:
@@ -69,6 +70,7 @@ def _columns(body: SharedBody, result: VariantResult | Exception) -> Row:
         "residual": result.residual,
         "seconds": result.seconds,
         "build_seconds": body.seconds,
+        **({SAMPLE: result.sample} if result.sample else {}),
     }
 
 

@@ -69,13 +69,15 @@ _MANY_READINGS = 100
 """Gauges whose placing is announced: each takes some milliseconds."""
 
 
-def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Problem:
+def build(model: Model, report: Progress = QUIET, margin: float = MARGIN, anywhere: bool = False) -> Problem:
     """Mesh, assemble and condense a model.
 
     Parameters
     ----------
     report : receives the messages
     margin : rigid gap that candidate points reach to, in depths of the press; infinite for all of the contact face
+    anywhere : whether the object may touch the contact face anywhere, whatever the path of the model: edges are as
+        short all over it, and its points are the candidate points; with an infinite margin those of all free faces
 
     Raises
     ------
@@ -83,11 +85,18 @@ def build(model: Model, report: Progress = QUIET, margin: float = MARGIN) -> Pro
         If the object passes between the contact points.
     """
     contact, axes = model.first_contact, symmetry(model)
-    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
+    design = model.design
+    half_width = 0.5 * design.width_mm if model.domain == "solid" else 0.0
+    face = (-design.half_length_mm, design.half_length_mm, -half_width, half_width)
+    mesh, mesh_report = mesh_part(model, face if anywhere else contact.contact_box, axes, report)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     free = free_surface(model, mesh, thickness)
     check(model, free, contact.first_contact_mm, contact.place, axes)
-    candidates = candidate_points(model, free, contact.first_contact_mm, margin)
+    if anywhere:
+        allowed = np.ones(len(free.nodes), dtype=bool) if math.isinf(margin) else free.face == CONTACT
+        candidates = restrict(free, np.flatnonzero(allowed))
+    else:
+        candidates = candidate_points(model, free, contact.first_contact_mm, margin)
     return _condensed(model, mesh, mesh_report, candidates, report)
 
 

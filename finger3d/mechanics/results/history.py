@@ -127,11 +127,7 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
     normal, sticks = state.force[:, 0], state.status == STICK
     outward = (friction[:, ::2] * points.sides_of(step.lowest)).sum(axis=0)
     numbers: Tree = {
-        "depth_mm": target.depth_mm,
-        "slide_x_mm": target.slide_x_mm,
-        "slide_z_mm": target.slide_z_mm,
-        **{f"turn_{axis}_deg": round(math.degrees(turn), 12) for axis, turn in zip("xyz", target.turns, strict=True)},
-        "time_s": target.time_s,
+        **pose_entry(target),
         "normal_force_N": 0.0 - float(world[:, 1].sum()),  # 0, not -0, without contact
         "tangential_force_x_N": float(friction[:, 0].sum()),
         "tangential_force_z_N": float(friction[:, 2].sum()),
@@ -156,6 +152,17 @@ def measure(points: ContactPoints, step: StepResult, with_zones: bool = True) ->
         "residual": step.residual,
         "method": step.method,
         "outcome": str(step.outcome),
+    }
+
+
+def pose_entry(pose: ObjectPose) -> Tree:
+    """Return the coordinates of the object as summary.json and history.csv name them."""
+    return {
+        "depth_mm": pose.depth_mm,
+        "slide_x_mm": pose.slide_x_mm,
+        "slide_z_mm": pose.slide_z_mm,
+        **{f"turn_{axis}_deg": round(math.degrees(turn), 12) for axis, turn in zip("xyz", pose.turns, strict=True)},
+        "time_s": pose.time_s,
     }
 
 

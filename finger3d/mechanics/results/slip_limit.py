@@ -9,13 +9,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import STICK, FrictionLaw
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.contact_points import ContactPoints
+
+Region: TypeAlias = "NDArray[np.bool_] | slice"
+"""Which contact points (m,) a region has."""
+
+EVERYWHERE = slice(None)
 
 
 @dataclass(frozen=True)
@@ -41,39 +48,42 @@ class SlipLimit:
 
 
 def largest_force(
-    points: ContactPoints, state: ContactState, friction: FrictionLaw, direction: Float
+    points: ContactPoints, state: ContactState, friction: FrictionLaw, direction: Float, region: Region = EVERYWHERE
 ) -> tuple[float, float]:
     """Return the largest friction and the pressure (N) along a unit vector (3,), with the normal forces of a state."""
-    normal, limit = _normals(points, state), _limits(points, state, friction)
+    normal, limit = _normals(points, state)[region], limits(points, state, friction)[region]
     along = normal @ direction
     across = np.linalg.norm(direction - along[:, None] * normal, axis=1)
-    return float(limit @ across), float(state.force[:, 0] @ along)
+    return float(limit @ across), float(state.force[region, 0] @ along)
 
 
 def margins(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
     """Return the margin (m,) of every point, 1 - |friction| / (mu N); 0 where it does not stick."""
-    sticks, limit = state.status == STICK, _limits(points, state, friction)
+    sticks, limit = state.status == STICK, limits(points, state, friction)
     used = np.divide(np.linalg.norm(state.force[:, 1:], axis=1), limit, out=np.ones_like(limit), where=limit > 0.0)
     return np.where(sticks, np.clip(1.0 - used, 0.0, 1.0), 0.0)
 
 
-def slip_margin(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> float:
+def slip_margin(
+    points: ContactPoints, state: ContactState, friction: FrictionLaw, region: Region = EVERYWHERE
+) -> float:
     """Return 1 less the tangential load over the largest that the whole contact can hold in its direction.
 
-    The load is that of pressure and friction; 0: the contact slips as a whole.
+    The load is that of pressure and friction; 0: the contact slips as a whole.  The margin of a region is that of its
+    points (m,) alone.
     """
-    load = points.with_basis_of(state).to_global(state.force).sum(axis=0) * np.array([1.0, 0.0, 1.0])
+    load = points.with_basis_of(state).to_global(state.force)[region].sum(axis=0) * np.array([1.0, 0.0, 1.0])
     size = float(np.linalg.norm(load))
-    if not (state.status == STICK).any() or not _limits(points, state, friction).any():
+    if not (state.status[region] == STICK).any() or not limits(points, state, friction)[region].any():
         return 0.0
     direction = load / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
-    held = sum(largest_force(points, state, friction, direction))
+    held = sum(largest_force(points, state, friction, direction, region))
     return min(max(1.0 - size / held, 0.0), 1.0) if held > 0.0 else 0.0
 
 
 def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> SlipLimit | None:
     """Return the slip limit of the whole finger in a state; None without contact or friction."""
-    limit = _limits(points, state, friction)
+    limit = limits(points, state, friction)
     if not limit.any():
         return None
     force = points.with_basis_of(state).friction(state.force)
@@ -91,7 +101,7 @@ def slip_limit(points: ContactPoints, state: ContactState, friction: FrictionLaw
     return SlipLimit(x, z, moment, math.hypot(*(own / most for own, most in used if most)))
 
 
-def _limits(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
+def limits(points: ContactPoints, state: ContactState, friction: FrictionLaw) -> Float:
     """Return the largest friction (m,) N of the points."""
     mu = friction.coefficients(state.status, state.force[:, 0] / points.area)
     return np.asarray(mu * state.force[:, 0])
