@@ -6,12 +6,38 @@ A table stands between ``<!-- from SOURCE ... -->`` and ``<!-- end -->``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+import typing
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import finger3d
-from finger3d.materials import reference as silicones
-from finger3d.scene import reference as keys
+from finger3d.effects import effect_names, effect_type
+from finger3d.geometry.registry import designs
+from finger3d.materials.modulus import youngs_modulus
+from finger3d.materials.silicones import Silicone, silicones, sources
+from finger3d.objects import OBJECTS, RigidObject
+from finger3d.scene.messages import described, listed, shown
+from finger3d.scene.schema import descriptions
+from finger3d.scene.tables import (
+    AutoTable,
+    ContactTable,
+    DomainTable,
+    FileTable,
+    FrictionTable,
+    GaugeTable,
+    GripTable,
+    LabelsTable,
+    LegTable,
+    MarkerGridTable,
+    MarkerTable,
+    MaterialTable,
+    MeshFileTable,
+    MeshTable,
+    PartTable,
+    TaxelTable,
+    TomlTable,
+    table_of,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = {"normal_force_N": "normal force", "gauge_g36": "gauge", "stick_area_mm2": "stick area"}
@@ -37,10 +63,132 @@ def cost_table() -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
+def keys() -> str:
+    """Return the table of all keys of a scene: key, what is allowed, default, meaning."""
+    lines = ["| key | allowed | default | meaning |", "|---|---|---|---|"]
+    for title, rows in _tables():
+        lines.append(f"| **`{title}`** | | | |")
+        lines += [
+            f"| {key and f'`{key}`'} | {allowed} | {default} | {meaning} |" for key, allowed, default, meaning in rows
+        ]
+    return "\n".join(lines) + "\n"
+
+
+_Row = tuple[str, str, str, str]
+
+
+def _tables() -> Iterator[tuple[str, list[_Row]]]:
+    yield (
+        "[finger]",
+        [("geometry", "a design's name, or the path of a .step, .stl, .msh or .vtu file", "", "what is pressed")],
+    )
+    for name, design in designs().items():
+        yield f'[finger] geometry = "{name}"', _rows_of(table_of(design), design)
+    yield "[finger] with a STEP or STL file", _rows_of(FileTable)
+    yield "[finger] with a .msh or .vtu file", _rows_of(MeshFileTable)
+    yield "[material]", _rows_of(MaterialTable)
+    yield "[parts.LABEL]", _rows_of(PartTable)
+    common = _rows_of(table_of(RigidObject), RigidObject)
+    yield "[object]", [("shape", listed(OBJECTS), '`"plane"`', "what the finger is pressed on"), *common]
+    for shape, record in OBJECTS.items():
+        yield f'[object] shape = "{shape}"', [row for row in _rows_of(table_of(record), record) if row not in common]
+    yield "[friction]", _rows_of(FrictionTable)
+    yield "[press] or [[press.leg]]", _rows_of(LegTable)
+    yield "[grip]", _rows_of(GripTable)
+    yield "[contact]", _rows_of(ContactTable)
+    yield "[model]", _rows_of(DomainTable)
+    yield "[mesh]", _rows_of(MeshTable)
+    yield "[[gauge]]", _rows_of(GaugeTable)
+    yield "[[marker]]", _rows_of(MarkerTable)
+    yield "[marker_grid]", _rows_of(MarkerGridTable)
+    yield "[[taxel]]", _rows_of(TaxelTable)
+    yield "[labels]", _rows_of(LabelsTable)
+    yield "[effects]", _rows_of(AutoTable)
+    for name in effect_names():
+        effect = effect_type(name)
+        rows = _rows_of(table_of(effect), effect)
+        yield f"[effects.{name}]", rows or [("", "no keys", "", (effect.__doc__ or "").split(": none. ")[-1])]
+
+
+def _rows_of(table: type[TomlTable], documented: type | None = None) -> list[_Row]:
+    hints = typing.get_type_hints(table, include_extras=True)
+    said = descriptions(documented or table)
+    return [
+        (
+            name,
+            described(hints[name]).replace("|", "\\|"),
+            _default(field),
+            said.get(name) or said[name.removesuffix("_deg")],
+        )
+        for name, field in table.model_fields.items()
+    ]
+
+
+def _default(field: typing.Any) -> str:
+    if field.is_required():
+        return "required"
+    return "" if field.default is None else f"`{shown(field.default)}`"
+
+
+_HEAD = {
+    "silicone": "---",
+    "Shore": "---",
+    "E (MPa)": "---:",
+    "spread": "---:",
+    "100 % modulus (psi)": "---:",
+    "tension (MPa)": "---:",
+    "compression (MPa)": "---:",
+    "density (g/ml)": "---:",
+    "viscosity (Pa s)": "---:",
+    "mix": "---",
+    "pot life (min)": "---:",
+    "cure (h)": "---:",
+    "shrinkage": "---",
+    "sources": "---",
+}
+
+
+def silicone_table() -> str:
+    """Return the table of silicones, a row each, and the list of sources by number."""
+    numbers = {key: number for number, key in enumerate(sources(), start=1)}
+    lines = [_row(list(_HEAD)), _row(list(_HEAD.values()))]
+    lines += [_row(_cells(one, numbers)) for one in silicones().values()]
+    lines += ["", *(f"{number}. {sources()[key]}" for key, number in numbers.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _row(cells: list[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _cells(one: Silicone, numbers: dict[str, int]) -> list[str]:
+    modulus = youngs_modulus(one)
+    return [
+        one.name,
+        f"{one.shore:g} A" if one.scale == "A" else f"00-{one.shore:g}",
+        f"{modulus.E_MPa:.3g}",
+        f"{100.0 * (modulus.spread or 0.0):.0f} %",
+        _number(one.modulus_100_psi),
+        _number(one.tangent_tension_MPa),
+        _number(one.modulus_compression_MPa),
+        _number(one.density_g_ml),
+        _number(one.viscosity_Pa_s),
+        "" if one.mix is None else str(one.mix),
+        _number(one.pot_life_min),
+        _number(one.cure_h),
+        "" if one.shrinkage is None else f"below {100.0 * one.shrinkage:g} %",
+        ", ".join(str(numbers[key]) for key in one.sources),
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"
+
+
 TABLES: dict[str, tuple[str, Callable[[], str]]] = {
     "docs/accuracy.md": ("finger3d cost geometries/fig9.toml", cost_table),
-    "docs/scenes.md": ("finger3d.scene.reference", keys.reference),
-    "docs/materials.md": ("finger3d.materials.reference", silicones.reference),
+    "docs/scenes.md": ("the tables of finger3d.scene", keys),
+    "docs/materials.md": ("finger3d/materials/silicones.toml", silicone_table),
 }
 """By page: what its table comes from, and the function that returns it."""
 

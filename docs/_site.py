@@ -146,7 +146,7 @@ def _toml(value: object) -> str:
 def outputs() -> str:
     """Return the tables of the numbers of a press, from the docstring of `PressStep` and the columns of contact.csv."""
     from finger3d.results.summary import PressStep
-    from finger3d.scene.reference import descriptions
+    from finger3d.scene.schema import descriptions
 
     said = {name: text.replace("|", r"\|") for name, text in descriptions(PressStep).items()}
     lines = ["| key | unit | meaning |", "|---|---|---|"]

@@ -143,16 +143,6 @@ def reserve_for_linear_algebra() -> None:
     np.eye(_UNROLLED) @ np.eye(_UNROLLED)
 
 
-def environment_bytes(prefix: Path) -> int:
-    """Return the bytes on disk of all files in an environment; a file with several names counts once."""
-    sizes: dict[tuple[int, int], int] = {}
-    for path in prefix.rglob("*"):
-        if path.is_file() and not path.is_symlink():
-            status = path.stat()
-            sizes[status.st_dev, status.st_ino] = getattr(status, "st_blocks", -(-status.st_size // 512)) * 512
-    return sum(sizes.values())
-
-
 def child_environment() -> dict[str, str]:
     """Return the environment of this process, changed so that a child imports this same package."""
     here = str(Path(__file__).resolve().parent.parent)

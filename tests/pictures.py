@@ -11,7 +11,7 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import CONTACT, Mesh, quadratic
 from finger3d.objects import Plane
 from finger3d.plotting import solid as render
-from finger3d.plotting.deformed import draw_fingers
+from finger3d.plotting.deformed import draw_finger
 from finger3d.plotting.layout import save
 from finger3d.plotting.solid import DeformedFinger
 from finger3d.sensor import Calibration, ReadingCurve, Tolerance
@@ -109,11 +109,9 @@ def deformed(mesh: Mesh, displacement: np.ndarray, table: dict[str, Any], contac
     )
 
 
-def finger_picture(path: Path, mesh: Mesh, **more: Any) -> str:
-    """Draw the finger, and return the renderer."""
-    (figure,), renderer = draw_fingers([deformed(mesh, **more)])
-    save(figure, path)
-    return renderer
+def finger_picture(path: Path, mesh: Mesh, **more: Any) -> None:
+    """Draw the finger."""
+    save(draw_finger(deformed(mesh, **more)), path)
 
 
 def solid_finger() -> tuple[Mesh, dict[str, Any]]:

@@ -217,7 +217,7 @@ def test_a_press_tells_what_large_deformation_would_change(tmp_path: Path, monke
     value = told["steps"][-1]["normal_force_N"]
     line = next(text for text in told["advice"] if "[effects.large_deformation]" in text)
     assert f" {float(format(100.0 * force['change'] / value, '.2g')):+g} % (" in line
-    page = words(press_page(tmp_path / "told"))
+    page = words(press_page(tmp_path / "told").write(tmp_path / "told"))
     assert f"normal_force_N {force['change']:.5g} {force['low']:.5g} {force['high']:.5g}" in page
 
     def forbidden(*_: Any) -> Any:

@@ -143,7 +143,6 @@ def test_a_folder_opens_as_the_result_that_was_written_there(solid: PressResult)
     assert opened._repr_html_() == solid._repr_html_()
     assert opened.plot_contact() == solid.plot_contact()
     assert opened.plot_forces() == solid.plot_forces()
-    assert opened.plot_map() == solid.plot_map()
 
 
 def test_a_result_keeps_its_tables_when_its_folder_is_used_again(tmp_path: Path) -> None:
@@ -152,8 +151,6 @@ def test_a_result_keeps_its_tables_when_its_folder_is_used_again(tmp_path: Path)
     before = first.to_dataframe("contact")
     finger3d.press(given, tmp_path / "out", figures=False, error=False, overrides=["material.E_MPa=3.0"])
     assert first.to_dataframe("contact").equals(before)
-    with pytest.raises(Finger3dError, match="a section has no map"):
-        first.plot_map()
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,12 @@ import pytest
 import finger3d
 import finger3d.analyses.press
 from finger3d.cli import app, main
-from finger3d.cli.terminal import SafeStream, legible_width, safe_streams
+from finger3d.cli.streams import SafeStream, safe_streams
+from finger3d.cli.terminal import least_width
 from finger3d.effects import effect_names
 from finger3d.errors import Outcome
 from finger3d.mechanics.model import MeshOptions
 from finger3d.scene import load
-from finger3d.scene.reference import reference
 from finger3d.scene.schema import schema
 from tests.commands import loaded, refused, run
 from tests.scenes import BLOCK, written
@@ -48,6 +48,10 @@ COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)
         (["plan", "scene.toml", "--set"], "--set"),
         (["new", "a.toml", "b.toml"], "b.toml"),
         (["info", "--loud"], "--loud"),
+        (["completion", "bash"], "completion is gone: use finger3d --completion SHELL"),
+        (["schema"], "schema is gone: use finger3d new --schema"),
+        (["validate"], "validate is gone: use python -m validation"),
+        (["design", "scene.toml", "--out", "out"], "design is gone: use finger3d optimise"),
     ],
 )
 def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys) -> None:
@@ -202,8 +206,8 @@ def test_results_are_written_whatever_becomes_of_the_terminal(root: Path, tmp_pa
 def test_a_closed_descriptor_is_not_given_to_a_file(root: Path, tmp_path: Path) -> None:
     """Else what a library prints to descriptor 1 would end up in a file of results."""
     code = (
-        "import os; from finger3d.cli.terminal import safe_streams\n"
-        "with safe_streams():\n    file = open('data', 'w'); os.write(1, b'printed'); file.write(str(file.fileno()))"
+        "import os; from finger3d.cli.terminal import fill_descriptors\n"
+        "fill_descriptors(); file = open('data', 'w'); os.write(1, b'printed'); file.write(str(file.fileno()))"
     )
     env = {**os.environ, "PYTHONPATH": str(root)}
     line = f"'{sys.executable}' -c \"$1\" >&-"
@@ -256,14 +260,11 @@ def test_help_ends_on_a_terminal_of_any_width(root: Path, columns: str) -> None:
     assert "--out" in done.stdout
 
 
-def test_the_width_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "3")
-    with legible_width():
-        assert os.environ["COLUMNS"] == "20"
-    assert os.environ["COLUMNS"] == "3"
-    monkeypatch.setenv("COLUMNS", "77")
-    with legible_width():
-        assert os.environ["COLUMNS"] == "77"
+@pytest.mark.parametrize(("said", "used"), [("3", "20"), ("77", "77")])
+def test_only_a_narrow_terminal_is_taken_for_wider(said: str, used: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", said)
+    least_width()
+    assert os.environ["COLUMNS"] == used
 
 
 # --- A refused command says one line that helps, and leaves nothing behind; --json prints JSON alone -----------------
@@ -342,9 +343,9 @@ def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
     assert [leg.depth_mm for leg in loaded.legs] == [10.0]
 
 
-def test_new_explains_every_key(scene) -> None:
-    text = scene.read_text(encoding="utf-8")
-    keys = set(re.findall(r"^\| `(\w+)` \|", reference(), re.MULTILINE))
+def test_new_explains_every_key(scene, root) -> None:
+    text, page = scene.read_text(encoding="utf-8"), (root / "docs" / "scenes.md").read_text(encoding="utf-8")
+    keys = set(re.findall(r"^\| `(\w+)` \|", page.split("<!-- from the tables")[1], re.MULTILINE))
     assert {"depth_mm", "prony", "tolerance"} <= keys
     assert not [key for key in keys if not re.search(rf"\b{key}\b", text)]
     assert not [name for name in effect_names() if f"\n# [effects.{name}]\n" not in text]
@@ -387,7 +388,7 @@ def test_a_core_install_gets_a_scene_that_it_can_press(tmp_path, monkeypatch: py
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_prints_a_script(shell, capsys) -> None:
-    assert run("completion", shell) == 0
+    assert run("--completion", shell) == 0
     script = capsys.readouterr().out
     for command in COMMANDS:
         assert command in script
@@ -395,11 +396,15 @@ def test_completion_prints_a_script(shell, capsys) -> None:
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [(["pre"], "press"), (["press", "scene.toml", "--no"], "--no-figures"), (["completion", "b"], "bash")],
+    [
+        (["pre"], "press"),
+        (["press", "scene.toml", "--no"], "--no-figures"),
+        (["export", "scene.toml", "--solver", "c"], "calculix"),
+    ],
 )
 def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, capsys) -> None:
     """bash reads the script, and is asked what it offers after what was typed."""
-    run("completion", "bash")
+    run("--completion", "bash")
     script = tmp_path / "completion.bash"
     script.write_text(capsys.readouterr().out)
     words = " ".join(["finger3d", *typed])
@@ -414,7 +419,7 @@ def test_bash_completes_commands_options_and_choices(typed, offered, tmp_path, c
 
 
 def test_schema_prints_the_json_schema_of_a_scene(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema"]) == 0
+    assert main(["new", "--schema"]) == 0
     assert json.loads(capsys.readouterr().out) == schema()
 
 

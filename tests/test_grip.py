@@ -197,7 +197,7 @@ def test_the_command_writes_both_fingers(tmp_path: Path, capsys: pytest.CaptureF
     assert [finger["finger"] for finger in summary["fingers"]] == ["lower", "upper"]
     assert summary["fingers"][0]["steps"] == summary["steps"]
     assert summary["object_pose"]["z_mm"] < 0.0
-    page = press_page(out).read_text(encoding="utf-8")
+    page = press_page(out).write(out).read_text(encoding="utf-8")
     assert "closing_mm = 0.8" in page
     assert "Two fingers" in page
     rows = (out / "contact.csv").read_text(encoding="utf-8").splitlines()

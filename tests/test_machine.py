@@ -25,7 +25,6 @@ from finger3d._machine import (
     PACKAGES,
     child_environment,
     cores,
-    environment_bytes,
     made_with,
     memory_bytes,
     source_hash,
@@ -63,14 +62,6 @@ def test_the_source_of_designs_effects_and_tables_shapes_numbers(tmp_path: Path,
     source_hash.cache_clear()
     assert len(found) == 4
     assert "matplotlib" not in made_with()
-
-
-def test_a_file_with_two_names_counts_once(tmp_path: Path) -> None:
-    (tmp_path / "a").write_bytes(b"x" * 100_000)
-    one = environment_bytes(tmp_path)
-    assert 100_000 <= one < 200_000
-    os.link(tmp_path / "a", tmp_path / "b")
-    assert environment_bytes(tmp_path) == one
 
 
 def test_changing_the_answer_changes_no_later_one() -> None:

@@ -500,7 +500,7 @@ def test_an_undercut_that_no_printer_resolves_is_accepted() -> None:
         lip = Pos(0.0, 2.0 - depth, 9.75) * Box(20.0, 1.0, 0.5)
         body = Body.of((gel - groove - lip).solids()[0], 0.02)
         if accepted:
-            assert check_opening(body, MoldOptions(), may_turn=True).depth_mm == pytest.approx(depth, rel=0.2)
+            assert check_opening(body, MoldOptions(), may_turn=True).depth_mm == 0.0
         else:
             with pytest.raises(Finger3dError, match="undercut of 0.05 mm"):
                 check_opening(body, MoldOptions(), may_turn=True)

@@ -39,7 +39,7 @@ from tests.sensor_cases import curve, line, scene, straight, together, tolerance
 
 
 def test_the_page_of_a_section_loads_neither_plotly_nor_vtk(section: Path) -> None:
-    program = f"from finger3d.report.press import press_page; press_page({str(section)!r})"
+    program = f"from finger3d.report.press import press_page; press_page({str(section)!r}).write({str(section)!r})"
     assert not loaded(program, "plotly", "vtk", "vtkmodules", "pyvista", "matplotlib", "jinja2")
 
 
@@ -269,25 +269,25 @@ def test_errors_are_shown_with_their_numbers(section: Path, tmp_path: Path) -> N
         "steps": {"normal_force_N": 0.01, "contact_half_length_mm": 0.0},
         "method": "companion", "seconds": 0.1,
     }  # fmt: skip
-    text = words(press_page(copied(section, tmp_path, error_estimate=estimate)))
+    text = words(press_page(copied(section, tmp_path, error_estimate=estimate)).write(tmp_path))
     assert f" {last['normal_force_N']:.3f} ± 0.030 N " in text
     assert f" {2 * last['contact_half_length_mm']:.2f} ± 0.20 mm " in text
     assert f"<g> {last['gauges']['<g>']:.4f} ± 0.0030 " in text
     assert "normal_force_N 0.02 0.01" in text
-    assert "±" not in words(press_page(copied(section, tmp_path, error_estimate=None)))
+    assert "±" not in words(press_page(copied(section, tmp_path, error_estimate=None)).write(tmp_path))
 
 
 def test_a_failed_or_empty_press_says_so(section: Path, tmp_path: Path) -> None:
     steps = json.loads((section / "summary.json").read_text(encoding="utf-8"))["steps"]
     failed = str(Outcome.NO_CONVERGENCE)
     steps[-1] |= {"outcome": failed, "residual": None}
-    page = press_page(copied(section, tmp_path, outcome=failed, steps=steps))
+    page = press_page(copied(section, tmp_path, outcome=failed, steps=steps)).write(tmp_path)
     assert f'class="bad">{failed}' in page.read_text(encoding="utf-8")
     assert 'class="headline"' in page.read_text(encoding="utf-8")
     text = words(page)
     assert f" {steps[-2]['normal_force_N']:.5g} N " in text  # the last good step
     assert "none NO" in text
-    empty = press_page(copied(section, tmp_path, outcome="incomplete", steps=[]))
+    empty = press_page(copied(section, tmp_path, outcome="incomplete", steps=[])).write(tmp_path)
     assert 'class="headline"' not in empty.read_text(encoding="utf-8")
     with pytest.raises(Finger3dError, match="summary.json"):
         press_page(tmp_path / "nothing")
@@ -310,7 +310,7 @@ SCENE: dict[str, Any] = {"scene": scene().as_dict() | {"title": "<b>a finger</b>
 def test_a_gauges_page_tells_range_curve_causes_and_a_command_that_succeeds(tmp_path: Path, capsys: Any) -> None:
     made = curve(line(0.05), tolerances=(tolerance("depth_mm", 0.1, 1e-3),), failed=((0.9, "no convergence"),), **SCENE)
     save(made, tmp_path / "calibration.json")
-    text = words(calibrate_page(tmp_path))
+    text = words(calibrate_page(tmp_path).write(tmp_path))
     assert "<b>a finger</b>: g against friction" in text
     assert made.verdict() in text
     low, high = made.trusted[0]
@@ -328,7 +328,7 @@ def test_a_gauges_page_tells_range_curve_causes_and_a_command_that_succeeds(tmp_
 
 def test_the_page_of_a_gauge_that_knows_mu_nowhere_gives_no_range(tmp_path: Path) -> None:
     save(curve(lambda mu: 0.0 * mu, **SCENE), tmp_path / "calibration.json")
-    page = calibrate_page(tmp_path).read_text(encoding="utf-8")
+    page = calibrate_page(tmp_path).write(tmp_path).read_text(encoding="utf-8")
     assert page.count("<dd>none</dd>") == 2  # with all tolerances, and by the noise alone
     assert "<dd>unknown</dd>" in page
 
@@ -337,7 +337,7 @@ def test_a_page_of_several_readings_tells_each_and_what_would_reduce_the_varianc
     depth = tolerance("depth_mm", 0.1, 0.02)
     joint = replace(together(curve(line(0.01), tolerances=(depth,)), curve(straight, tolerances=(depth,))), **SCENE)
     save(joint, tmp_path / "calibration.json")
-    text = words(calibrate_page(tmp_path))
+    text = words(calibrate_page(tmp_path).write(tmp_path))
     best = joint.best
     assert re.search(rf"mu = {joint.mu[best]:.3g}\b[^=]* {joint.judged_at_mu[best].std:.2g}\b", text)
     fall = joint.reductions(joint.mu)["depth_mm"][best]
@@ -364,11 +364,11 @@ def test_a_comparison_tells_its_verdict_and_every_case(tmp_path: Path) -> None:
         ],
     }  # fmt: skip
     (tmp_path / "compare.json").write_text(json.dumps(data), encoding="utf-8")
-    text = words(compare_page(tmp_path))
+    text = words(compare_page(tmp_path).write(tmp_path))
     assert "<t>: " in text
     del data["scene"]["title"]
     (tmp_path / "compare.json").write_text(json.dumps(data), encoding="utf-8")
-    assert title_of(data["scene"]) in words(compare_page(tmp_path))
+    assert title_of(data["scene"]) in words(compare_page(tmp_path).write(tmp_path))
     assert "solid 15.20 ± 0.10 N/mm" in text
     assert "plane strain 26.4 N/mm" in text
     assert data["verdict"][0] in text
@@ -389,14 +389,14 @@ def test_every_gauge_with_its_place_and_the_command_that_calibrates_them(tmp_pat
         ],
     }  # fmt: skip
     (tmp_path / "gauges.json").write_text(json.dumps(data), encoding="utf-8")
-    text = words(gauge_places_page(tmp_path))
+    text = words(gauge_places_page(tmp_path).write(tmp_path))
     assert "2 gauges" in text
     assert "mu = 0.1 to 0.5 0.03" in text
     assert "g1 x 30.2, y 41.0, z 0.0 mm, 12.5°" in text
     assert f"finger3d calibrate {tmp_path / 'best.toml'} --gauge g1,g2" in text
     data["gauges"] = data["gauges"][:1]
     (tmp_path / "gauges.json").write_text(json.dumps(data), encoding="utf-8")
-    assert "1 gauge " in words(gauge_places_page(tmp_path))
+    assert "1 gauge " in words(gauge_places_page(tmp_path).write(tmp_path))
 
 
 # --- the page of an identification -----------------------------------------------------------------------------------
@@ -418,7 +418,7 @@ def test_values_with_bounds_intervals_correlation_and_residuals(tmp_path: Path) 
     task = {"free": [["material.E_MPa", 0.05, 5.0], ["friction.mu", 0.1, 1.0]]}
     for name, content in {"identify.json": data, "task.json": task}.items():
         (tmp_path / name).write_text(json.dumps(content), encoding="utf-8")
-    page = identify_page(tmp_path)
+    page = identify_page(tmp_path).write(tmp_path)
     text, tables = words(page), page.read_text(encoding="utf-8").count("<table>")
     assert "a.csv" in text
     assert "material.E_MPa 0.371 ± 0.012" in text
@@ -429,7 +429,7 @@ def test_values_with_bounds_intervals_correlation_and_residuals(tmp_path: Path) 
     del data["values"]["friction.mu"]
     (tmp_path / "identify.json").write_text(json.dumps(data), encoding="utf-8")
     # one value is correlated with no other
-    assert identify_page(tmp_path).read_text(encoding="utf-8").count("<table>") == tables - 1
+    assert identify_page(tmp_path).write(tmp_path).read_text(encoding="utf-8").count("<table>") == tables - 1
 
 
 # --- the page of a design search -------------------------------------------------------------------------------------
@@ -451,7 +451,7 @@ def written(folder: Path, best: float) -> Path:
 
 
 def test_the_best_designs_come_first_and_failures_are_counted(tmp_path: Path) -> None:
-    text = words(optimise_page(written(tmp_path, 25.0)))
+    text = words(optimise_page(written(tmp_path, 25.0)).write(tmp_path))
     assert "(sensitivity) 42.5" in text
     assert {"1 of 3", "2 of 3"} <= set(re.findall(r"\d of \d", text))
     assert "gauge.g36.x_mm 10 40 20 25" in text
@@ -461,7 +461,7 @@ def test_the_best_designs_come_first_and_failures_are_counted(tmp_path: Path) ->
 
 @pytest.mark.parametrize(("best", "said"), [(25.0, False), (39.9, True), (10.1, True)])
 def test_a_value_at_its_bound_is_pointed_out(best: float, said: bool, tmp_path: Path) -> None:
-    page = optimise_page(written(tmp_path, best)).read_text(encoding="utf-8")
+    page = optimise_page(written(tmp_path, best)).write(tmp_path).read_text(encoding="utf-8")
     remark = re.search(r"<tr><td[^>]*>gauge\.g36\.x_mm</td>.*?<td[^>]*>([^<]*)</td></tr>", page)  # the last cell
     assert remark is not None
     assert ("bound" in remark[1]) == said

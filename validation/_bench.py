@@ -361,7 +361,8 @@ def main(arguments: Sequence[str]) -> None:
             os.environ["FINGER3D_SOLVER"] = "mumps"
         print(json.dumps(build(fig9(size)).seconds["condensation"] if "mumps" in arguments else measured(size)))
         return
-    from finger3d.cli.common import job, print_columns
+    from finger3d.cli.common import job
+    from finger3d.cli.printing import print_columns
 
     from ._rows import table
 

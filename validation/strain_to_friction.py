@@ -224,3 +224,13 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
     for axes in panels[1]:
         axes.plot(36.0, 40.0, "ko", mfc="none", ms=8)
         axes.set(xlabel="x (mm)", ylabel="y (mm)")
+
+
+def _edges(at: Float) -> Float:
+    """Return the n + 1 edges of the squares around n equidistant positions."""
+    half = 0.5 * (at[1] - at[0])
+    return np.append(at - half, at[-1] + half)
+
+
+def _colour_bar(figure: Any, axes: Any, drawn: Any, label: str, extend: str) -> None:
+    figure.colorbar(drawn, ax=axes, label=label, extend=extend, location="bottom", shrink=0.8, aspect=35)

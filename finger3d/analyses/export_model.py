@@ -33,6 +33,14 @@ class ModelFiles:
     multiple: float | None = None
     remarks: tuple[str, ...] = ()
 
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """The mesh and the factor of the forces in words."""
+        rows = [("mesh", f"{self.cells} cells, {self.points} points")]
+        if self.multiple is not None:
+            rows.append(("force", f"{self.multiple:.12g} times the total force that ccx prints"))
+        return rows
+
 
 def export_mesh(
     scene: Source, out: str | Path, report: Progress | None = None, overrides: Sequence[str] = ()

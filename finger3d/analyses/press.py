@@ -100,7 +100,7 @@ def press(
 
                 report.stage("drawing")
                 draw()
-                press_page(folder)
+                press_page(folder).write(folder)
     return result_in(folder, record.history, temporary)
 
 

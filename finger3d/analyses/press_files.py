@@ -180,7 +180,7 @@ class ResultWriter:
         function that draws and writes them; a solid is rendered beside what is done before
         """
         from finger3d.plotting import figures
-        from finger3d.plotting.deformed import drawing_fingers
+        from finger3d.plotting.deformed import drawing_finger
         from finger3d.plotting.gauges import marks_of
         from finger3d.plotting.layout import save
         from finger3d.plotting.show import finger_of, mesh_of
@@ -201,10 +201,9 @@ class ResultWriter:
             figures.force_figure(self.folder / "force.png", steps)
             if markers := _markers(record):
                 figures.marker_figure(self.folder / "markers.png", markers)
-            (figure,), _ = drawn()
-            save(figure, self.folder / "finger.png")
+            save(drawn(), self.folder / "finger.png")
 
-        with drawing_fingers([finger]) as drawn:
+        with drawing_finger(finger) as drawn:
             yield draw
 
 

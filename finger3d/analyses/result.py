@@ -206,21 +206,6 @@ class PressResult:
         self._contact()
         return _picture(force_figure, [step for step in self._numbers["steps"] if step["outcome"] == "converged"])
 
-    def plot_map(self) -> Picture:
-        """Draw a flat map of the contact face in the last good increment: pressure, friction, and stick and slip.
-
-        Raises
-        ------
-        Finger3dError
-            If the press is that of a section.
-        """
-        from finger3d.plotting.figures import map_figure
-
-        table = self._contact()
-        if not table["z_mm"].any():
-            raise Finger3dError("plot_map(): a section has no map; plot_contact() draws it along x")
-        return _picture(map_figure, table)
-
     def to_pyvista(self, step: int | None = None) -> pyvista.UnstructuredGrid:
         """Return the finger at rest with its fields; ``warp_by_vector("displacement")`` deforms it.
 
@@ -256,12 +241,12 @@ class PressResult:
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
         from finger3d.report.build import number
-        from finger3d.report.press import headline
+        from finger3d.report.press_rows import headline
 
         good, bars = self._good(), ErrorBars.of_summary(self._numbers)
         rows = [
             (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
-            for row in (headline(good[-1], bars.totals(), bars.modulus) if good else ())
+            for row in (headline(good[-1], bars) if good else ())
         ]
         return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])
 

@@ -4,35 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 
-from cyclopts import App, CycloptsError, MissingArgumentError, UnknownOptionError
+from cyclopts import App, CycloptsError, MissingArgumentError
 
-# Importing a module registers its command.
-import finger3d.cli.app  # noqa: F401
 from finger3d._extras import absent, message
 from finger3d._interruption import termination_interrupts
 from finger3d._machine import enough_address_space
-from finger3d.cli import (  # noqa: F401
-    calibrate,
-    compare,
-    cost,
-    estimate,
-    export,
-    identify,
-    info,
-    optimise,
-    plan,
-    press,
-    sensitivity,
-    show,
-    sweep,
-    writing,
-)
-from finger3d.cli.common import Interrupted, app, complain
-from finger3d.cli.terminal import legible_width, safe_streams
+from finger3d.cli.common import Interrupted, app
+from finger3d.cli.gone import gone
+from finger3d.cli.printing import complain
+from finger3d.cli.streams import safe_streams
+from finger3d.cli.terminal import fill_descriptors, least_width
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
+
+_COMMANDS = (
+    "app_page calibrate compare cost estimate export identify info new optimise plan press sensitivity show sweep"
+)
+for _command in _COMMANDS.split():
+    import_module(f"finger3d.cli.{_command}")  # which registers it
 
 
 def main(arguments: Sequence[str] | None = None, program: App | None = None) -> int:
@@ -40,7 +32,9 @@ def main(arguments: Sequence[str] | None = None, program: App | None = None) -> 
 
     Errors are reported in one line on standard error. SIGTERM and SIGHUP interrupt a command like Ctrl-C.
     """
-    with safe_streams(), termination_interrupts(), legible_width():
+    fill_descriptors()
+    least_width()
+    with safe_streams(), termination_interrupts():
         return _run(list(sys.argv[1:] if arguments is None else arguments), program or app)
 
 
@@ -57,14 +51,6 @@ def _check_surroundings(arguments: Sequence[str]) -> None:
         raise MissingError(OUT_OF_MEMORY)
 
 
-def _gone(error: CycloptsError, arguments: Sequence[str]) -> str:
-    """Return what to do instead of an option that is gone; empty for any other mistake."""
-    if not isinstance(error, UnknownOptionError) or arguments[0] != "export":
-        return ""
-    option = (error.token.keyword or error.token.value).split("=")[0]
-    return f"{option} is gone: {export.GONE[option]}" if option in export.GONE else ""
-
-
 def _run(arguments: Sequence[str], program: App) -> int:
     try:
         _check_surroundings(arguments)
@@ -76,7 +62,7 @@ def _run(arguments: Sequence[str], program: App) -> int:
         complain("give --out FOLDER, the folder for the results" if no_out else str(error))
         return Finger3dError.exit_code
     except CycloptsError as error:
-        complain(_gone(error, arguments) or f"{error} (finger3d --help lists the commands and options)")
+        complain(gone(error, arguments) or f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code
     except (Finger3dError, Interrupted) as error:
         complain(str(error))
@@ -84,15 +70,12 @@ def _run(arguments: Sequence[str], program: App) -> int:
     except KeyboardInterrupt:
         complain("interrupted; nothing was written")
         return 130
-    except (MemoryError, OSError, RuntimeError) as error:
-        if not out_of_memory(error):
-            raise
-        complain(OUT_OF_MEMORY)
-        return MissingError.exit_code
-    except ImportError as error:
+    except (MemoryError, OSError, RuntimeError, ImportError) as error:
         if out_of_memory(error):
             complain(OUT_OF_MEMORY)
             return MissingError.exit_code
+        if not isinstance(error, ImportError):
+            raise
         if (module := absent(error)) is not None:
             complain(message(next(iter(arguments), "finger3d"), module))
             return MissingError.exit_code

@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, Noise, Out, Set, app, job, load, print_json, print_rows
-from finger3d.cli.tolerances import Tolerances, parsed_tolerances
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import load
+from finger3d.cli.options import Json, Out, Set
+from finger3d.cli.printing import print_json, print_rows
+from finger3d.cli.sensor_options import CalibrationOptions
+from finger3d.cli.tolerances import parsed_tolerances
 from finger3d.errors import MissingError
-
-
-@dataclass(frozen=True, kw_only=True)
-class CalibrationOptions:
-    """What is calibrated, and how well readings and scene are known.
-
-    Parameters
-    ----------
-    gauge
-        Name of a [[gauge]] of the scene; or several readings together, with commas: gauges, m1.x of a
-        [[marker]], taxels.
-    mu
-        Values of mu: first:last:count, or numbers separated by commas.
-    marker_noise
-        Standard deviation of a reading of a marker, mm.
-    taxel_noise
-        Standard deviation of a reading of a taxel, MPa.
-    resolution
-        Largest standard deviation of mu at which the sensor is usable.
-    """
-
-    gauge: str
-    mu: str = "0.02:1.2:25"
-    noise: Noise = 1.5e-4
-    marker_noise: float = 0.02
-    taxel_noise: float = 1e-3
-    resolution: float = 0.1
-    tolerance: Tolerances = None
 
 
 @app.command

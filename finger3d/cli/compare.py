@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import Json, Out, Set, app, job, load, numbers, print_columns, print_json
-from finger3d.errors import MissingError
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import load
+from finger3d.cli.options import Json, Out, Set
+from finger3d.cli.printing import print_columns, print_json
+from finger3d.errors import Finger3dError, MissingError
 
 
 @app.command
@@ -29,9 +32,10 @@ def compare(
     widths
         Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.
     """
-    chosen = (
-        None if widths is None else numbers("--widths", widths, "numbers of mm with commas, for instance 5,20,50,200")
-    )
+    try:
+        chosen = None if widths is None else [float(part) for part in widths.split(",")]
+    except ValueError:
+        raise Finger3dError(f"--widths {widths}: must be numbers of mm with commas, for instance 5,20,50,200") from None
     loaded = load(scene, set_, out)
     from finger3d.analyses.compare.run import compare as run
     from finger3d.results.summary import read_json

@@ -3,38 +3,17 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Json, app, print_json
+from finger3d.cli.common import app
+from finger3d.cli.options import Json
+from finger3d.cli.printing import print_json
+from finger3d.cli.sensor_options import ReadingOptions
 from finger3d.errors import Finger3dError
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReadingOptions:
-    """Where readings come from.
-
-    Parameters
-    ----------
-    strain
-        A reading; or NAME=READING, repeated for each of several calibrated readings.
-    std
-        Standard deviation of the readings, or NAME=NUMBER for one of several; default: the noise of the
-        calibration.
-    csv
-        CSV file of readings: a column for each, NAME, and optionally NAME_std; of a single reading strain and
-        std will do.
-    follow
-        The same from standard input, -, line by line as it is written, for instance by tail -F readings.csv.
-    """
-
-    strain: Annotated[list[str] | None, Parameter(negative=(), allow_leading_hyphen=True)] = None
-    std: Annotated[list[str] | None, Parameter(negative=(), allow_leading_hyphen=True)] = None
-    csv: Path | None = None
-    follow: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
 
 
 @app.command
@@ -42,7 +21,7 @@ def estimate(
     calibration: Path,
     /,
     *,
-    given: Annotated[ReadingOptions, Parameter(name="*")] = ReadingOptions(),
+    given: Annotated[ReadingOptions | None, Parameter(name="*")] = None,
     out: Path | None = None,
     json_: Json = False,
     tolerances: bool = True,
@@ -63,6 +42,7 @@ def estimate(
     tolerances
         Include the tolerances of the calibration in the standard deviation.
     """
+    given = given or ReadingOptions()
     if sum(source is not None for source in (given.strain, given.csv, given.follow)) != 1:
         raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow -")
     if given.follow not in (None, "-"):

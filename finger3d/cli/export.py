@@ -8,38 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Flag, Json, Set, app, check_folder, job, load, print_json, print_rows
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_folder, load
+from finger3d.cli.options import Flag, Json, Set
+from finger3d.cli.printing import print_json, print_rows
 from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
 
 if TYPE_CHECKING:
     from finger3d.analyses.export_model import ModelFiles
     from finger3d.mold.export import Exported
-
-_INSERT = "draw it as a part of the design with [parts.LABEL] rigid = true: it is printed and inserted"
-_PLAIN = "the faces are plain: hold them with --screw, clamps or rubber bands"
-
-GONE = {
-    **dict.fromkeys(("--carrier", "--carrier-mm", "--key-mm", "--inserts"), _INSERT),
-    **dict.fromkeys(("--fasten", "--band-mm", "--seal", "--cord-mm", "--pry", "--no-pry"), _PLAIN),
-    **dict.fromkeys(("--plugs", "--no-plugs", "--slot-gap-mm"), "slots of strips are sealed with tape"),
-    "--ascii": "STL files are binary; a program that reads them turns them into text",
-    "--wall-mm": "the walls are 8 mm thick",
-    "--peg-mm": "pegs have a diameter of 4 mm",
-    "--lid-mm": "the lid is 4 mm thick",
-    "--vent-mm": "vents are as wide as the base allows, at most 2 mm",
-    "--foil-length-mm": "give length_mm in [[gauge]]; without it a foil is 5 mm long",
-    **dict.fromkeys(
-        ("--foil-thickness-mm", "--foil-width-mm"),
-        "give them in [effects.embedded_gauge]; without it they are 0.1 and 3 mm",
-    ),
-    "--riser": "the pour hole is a funnel, of the width --pour-mm at the sensor",
-    "--cavities": "print the mold several times",
-    "--coupon": "give the clearance of your printer as --clearance-mm",
-    "--button": "press a sample with a scene of its own, and finger3d identify",
-    "--bed": "the program of the printer arranges the parts",
-}
-"""Options that are gone, and what to do instead."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,34 +76,14 @@ def export(
         if what.mesh or what.solver:
             from finger3d.analyses.export_model import export_deck, export_mesh
 
-            model = (export_deck if what.solver else export_mesh)(loaded, out, report)
-            done, rows = model, _rows_of_model(model)
+            done = (export_deck if what.solver else export_mesh)(loaded, out, report)
         else:
             from finger3d.mold.export import export as run
 
-            finger = run(loaded, out, chosen if what.mold else None, what.tolerance_mm, report)
-            done, rows = finger, _rows_of_finger(finger)
+            done = run(loaded, out, chosen if what.mold else None, what.tolerance_mm, report)
     if json_:
         print_json({"results": out, **asdict(done)})
         return
-    print_rows(loaded.title, [*rows, ("results", str(out)), *(("", file.name) for file in done.files)])
+    print_rows(loaded.title, [*done.rows, ("results", str(out)), *(("", file.name) for file in done.files)])
     for text in done.remarks:
         print(f"remark: {text}")
-
-
-def _rows_of_finger(done: Exported) -> list[tuple[str, str]]:
-    off = done.stl_volume_mm3 / done.volume_mm3 - 1.0
-    rows = [
-        ("volume", f"{done.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}"),
-        ("tolerance", f"{done.tolerance_mm:.3g} mm"),
-    ]
-    if done.silicone_ml is not None:
-        rows.append(("silicone", f"{done.silicone_ml:.3g} ml in the cavity; see sheet.txt"))
-    return rows
-
-
-def _rows_of_model(done: ModelFiles) -> list[tuple[str, str]]:
-    rows = [("mesh", f"{done.cells} cells, {done.points} points")]
-    if done.multiple is not None:
-        rows.append(("force", f"{done.multiple:.12g} times the total force that ccx prints"))
-    return rows

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import Continued, Json, Set, Texts, app, check_writable, job, print_json, print_rows
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_writable
+from finger3d.cli.options import Continued, Json, Set, Texts
+from finger3d.cli.printing import print_json, print_page
 
 
 @app.command
@@ -34,8 +37,8 @@ def identify(
         A free key and its bounds, for instance material.E_MPa=0.05:5; or depth_offset_mm=-1:1, which is added
         to the measured depth; may be repeated.
     """
-    from finger3d.analyses.identify.run import DEVIATIONS
     from finger3d.analyses.identify.run import identify as run
+    from finger3d.report.identify import identify_page
 
     check_writable(out, scene)
     kept = f"every press is kept in {out}; the same command continues"
@@ -43,20 +46,5 @@ def identify(
         result = run(scene, measured, free, out, set_ or (), report)
     if json_:
         print_json(result.as_dict())
-        return
-    f = result.fitted
-    fitted = zip(result.keys, f.values, f.stds, f.low, f.high, strict=True)
-    print_rows(
-        result.scene.title,
-        [
-            *(
-                (key, f"{value:.4g} +- {std:.2g} (68 % interval {low:.4g} to {high:.4g})")
-                for key, value, std, low, high in fitted
-            ),
-            ("deviations", DEVIATIONS),
-            *(("note", note) for note in result.notes),
-            ("presses", f"{result.presses} solved"),
-            ("results", str(out / "identified.toml")),
-            ("", str(out / "report.html")),
-        ],
-    )
+    else:
+        print_page(identify_page(out), (out / name for name in ("identified.toml", "report.html")))

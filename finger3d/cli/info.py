@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from finger3d.cli.common import Json, app, print_json, print_rows
+from finger3d.cli.common import app
+from finger3d.cli.options import Json
+from finger3d.cli.printing import print_json, print_rows
 
 _SOLVERS = {
     "pardiso": "PARDISO of MKL",
@@ -19,14 +21,12 @@ def info(*, json_: Json = False) -> None:
     """
     import platform
     import sys
-    from pathlib import Path
 
-    from finger3d._machine import cores, environment_bytes, memory_bytes, versions
+    from finger3d._machine import cores, memory_bytes, versions
     from finger3d.fem.solvers import condense
     from finger3d.meshing.cache import folder
 
-    memory, isolated = memory_bytes(), sys.prefix != sys.base_prefix
-    size = environment_bytes(Path(sys.prefix)) if isolated else None
+    memory = memory_bytes()
     if json_:
         machine = {
             "platform": platform.platform(),
@@ -34,7 +34,6 @@ def info(*, json_: Json = False) -> None:
             "memory_bytes": memory[0] if memory else None,
             "mesh_cache": folder(),
             "environment": sys.prefix,
-            "environment_bytes": size,
             "factorisation": condense.default_solver(),
         }
         print_json({"versions": versions(), "machine": machine})
@@ -47,7 +46,7 @@ def info(*, json_: Json = False) -> None:
             ("cores", cores()),
             ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
             ("mesh cache", folder()),
-            ("environment", f"{sys.prefix}, {size / 1e9:.2f} GB" if size is not None else f"{sys.prefix}, shared"),
+            ("environment", sys.prefix),
             ("factorisation", _SOLVERS[condense.default_solver()]),
         ],
     )

@@ -2,60 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import Continued, Json, Noise, Set, Texts, app, check_writable, job, print_json, print_rows
-from finger3d.cli.tolerances import Tolerances, parsed_tolerances
-
-if TYPE_CHECKING:
-    from finger3d._types import TreeView
-
-    Found = tuple[str, list[tuple[str, str]], TreeView]  # title, rows of the printed table, and JSON
-
-
-@dataclass(frozen=True, kw_only=True)
-class OptimiseOptions:
-    """What is free, and what is best.
-
-    Parameters
-    ----------
-    free
-        A free key and its bounds, for instance finger.radius_mm=60:200; may be repeated.
-    gauges
-        Find the places and directions of so many gauges that together determine mu best, with all tolerances of
-        a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg.
-    spacing
-        Least distance of two of these, mm: their length, so that none overlap.
-    gauge
-        Gauge whose sensitivity to friction is to be largest; default: the first.
-    mu
-        Ascending values of mu, with commas; default: nine from 0.05 to 1.
-    budget
-        Number of designs; of bodies, if keys of gauges are optimised for each body.
-    seed
-        Seed of the random number generator.
-    """
-
-    free: Texts | None = None
-    gauges: int | None = None
-    spacing: float = 3.0
-    tolerance: Tolerances = None
-    gauge: str | None = None
-    mu: str | None = None
-    noise: Noise = 1.5e-4
-    budget: int = 60
-    seed: int = 0
-
-    @property
-    def mus(self) -> tuple[float, ...] | None:
-        """Values of mu; None for those of the default."""
-        from finger3d.analyses.calibrate.settings import parsed_mus
-
-        return parsed_mus(self.mu) if self.mu else None
+from finger3d.cli.common import app, job
+from finger3d.cli.folders import check_writable
+from finger3d.cli.optimise_options import OptimiseOptions
+from finger3d.cli.options import Continued, Json, Set
+from finger3d.cli.printing import print_json, print_page
+from finger3d.cli.tolerances import parsed_tolerances
 
 
 @app.command
@@ -64,7 +21,7 @@ def optimise(
     /,
     *,
     out: Continued,
-    options: Annotated[OptimiseOptions, Parameter(name="*")] = OptimiseOptions(),
+    options: Annotated[OptimiseOptions | None, Parameter(name="*")] = None,
     set_: Set = None,
     json_: Json = False,
 ) -> None:
@@ -80,54 +37,25 @@ def optimise(
         The scene file (TOML).
     """
     check_writable(out, scene)
-    search = _find_design if options.gauges is None else _place_gauges
-    title, rows, data = search(scene, out, options, set_ or [], json_)
-    if json_:
-        print_json(data)
-    else:
-        print_rows(title, [*rows, ("", str(out / "report.html"))])
-
-
-def _find_design(scene: Path, out: Path, o: OptimiseOptions, set_: list[str], json_: bool) -> Found:
-    """Return the best design."""
-    from finger3d.analyses.optimise.run import optimise as run
+    from finger3d.analyses.calibrate.settings import parsed_mus
     from finger3d.results.summary import read_json
 
-    kept = f"every evaluated design is kept in {out}; the same command continues"
-    with job(json_, lambda _: kept) as report:
-        result = run(scene, o.free or (), out, o.gauge, o.mus, o.noise, o.budget, o.seed, set_, report)
-    design = read_json(out / "design.json")
-    chosen = zip(result.keys, result.best.values, strict=True)
-    rows = [
-        (
-            f"objective ({Path(design['objective']).name})",
-            f"{result.best.value:.5g}, at the start {result.start.value:.5g}",
-        ),
-        *((key, f"{value:.5g}") for key, value in chosen),
-        ("evaluated", f"{result.distinct_designs} designs, {result.bodies} bodies condensed"),
-        ("results", str(out / "best.toml")),
-        ("", str(out / "evaluations.csv")),
-    ]
-    return result.scene.title, rows, design
+    o, sets = options or OptimiseOptions(), set_ or []
+    mus = parsed_mus(o.mu) if o.mu else None
+    if o.gauges is None:
+        from finger3d.analyses.optimise.run import optimise as run
+        from finger3d.report.optimise import optimise_page as page
 
+        with job(json_, lambda _: f"every evaluated design is kept in {out}; the same command continues") as report:
+            run(scene, o.free or (), out, o.gauge, mus, o.noise, o.budget, o.seed, sets, report)
+    else:
+        from finger3d.analyses.optimise.gauge_run import place_gauges
+        from finger3d.report.gauge_places import gauge_places_page as page
 
-def _place_gauges(scene: Path, out: Path, o: OptimiseOptions, set_: list[str], json_: bool) -> Found:
-    """Return the places of several gauges."""
-    from finger3d.analyses.optimise.gauge_run import place_gauges
-
-    with job(json_, lambda _: "nothing was written") as report:
-        tolerances = parsed_tolerances(o.tolerance)
-        result = place_gauges(
-            scene, o.gauges or 0, out, o.free or [], o.mus, o.noise, tolerances, set_, report, o.spacing
-        )
-    data = result.as_dict()
-    rows = [
-        (
-            g["name"],
-            f"x {g['x_mm']:.1f}, y {g['y_mm']:.1f}, z {g['z_mm']:.1f} mm, {g['angle_deg']:.1f} degrees: mu +- "
-            f"{g['mean_mu_sd_with_those_before']:.3g} with those before, {g['mean_mu_sd_alone']:.3g} alone",
-        )
-        for g in data["gauges"]
-    ]
-    spread = f"mu +- {data['mean_mu_sd']:.3g}, mean over mu = {result.mus[0]:g} to {result.mus[-1]:g}"
-    return result.scene.title, [*rows, ("together", spread), ("results", str(out / "best.toml"))], data
+        with job(json_, lambda _: "nothing was written") as report:
+            stds = parsed_tolerances(o.tolerance)
+            place_gauges(scene, o.gauges, out, o.free or [], mus, o.noise, stds, sets, report, o.spacing)
+    if json_:
+        print_json(read_json(out / ("design.json" if o.gauges is None else "gauges.json")))
+    else:
+        print_page(page(out), (out / name for name in ("best.toml", "report.html")))

@@ -1,10 +1,12 @@
-"""Command ``show``: a window, a picture or an animation of a result."""
+"""Command ``show``: a window, the page, or a picture of a result."""
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 
-from finger3d.cli.common import app, check_folder
+from finger3d.cli.common import app
+from finger3d.cli.folders import check_folder
 from finger3d.errors import Finger3dError
 
 
@@ -14,58 +16,60 @@ def show(
     /,
     *,
     png: Path | None = None,
-    gif: Path | None = None,
     step: int | None = None,
 ) -> None:
-    """Show a result in a window with fields, increments and a clip plane; --png and --gif need no display.
+    """Show a press in a window with fields, increments and a clip plane, or without a display its page.
 
-    Example: finger3d show out --png finger.png --gif press.gif
+    Of a sweep it opens the page. --png writes a picture.
+
+    Example: finger3d show out --png finger.png
 
     Parameters
     ----------
     folder
-        Results of `finger3d press`; or of `finger3d sweep`, whose charts --png draws.
+        Folder of results.
     png
-        Write a picture of one increment instead of opening a window.
-    gif
-        Write an animation of the increments instead of opening a window.
+        Write a picture of one increment of a press, or of the charts of a sweep.
     step
         Number of the increment in the picture; default: the last.
     """
+    if step is not None and png is None:
+        raise Finger3dError("show: --step goes with --png; the window and the page have a slider")
+    if png is None:
+        _open(folder)
+        return
+    if png.suffix.lower() != ".png":
+        raise Finger3dError(f"show: --png {png}: must end in .png")
+    check_folder(png.parent)
     if (folder / "sweep.json").is_file():
-        _show_sweep(folder, png, gif, step)
-        return
-    from finger3d.plotting import show as run
-
-    if png is None and gif is None:
         if step is not None:
-            raise Finger3dError("show: --step goes with --png; the window has a slider")
-        run.show_window(folder)
-        return
-    run.found(folder)
-    _check(png, ".png")
-    _check(gif, ".gif")
-    run.show(folder, png, gif, step)
-    for path in (png, gif):
-        if path is not None:
-            print(f"{path} written")
+            raise Finger3dError(f"show: {folder} holds a sweep: give --png alone, or nothing for its page")
+        from finger3d.report.sweep_figure import picture
 
+        picture(folder, png)
+    else:
+        from finger3d.plotting.show import show as draw
 
-def _show_sweep(folder: Path, png: Path | None, gif: Path | None, step: int | None) -> None:
-    if png is None or gif is not None or step is not None:
-        page = folder / "report.html"
-        advice = f"open {page}" if page.exists() else "it is not finished; the same command continues"
-        raise Finger3dError(f"show: {folder} holds a sweep: {advice}, or give --png alone")
-    _check(png, ".png")
-    from finger3d.report.sweep_figure import picture
-
-    picture(folder, png)
+        draw(folder, png, step)
     print(f"{png} written")
 
 
-def _check(path: Path | None, ending: str) -> None:
-    if path is None:
+def _open(folder: Path) -> None:
+    from finger3d.plotting.show import has_window, show_window
+    from finger3d.results.summary import press_summary
+
+    is_sweep = (folder / "sweep.json").is_file()
+    if has_window() and not is_sweep:
+        show_window(folder)
         return
-    if path.suffix.lower() != ending:
-        raise Finger3dError(f"show: --{ending[1:]} {path}: must end in {ending}")
-    check_folder(path.parent)
+
+    page = folder / "report.html"
+    if not page.exists():
+        if is_sweep:
+            raise Finger3dError(f"show: {folder}: the sweep is not finished; the same command continues")
+        press_summary(folder)
+        from finger3d.report.press import press_page
+
+        press_page(folder).write(folder)
+    print(f"open {page}", flush=True)
+    webbrowser.open(page.resolve().as_uri())

@@ -102,15 +102,10 @@ def sources() -> Mapping[str, str]:
 @functools.cache
 def silicones() -> Mapping[str, Silicone]:
     """Return every silicone by its name, in the order of the table."""
-    rows: list[dict[str, object]] = _content()["silicone"]  # type: ignore[assignment]
-    return {one.name: one for one in map(_silicone, rows)}
+    from pydantic import TypeAdapter
 
-
-def _silicone(row: Mapping[str, object]) -> Silicone:
-    values = {key: tuple(value) if isinstance(value, list) else value for key, value in row.items()}
-    if isinstance(mix := row.get("mix"), Mapping):
-        values["mix"] = Mix(**mix)
-    return Silicone(**values)  # type: ignore[arg-type]
+    rows = TypeAdapter(list[Silicone]).validate_python(_content()["silicone"])
+    return {one.name: one for one in rows}
 
 
 def silicone_named(name: str) -> Silicone:

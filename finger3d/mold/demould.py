@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body
@@ -21,13 +20,11 @@ from finger3d.mold.options import MoldOptions
 from finger3d.mold.regions import manifold, triangles
 
 if TYPE_CHECKING:
-    from build123d import Face
     from manifold3d import CrossSection
 
 
 _ON_PLANE_MM = 1e-6  # distance at which a face lies on a plane
-_NORMAL_TOLERANCE = 1e-6  # component of a unit normal against the opening direction
-_LEAST_UNDERCUT_MM = 0.02  # what a printer resolves, and triangles of a smooth body have
+_LEAST_UNDERCUT_MM = 0.04  # largest chord tolerance of the printers: triangles of a smooth body have as much
 _LEVELS = 24  # heights of a half at which its undercut is measured
 _DEPTH_TOLERANCE = 1e-3  # of the depth, relative
 
@@ -76,11 +73,10 @@ def undercut(finger: Body, split: str, at_mm: float) -> Undercut:
     deepest = Undercut(0.0, "")
     for sign in (1.0, -1.0):
         half = _half(finger.surface, axis, sign, at_mm)
-        locked = _locked(finger, axis, sign, at_mm)
-        depth = undercut_depth(half, axis, sign) if locked or finger.cad is None else 0.0
-        if depth > max(deepest.depth_mm, 0.0 if finger.cad is not None else _LEAST_UNDERCUT_MM):
+        depth = undercut_depth(half, axis, sign)
+        if depth > max(deepest.depth_mm, _LEAST_UNDERCUT_MM):
             walls = ~_cuts(half, axis, at_mm)
-            point = locked or half.corners[walls][int(np.argmin(sign * half.normals[walls, axis]))].mean(axis=0)
+            point = half.corners[walls][int(np.argmin(sign * half.normals[walls, axis]))].mean(axis=0)
             place = ", ".join(f"{c:.4g}" for c in point)
             side = f"{'+' if sign > 0 else '-'}{split}"
             deepest = Undercut(depth, f"the half on the {side} side is locked by the body near ({place}) mm")
@@ -139,54 +135,3 @@ def _reach(shadow: CrossSection, locked: CrossSection, least: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if reaches(middle) else (low, middle)
     return high
-
-
-def _locked(finger: Body, axis: int, sign: float, at_mm: float) -> tuple[float, ...] | None:
-    """Return the point (3,), mm, where a CAD body locks a half most; None without one, or without CAD.
-
-    A half can be removed along d if the normals n of the body inside it satisfy n . d >= 0 everywhere but on the base.
-    The normals are those of CAD at the points of a tessellation.
-    """
-    if finger.cad is None:
-        return None
-    from build123d import Box, Pos
-
-    low, high = finger.box
-    reach = 4.0 * float(np.linalg.norm(high - low))
-    middle = np.zeros(3)
-    middle[axis] = at_mm + sign * reach / 2.0
-    worst, place = -_NORMAL_TOLERANCE, None
-    for piece in (finger.cad & Pos(*map(float, middle)) * Box(reach, reach, reach)).solids():
-        for face in piece.faces():
-            centre, normal = np.array([*face.center()]), np.array([*face.normal_at(face.center())])
-            on_base = abs(centre[1]) < _ON_PLANE_MM and normal[1] < -0.5  # which the lid covers
-            on_split = abs(centre[axis] - at_mm) < _ON_PLANE_MM and abs(normal[axis]) > 0.5
-            if face.is_planar and (on_base or on_split):
-                continue
-            points, normals = _normals(face)
-            along = sign * normals[:, axis]
-            if along.min() < worst:
-                worst, place = float(along.min()), tuple(float(c) for c in points[int(np.argmin(along))])
-    return place
-
-
-def _normals(face: Face) -> tuple[Float, Float]:
-    """Points (n, 3) mm of a face, and outward unit normals (n, 3)."""
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepGProp import BRepGProp_Face
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.gp import gp_Pnt, gp_Vec
-    from OCP.TopLoc import TopLoc_Location
-
-    BRepMesh_IncrementalMesh(face.wrapped, 0.05, False, 0.2, False)
-    mesh = BRep_Tool.Triangulation_s(face.wrapped, TopLoc_Location())
-    surface, point, normal = BRepGProp_Face(face.wrapped), gp_Pnt(), gp_Vec()
-    points, normals = [], []
-    for i in range(1, mesh.NbNodes() + 1):
-        uv = mesh.UVNode(i)
-        surface.Normal(uv.X(), uv.Y(), point, normal)
-        if normal.Magnitude() > 1e-9:  # a sphere's pole has none
-            points.append([point.X(), point.Y(), point.Z()])
-            normals.append([normal.X(), normal.Y(), normal.Z()])
-    n = np.array(normals)
-    return np.array(points), n / np.linalg.norm(n, axis=1, keepdims=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -141,9 +141,8 @@ def initial_contact(way: ContactPath, touch: FirstTouch | None = None) -> Initia
     Finger3dError
         If the object is nowhere above the finger, reaches the base beside it, or runs into a side that may not touch.
     """
-    top, obj, path = way.top, way.object, way.poses
-    half_length, half_width = way.half_length_mm, way.half_width_mm
-    first_contact_mm, place = touch or first_touch(way)
+    touch = touch or first_touch(way)
+    first_contact_mm, place = touch
     if first_contact_mm == math.inf:
         raise Finger3dError(
             "object: as it is turned at the start, it extends downwards without end over the finger, which would start "
@@ -151,30 +150,24 @@ def initial_contact(way: ContactPath, touch: FirstTouch | None = None) -> Initia
         )
     if not math.isfinite(first_contact_mm):
         raise Finger3dError(
-            f"object: no part of it is above the finger (|x| <= {half_length:g}, |z| <= {half_width:g} mm), so that it "
-            "never touches; change x_mm, z_mm"
+            f"object: no part of it is above the finger (|x| <= {way.half_length_mm:g}, |z| <= "
+            f"{way.half_width_mm:g} mm), so that it never touches; change x_mm, z_mm"
         )
     _clear_of_base(way, first_contact_mm)
-    if obj.is_flat:  # it has no end that could hang down
-        return InitialContact(
-            first_contact_mm, _box(top, obj, half_length, half_width, first_contact_mm, place, path), _pair(place)
-        )
-    deepest = max(pose.depth_mm for pose in path)
-    if first_contact_mm <= deepest:
-        raise Finger3dError(
-            f"object: at depth {deepest:g} mm its lowest point, beside the finger, is {deepest - first_contact_mm:.4g} "
-            "mm below the finger's base: it touches the base first; press less deep, or change x_mm, z_mm"
-        )
-    _stays_on_finger(way, first_contact_mm)
-    zone = _box(top, obj, half_length, half_width, first_contact_mm, place, path)
-    if not way.walls_touch:
-        _not_a_wall(obj, place, half_length, half_width)
+    if not way.object.is_flat:  # a plane has no end that could hang down
+        deepest = max(pose.depth_mm for pose in way.poses)
+        if first_contact_mm <= deepest:
+            raise Finger3dError(
+                f"object: at depth {deepest:g} mm its lowest point, beside the finger, is "
+                f"{deepest - first_contact_mm:.4g} mm below the finger's base: it touches the base first; press less "
+                "deep, or change x_mm, z_mm"
+            )
+        _stays_on_finger(way, first_contact_mm)
+    zone = _box(way, touch)
+    if not (way.object.is_flat or way.walls_touch):
+        _not_a_wall(way, place)
         _no_side(way, first_contact_mm)
-    return InitialContact(first_contact_mm, zone, _pair(place))
-
-
-def _pair(place: Float) -> tuple[float, float]:
-    return float(place[0]), float(place[1])
+    return InitialContact(first_contact_mm, zone, (float(place[0]), float(place[1])))
 
 
 def _clear_of_base(way: ContactPath, first_contact_mm: float) -> None:
@@ -212,33 +205,26 @@ def _stays_on_finger(way: ContactPath, first_contact_mm: float) -> None:
             )
 
 
-def _box(
-    top: Top,
-    obj: RigidObject,
-    half_length: float,
-    half_width: float,
-    first_contact_mm: float,
-    place: Float,
-    path: Sequence[ObjectPose],
-) -> tuple[float, float, float, float]:
-    limit = np.array([half_length, half_width])
-    window = _grid(1.0, float(half_width > 0.0), (_ZOOM, _ZOOM)) * 2.0 * limit / (np.array(_COARSE) - 1)
-    grids = [_grid(half_length, half_width, _COARSE)]
+def _box(way: ContactPath, touch: FirstTouch) -> tuple[float, float, float, float]:
+    """Return the box over which the object overlaps the finger at rest on its path."""
+    place, limit = touch.place, np.array([way.half_length_mm, way.half_width_mm])
+    window = _grid(1.0, float(way.half_width_mm > 0.0), (_ZOOM, _ZOOM)) * 2.0 * limit / (np.array(_COARSE) - 1)
+    grids = [_grid(way.half_length_mm, way.half_width_mm, _COARSE)]
     for k in range(_ZOOMS):  # a tip may lie between the points of the grid
         near = window * 10.0**-k
-        slides = {(pose.slide_x_mm, pose.slide_z_mm) for pose in path}
+        slides = {(pose.slide_x_mm, pose.slide_z_mm) for pose in way.poses}
         grids += [np.clip(place + [sx, sz] + near, -limit, limit) for sx, sz in slides]
     points = np.vstack(grids)
     inside = np.zeros(len(points), dtype=bool)
     deepest: dict[tuple[float, ...], ObjectPose] = {}
-    for pose in path:  # deeper at the same place covers what was touched before
+    for pose in way.poses:  # deeper at the same place covers what was touched before
         key = (pose.slide_x_mm, pose.slide_z_mm, *pose.turns)
         if key not in deepest or pose.depth_mm > deepest[key].depth_mm:
             deepest[key] = pose
     for pose in deepest.values():
-        inside |= _overlap(top, obj, points, first_contact_mm, pose) > 0.0
+        inside |= _overlap(way.top, way.object, points, touch.height_mm, pose) > 0.0
     (x0, z0), (x1, z1) = (f(points[inside], axis=0) if inside.any() else place for f in (np.min, np.max))
-    if x1 - x0 <= _NOTHING * half_length or z1 - z0 < _NOTHING * half_width:
+    if x1 - x0 <= _NOTHING * way.half_length_mm or z1 - z0 < _NOTHING * way.half_width_mm:
         raise Finger3dError(
             f"object: it touches the finger only at x = {place[0]:.4g}, z = {place[1]:.4g} mm, over no area: an edge "
             "or a wall touches first; change x_mm, z_mm, or press deeper"
@@ -251,16 +237,16 @@ def _overlap(top: Top, obj: RigidObject, at: Float, touch: float, pose: ObjectPo
     return PlacedObject.of(obj, touch, pose).overlap(at[:, 0], top(*at.T), at[:, 1])
 
 
-def _not_a_wall(obj: RigidObject, place: Float, half_length: float, half_width: float) -> None:
+def _not_a_wall(way: ContactPath, place: Float) -> None:
     """Raise an error if the object first touches the rim of the finger with a flank that extends below it."""
-    reach = 1e-3 * half_length
-    for axis, limit in ((0, half_length), (1, half_width)):
+    reach = 1e-3 * way.half_length_mm
+    for axis, limit in ((0, way.half_length_mm), (1, way.half_width_mm)):
         if limit == 0.0 or abs(place[axis]) < limit * (1.0 - 1e-9):
             continue
         step = np.zeros(2)
         step[axis] = math.copysign(reach, place[axis])
         points = np.stack([place, place + step, place - step], axis=1)
-        here, beside, before = PlacedObject.of(obj, 0.0).height(*points)
+        here, beside, before = PlacedObject.of(way.object, 0.0).height(*points)
         if here - beside > _STEEP * reach or before - here > _STEEP * reach:
             raise Finger3dError(
                 f"object: it touches the finger's rim at x = {place[0]:.4g}, z = {place[1]:.4g} mm with a flank that "

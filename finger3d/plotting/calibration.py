@@ -1,4 +1,4 @@
-"""Picture of a calibration: readings over mu, the standard deviation of mu, and what would reduce its variance."""
+"""calibration.png: readings over mu, the standard deviation of mu, and what would reduce its variance."""
 
 from __future__ import annotations
 

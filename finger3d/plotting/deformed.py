@@ -1,12 +1,8 @@
-"""Deformed fingers drawn to scale: contact pressure on the left, stick and slip on the right.
-
-Solids are rendered by PyVista in a child process, because VTK aborts the process if no OpenGL driver works. In that
-case, and with ``FINGER3D_RENDERER=matplotlib``, matplotlib draws them.
-"""
+"""A deformed finger drawn to scale: contact pressure on the left, stick and slip on the right."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -28,7 +24,7 @@ from finger3d.plotting.panels import (
     sliced,
     two_panels,
 )
-from finger3d.plotting.renderer import WINDOW, flat
+from finger3d.plotting.renderer import flat
 from finger3d.plotting.solid import (
     BODY,
     FEATURE,
@@ -39,9 +35,7 @@ from finger3d.plotting.solid import (
     DeformedFinger,
     Rendered,
     Skin,
-    draw_solid,
-    rendering_solids,
-    seen_box,
+    rendering_solid,
     skin_of,
 )
 
@@ -49,77 +43,58 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_fingers(
-    fingers: Sequence[DeformedFinger], window: tuple[int, int] = WINDOW, arrows: bool = True
-) -> tuple[list[Figure], str]:
-    """Return figures of one finger at several steps, and their renderer; see `drawing_fingers`."""
-    with drawing_fingers(fingers, window, arrows) as drawn:
+def draw_finger(finger: DeformedFinger) -> Figure:
+    """Return a figure of a finger; see `drawing_finger`."""
+    with drawing_finger(finger) as drawn:
         return drawn()
 
 
 @contextmanager
-def drawing_fingers(
-    fingers: Sequence[DeformedFinger], window: tuple[int, int] = WINDOW, arrows: bool = True
-) -> Iterator[Callable[[], tuple[list[Figure], str]]]:
-    """Draw one finger at several steps, with one camera and one scale of pressure.
-
-    Solids are rendered beside what else is done within the block.
-
-    Parameters
-    ----------
-    fingers : the steps
-    window : width and height of rendered solids, in pixels
-    arrows : whether friction on solids is drawn
+def drawing_finger(finger: DeformedFinger) -> Iterator[Callable[[], Figure]]:
+    """Draw a finger; a solid is rendered beside what else is done within the block.
 
     Yields
     ------
-    function that returns the figures, one for each step, and the renderer: ``pyvista`` or ``matplotlib``
+    function that returns the figure
     """
-    highest = highest_of(np.concatenate([finger.pressure for finger in fingers]))
-    if fingers[0].mesh.dim == 2:
-        yield lambda: (_sections(fingers, highest), "matplotlib")
+    highest = highest_of(finger.pressure)
+    if finger.mesh.dim == 2:
+        yield lambda: _section(finger, highest)
         return
-    skins = [skin_of(finger) for finger in fingers]
-    pictures = []
-    for skin in skins:
-        by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
-        pictures += [
-            (skin, pressure_colours(skin.pressure, highest, skin.status[:, None]), False),
-            (skin, by_status, arrows),
-        ]
-    with rendering_solids(pictures, window) as rendered:
-        yield lambda: _solids(fingers, highest, pictures, rendered())
+    skin = skin_of(finger)
+    by_pressure = pressure_colours(skin.pressure, highest, skin.status[:, None])
+    by_status = np.repeat(palette()[skin.status][:, None], 3, axis=1)
+    with rendering_solid(skin, by_pressure, by_status) as rendered:
+        yield lambda: _solid(finger, highest, skin, rendered())
 
 
-def _sections(fingers: Sequence[DeformedFinger], highest: float) -> list[Figure]:
+def _section(finger: DeformedFinger, highest: float) -> Figure:
     """Draw a 2D model, with the pressure and the status along the faces that may touch."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
 
-    mesh = fingers[0].mesh
-    everywhere = np.concatenate([mesh.points, *(finger.moved for finger in fingers)])
+    mesh = finger.mesh
+    everywhere = np.concatenate([mesh.points, finger.moved])
     low, span = everywhere.min(axis=0), np.ptp(everywhere, axis=0)
-    rest, figures = outline_of(mesh, mesh.points), []
-    for finger in fingers:
-        halves, pressure, status = coloured_halves(finger)
-        figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
-        paths = [draw(mesh, finger.moved) for draw in (outline_of, edges_of, interfaces_of)]
-        lines = [(paths[0], BODY, LINE, 0.5), (paths[1], "none", LINE, 0.25), (paths[2], "none", FEATURE, 0.9)]
-        for axes, colours in zip(panels, (pressure_colours(pressure, highest, status), palette()[status]), strict=True):
-            for path, face, edge, width in lines:
-                axes.add_artist(PathPatch(path, facecolor=face, edgecolor=edge, lw=width))
-            axes.add_artist(PathPatch(rest, facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
-            if finger.thing is not None:
-                axes.add_collection(LineCollection(list(sliced(finger.thing)), colors=OBJECT, lw=1.2, zorder=2))
-            axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
-            axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
-            axes.set_xlabel("x (mm)", labelpad=1)
-            axes.spines[["top", "right"]].set_visible(False)
-        panels[0].set_ylabel("y (mm)")
-        draw_marks(panels[0], finger.lines)
-        keys(figure, highest, {"finger at rest": REST} | ({} if finger.thing is None else {"object": OBJECT}))
-        figures.append(figure)
-    return figures
+    rest = outline_of(mesh, mesh.points)
+    halves, pressure, status = coloured_halves(finger)
+    figure, panels = two_panels(1.14 * span[1] / (1.08 * span[0]), finger.title, ticks=True)
+    paths = [draw(mesh, finger.moved) for draw in (outline_of, edges_of, interfaces_of)]
+    lines = [(paths[0], BODY, LINE, 0.5), (paths[1], "none", LINE, 0.25), (paths[2], "none", FEATURE, 0.9)]
+    for axes, colours in zip(panels, (pressure_colours(pressure, highest, status), palette()[status]), strict=True):
+        for path, face, edge, width in lines:
+            axes.add_artist(PathPatch(path, facecolor=face, edgecolor=edge, lw=width))
+        axes.add_artist(PathPatch(rest, facecolor="none", edgecolor=REST, lw=0.8, ls=":"))
+        if finger.thing is not None:
+            axes.add_collection(LineCollection(list(sliced(finger.thing)), colors=OBJECT, lw=1.2, zorder=2))
+        axes.add_collection(LineCollection(list(halves), colors=colours, lw=5, capstyle="butt", zorder=3))
+        axes.set(xlim=low[0] + span[0] * np.array([-0.04, 1.04]), ylim=low[1] + span[1] * np.array([-0.04, 1.1]))
+        axes.set_xlabel("x (mm)", labelpad=1)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("y (mm)")
+    draw_marks(panels[0], finger.lines)
+    keys(figure, highest, {"finger at rest": REST} | ({} if finger.thing is None else {"object": OBJECT}))
+    return figure
 
 
 def coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
@@ -148,33 +123,18 @@ def coloured_halves(finger: DeformedFinger) -> tuple[Float, Float, Int]:
     return np.concatenate(halves), np.concatenate(pressure), np.concatenate(status)
 
 
-def _solids(
-    fingers: Sequence[DeformedFinger],
-    highest: float,
-    pictures: Sequence[tuple[Skin, Float, bool]],
-    rendered: Rendered | None,
-) -> tuple[list[Figure], str]:
-    """Draw a solid from its two pictures at each step; where they are not rendered, by matplotlib."""
-    images, extent = rendered or (None, None)
-    skins, arrows = [skin for skin, _, _ in pictures[::2]], pictures[-1][-1]
-    low, span = seen_box(skins)
-    aspect = float(span[1] / span[0]) if images is None else images[0].shape[0] / images[0].shape[1]
-    figures = []
-    for k, (finger, skin) in enumerate(zip(fingers, skins, strict=True)):
-        figure, panels = two_panels(aspect, finger.title)
-        for number, axes in enumerate(panels, start=2 * k):
-            if images is not None:
-                axes.imshow(images[number], interpolation="antialiased", extent=extent)
-            else:
-                draw_solid(axes, *pictures[number])
-                axes.set(xlim=(low[0], low[0] + span[0]), ylim=(low[1], low[1] + span[1]))
-            axes.set_axis_off()
-        draw_marks(panels[0], [(label, flat(line)) for label, line in finger.lines])
-        if finger.marks:
-            panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
-        if arrows and skin.largest_shear > 0.0:
-            text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
-            panels[1].set_title(text, fontsize=11)
-        keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
-        figures.append(figure)
-    return figures, "matplotlib" if images is None else "pyvista"
+def _solid(finger: DeformedFinger, highest: float, skin: Skin, rendered: Rendered) -> Figure:
+    """Draw a solid from its two pictures."""
+    images, extent = rendered
+    figure, panels = two_panels(images[0].shape[0] / images[0].shape[1], finger.title)
+    for axes, image in zip(panels, images, strict=True):
+        axes.imshow(image, interpolation="antialiased", extent=extent)
+        axes.set_axis_off()
+    draw_marks(panels[0], [(label, flat(line)) for label, line in finger.lines])
+    if finger.marks:
+        panels[0].set_title("contact pressure; gauges projected onto the front face", fontsize=11)
+    if skin.largest_shear > 0.0:
+        text = f"stick and slip; arrows: friction on the finger, at most {skin.largest_shear:.3g} MPa"
+        panels[1].set_title(text, fontsize=11)
+    keys(figure, highest, {"finger at rest": REST} | ({"object": OBJECT_TINT} if len(skin.thing) else {}))
+    return figure

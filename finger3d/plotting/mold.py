@@ -1,8 +1,8 @@
-"""Exploded view of a mold and its steps of casting, by PyVista, or by matplotlib if PyVista cannot render."""
+"""Exploded view of a mold and its steps of casting."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.geometry.surface import Triangles
 from finger3d.plotting.layout import DPI, blank, save
-from finger3d.plotting.renderer import Camera, Drawing, Image, Polygons, render, shaded, viewer_axes
+from finger3d.plotting.renderer import Camera, Drawing, Polygons, rendering, viewer_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,13 +72,26 @@ class Scenery:
     title: str = ""
     labels: Mapping[str, str] = field(default_factory=dict)
 
-    def opacity(self, name: str) -> float:
-        """Return the opacity of a part."""
-        return 1.0 if self.opaque else OPACITY.get(name, 1.0)
+    @property
+    def camera(self) -> Camera:
+        """What the picture is seen by."""
+        width, height = self.half
+        return Camera(self.axes, self.middle, float(height), (_PIXELS, max(int(_PIXELS * height / width), 1)))
 
-    def flat(self, points: Float) -> Float:
-        """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm from the centre."""
-        return (points - self.middle) @ self.axes[:2].T
+    @property
+    def drawing(self) -> Drawing:
+        """The parts in their colours."""
+        parts = (
+            Polygons(
+                part.points,
+                part.faces,
+                colour(name),
+                1.0 if self.opaque else OPACITY.get(name, 1.0),
+                feature_edges=True,
+            )
+            for name, part in self.parts.items()
+        )
+        return Drawing(self.camera, tuple(parts))
 
 
 def kind(name: str) -> str:
@@ -135,32 +148,28 @@ def _seen(parts: Mapping[str, Triangles], towards: Float, **more: Any) -> Scener
 
 
 def write_pictures(views: Mapping[Path, Scenery]) -> None:
-    """Write a PNG file of each view, all in one run of the renderer.
-
-    Raises
-    ------
-    MissingError
-        If FINGER3D_RENDERER is ``pyvista`` and PyVista cannot render.
-    """
-    images = rendered([*views.values()])
-    for i, (path, view) in enumerate(views.items()):
+    """Write a PNG file of each view, all in one run of the renderer."""
+    with rendering([view.drawing for view in views.values()]) as images:
+        found = images()
+    for image, (path, view) in zip(found, views.items(), strict=True):
         width, height = view.half
         factor = _LABEL_FACTOR if view.labels else 1.0
         above = _TITLE_HEIGHT if view.title else 0.0
         high = float(_WIDTH * height / width) + above
         figure = blank(factor * _WIDTH, high)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - above / high))
-        show(axes, view, None if images is None else images[i])
+        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
+        axes.set(xlim=(-factor * width, factor * width), ylim=(-height, height), aspect="equal")
+        axes.set_axis_off()
         for name in view.labels:
             _label(axes, view, name)
-        axes.set_xlim(-factor * width, factor * width)
         figure.text(0.5, 1.0 - 0.5 * above / high, view.title, fontsize=11, ha="center", va="center")
         save(figure, path)
 
 
 def _label(axes: Axes, view: Scenery, name: str) -> None:
     """Write the name of a part and a remark next to the part: half B at its left, the other parts at their right."""
-    seen = view.flat(view.parts[name].points)
+    seen = view.camera.flat(view.parts[name].points)
     left = name == "half_b"
     low = name == "strips"  # their front end is not hidden by other parts
     at = seen[np.argmin(seen[:, 1] if low else seen[:, 0]) if left or low else np.argmax(seen[:, 0])]
@@ -177,46 +186,3 @@ def _label(axes: Axes, view: Scenery, name: str) -> None:
         arrowprops=line,
         annotation_clip=False,
     )
-
-
-def show(axes: Axes, view: Scenery, image: Image | None) -> None:
-    """Show the rendered image of a view in its axes, or draw the view with matplotlib."""
-    width, height = view.half
-    if image is None:
-        draw(axes, view)
-    else:
-        axes.imshow(image, extent=(-width, width, -height, height), interpolation="nearest")
-    axes.set(xlim=(-width, width), ylim=(-height, height), aspect="equal")
-    axes.set_axis_off()
-
-
-def draw(axes: Axes, view: Scenery) -> None:
-    """Draw the parts with matplotlib from back to front, and likewise the triangles of each part."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
-
-    order = sorted(view.parts, key=lambda n: float((view.parts[n].points @ view.axes[2]).mean()))
-    for layer, name in enumerate(order):
-        corners, fill = shaded(view.parts[name].corners, to_rgb(colour(name)), view.axes[2])
-        far = np.argsort(corners.mean(axis=1) @ view.axes[2], kind="stable")
-        fill = fill[far]
-        alpha = view.opacity(name) if view.opacity(name) < 1.0 else None
-        # Edges in the colour of the face close fine seams; a transparent face would show them.
-        edge = fill if alpha is None else "none"
-        faces = PolyCollection(list(view.flat(corners)[far]), facecolors=fill, edgecolors=edge, lw=0.3, alpha=alpha)
-        faces.set(zorder=2 + layer, antialiased=alpha is None)
-        axes.add_collection(faces)
-
-
-def rendered(views: Sequence[Scenery]) -> list[Image] | None:
-    """Return the images (h, w, 3) by PyVista, or None if PyVista does not render."""
-    drawings = []
-    for view in views:
-        width, height = view.half
-        window = _PIXELS, max(int(_PIXELS * height / width), 1)
-        parts = tuple(
-            Polygons(part.points, part.faces, colour(name), view.opacity(name), feature_edges=True)
-            for name, part in view.parts.items()
-        )
-        drawings.append(Drawing(Camera(view.axes, view.middle, float(height), window), parts))
-    return render(drawings)

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.path import Path
 
 
-Marks = Sequence[tuple[str, Float]]
-"""Labels of gauges, and their start, middle and end, shape (3, d), mm."""
-
 CMAP = "viridis"  # of the contact pressure
 
 

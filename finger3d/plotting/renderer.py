@@ -1,7 +1,9 @@
-"""PyVista renderer of surfaces, lines and arrows, and the camera of the pictures of a solid.
+"""Renderer of surfaces, lines and arrows, and the camera of the pictures of a solid.
 
-VTK aborts its process if no OpenGL driver works. Therefore ``python -m finger3d.plotting.renderer IN OUT`` renders in
-a child process. The camera is an oblique parallel projection; the rendered window is cropped to what it shows.
+PyVista renders them. VTK aborts its process if no OpenGL driver works; therefore ``python -m
+finger3d.plotting.renderer IN OUT`` renders in a child process. Where that fails, or PyVista is not installed,
+matplotlib paints the same parts from back to front. The camera is an oblique parallel projection; the rendered window
+is cropped to what it shows.
 """
 
 from __future__ import annotations
@@ -15,18 +17,19 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finger3d._extras import available, require
+from finger3d._extras import available
 from finger3d._machine import child_environment
 from finger3d._types import Float, Int
-from finger3d.errors import MissingError
+from finger3d.plotting.layout import DPI, blank
 
 if TYPE_CHECKING:
     import pyvista as pv
+    from matplotlib.axes import Axes
 
 
 WINDOW = (1600, 1200)
@@ -58,10 +61,9 @@ def flat(points: Float) -> Float:
 def shaded(faces: Float, colours: ArrayLike, towards: Float) -> tuple[Float, Float]:
     """Return the polygons, of (m, k, 3), that face the viewer in a direction (3,), and their shaded RGB colours.
 
-    The light is above the viewer. matplotlib draws these where PyVista does not render.
+    The light is above the viewer.
     """
-    third = faces.shape[1] // 3
-    normal = np.cross(faces[:, third] - faces[:, 0], faces[:, 2 * third] - faces[:, 0])
+    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     seen = normal @ towards > 0.0
     brightness = 0.62 + 0.38 * np.clip(normal[seen] @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
@@ -131,6 +133,10 @@ class Camera:
     half_height: float
     window: tuple[int, int]
 
+    def flat(self, points: Float) -> Float:
+        """Project points, shape (..., 3), onto the picture plane, shape (..., 2), mm from the centre."""
+        return (points - self.middle) @ self.axes[:2].T
+
 
 @dataclass(frozen=True)
 class Polygons:
@@ -169,6 +175,24 @@ class Polygons:
             if edges.n_points:
                 plotter.add_mesh(edges, color="#333333", line_width=1.5)
 
+    def paint(self, axes: Axes, camera: Camera) -> None:
+        """Draw the polygons that face the viewer, far ones first."""
+        from matplotlib.collections import PolyCollection
+        from matplotlib.colors import to_rgb
+
+        colour = self.colour
+        colours = to_rgb(colour) if isinstance(colour, str) else colour[self.cells].mean(axis=1) / 255.0
+        faces, fill = shaded(self.points[self.cells], colours, camera.axes[2])
+        depth = faces.mean(axis=1) @ camera.axes[2]
+        far = np.argsort(depth, kind="stable")
+        # Edges in the colour of the face close fine seams; a transparent face would show them.
+        edges = fill[far] if self.opacity == 1.0 else "none"
+        seen = PolyCollection(
+            list(camera.flat(faces[far])), facecolors=fill[far], edgecolors=edges, lw=0.3, alpha=self.opacity
+        )
+        seen.set_zorder(float(depth.mean()) if len(depth) else 0.0)
+        axes.add_collection(seen)
+
 
 @dataclass(frozen=True)
 class Polylines:
@@ -187,6 +211,12 @@ class Polylines:
         plotter.add_mesh(
             pv.PolyData(points, lines=_padded(cells)), color=self.colour, line_width=self.width, opacity=self.opacity
         )
+
+    def paint(self, axes: Axes, camera: Camera) -> None:
+        """Draw the lines behind all polygons."""
+        from matplotlib.collections import LineCollection
+
+        axes.add_collection(LineCollection(list(camera.flat(self.points)), colors=self.colour, lw=0.8, zorder=-np.inf))
 
 
 @dataclass(frozen=True)
@@ -208,6 +238,13 @@ class Arrows:
             points.glyph(orient="vector", scale="vector", factor=1.0, geom=shape), color=self.colour, lighting=False
         )
 
+    def paint(self, axes: Axes, camera: Camera) -> None:
+        """Draw the arrows before all polygons."""
+        at, by = camera.flat(self.centres), self.vectors @ camera.axes[:2].T
+        arrows = axes.quiver(*at.T, *by.T, color=self.colour, pivot="mid", angles="xy", scale_units="xy", scale=1.0)
+        arrows.set(zorder=np.inf)
+        arrows.width = 0.002
+
 
 @dataclass(frozen=True)
 class Drawing:
@@ -227,67 +264,38 @@ FAILURES: list[str] = []
 """Reason of the first failure to render. Later calls do not try again, since a driver that crashed will crash again."""
 
 
-def render(drawings: Sequence[Drawing]) -> list[Image] | None:
-    """Render drawings in a child process; see `rendering`."""
-    with rendering(drawings) as images:
-        return images()
-
-
 @contextmanager
-def rendering(drawings: Sequence[Drawing]) -> Iterator[Callable[[], list[Image] | None]]:
+def rendering(drawings: Sequence[Drawing]) -> Iterator[Callable[[], list[Image]]]:
     """Render drawings in a child process, beside what else is done within the block; at its end the child ends.
 
-    The environment variable FINGER3D_RENDERER may ask for ``pyvista`` or ``matplotlib``.
+    With the environment variable FINGER3D_RENDERER=matplotlib PyVista is not tried.
 
     Yields
     ------
     function that waits for the images, (h, w, 3) arrays, and returns them
-        It returns None if PyVista is not installed or cannot render, or if matplotlib is asked for.
-
-    Raises
-    ------
-    MissingError
-        If PyVista is asked for and cannot render.
     """
-    wanted = os.environ.get("FINGER3D_RENDERER", "")
-    if wanted == "pyvista":
-        require("FINGER3D_RENDERER=pyvista", "pyvista")
-    if wanted == "matplotlib" or not available("pyvista"):
-        yield lambda: None
-        return
 
-    def failed() -> None:
-        if wanted == "pyvista":
-            raise MissingError(f"PyVista cannot render here: {FAILURES[0]}; unset FINGER3D_RENDERER to use matplotlib")
+    def painted() -> list[Image]:
+        return [_painted(drawing) for drawing in drawings]
 
-    if FAILURES:
-        yield failed
+    if os.environ.get("FINGER3D_RENDERER") == "matplotlib" or FAILURES or not available("pyvista"):
+        yield painted
         return
     with tempfile.TemporaryDirectory(prefix="finger3d-") as folder:
         source, target = Path(folder) / "drawings", Path(folder) / "images"
         source.write_bytes(pickle.dumps(list(drawings)))
 
-        def images() -> list[Image] | None:
+        def images() -> list[Image]:
             why = outcome()
             if why is None and target.exists():
                 found: list[Image] = pickle.loads(target.read_bytes())
                 return found
             FAILURES.append(why or "it wrote no picture")
-            failed()
-            return None
+            return painted()
 
         command = [sys.executable, "-P", "-m", "finger3d.plotting.renderer", str(source), str(target)]
         with running_child(command) as outcome:
             yield images
-
-
-def run_child(command: list[str], window: bool = False) -> str | None:
-    """Run a rendering command in a child process; return why it failed, in one line, and None if it succeeded.
-
-    For the parameters see `running_child`.
-    """
-    with running_child(command, window) as outcome:
-        return outcome()
 
 
 @contextmanager
@@ -305,9 +313,7 @@ def running_child(command: list[str], window: bool = False) -> Iterator[Callable
     """
     # EGL needs no display; choosing it avoids VTK's warning about a missing X server.
     egl = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
-    hidden = egl if sys.platform.startswith("linux") and not window else {}
-    env = {**hidden, **child_environment()}
-    limit = None if window else _TIME_LIMIT_S
+    env = {**(egl if sys.platform.startswith("linux") and not window else {}), **child_environment()}
     try:
         child = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     except OSError as error:
@@ -317,7 +323,7 @@ def running_child(command: list[str], window: bool = False) -> Iterator[Callable
 
     def outcome() -> str | None:
         try:
-            _, said = child.communicate(timeout=limit)
+            _, said = child.communicate(timeout=None if window else _TIME_LIMIT_S)
         except subprocess.TimeoutExpired as error:
             return str(error)
         code = child.returncode
@@ -352,6 +358,24 @@ def _image(drawing: Drawing) -> Image:
     image: Image = np.asarray(plotter.screenshot(return_img=True))[..., :3].copy()
     plotter.close()
     return image
+
+
+def _painted(drawing: Drawing) -> Image:
+    """Paint one drawing by matplotlib, far parts first."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    camera, (wide, high) = drawing.camera, drawing.camera.window
+    figure = blank(wide / DPI, high / DPI)
+    figure.set_dpi(DPI)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    for part in drawing.parts:
+        part.paint(axes, camera)
+    half = camera.half_height * np.array([-1.0, 1.0])
+    axes.set(xlim=half * wide / high, ylim=half)
+    axes.set_axis_off()
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def _padded(cells: Int) -> Int:

@@ -1,11 +1,11 @@
-"""Surface of a deformed solid, rendered by PyVista or drawn by matplotlib."""
+"""Surface of a deformed solid, and its picture."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,8 @@ from finger3d.plotting.renderer import (
     framed,
     half_height,
     rendering,
-    shaded,
     unshared,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 BODY, LINE, FEATURE, REST, OBJECT = "#d9d6cf", "#8d8a84", "#444444", "#777777", "#222222"
 COLOURS = {OPEN: "#c4c4c4", STICK: "#1f3f77", SLIP: "#f28e2b"}
@@ -57,7 +52,7 @@ _SIDES = np.array([[0, 3, 1], [1, 4, 2], [2, 5, 0]])
 
 @dataclass(frozen=True, kw_only=True)
 class DeformedFinger:
-    """A finger at one step of a press.
+    """A finger at one increment of a press.
 
     Attributes
     ----------
@@ -268,63 +263,7 @@ def _arrows(points: Float, shear: Float, status: Int) -> tuple[Int, Float, float
     return chosen, shear[chosen] / largest, largest
 
 
-# --- matplotlib ---------------------------------------------------------------------------------------------------
-
-
-_AT_CORNER = 1e-9
-"""Distance, over the solid's size, within which an arrow is at a corner of a triangle."""
-
-
-def draw_solid(axes: Axes, skin: Skin, colours: Float, arrows: bool) -> None:
-    """Draw a solid with matplotlib, far faces first.
-
-    Parameters
-    ----------
-    axes : axes of the picture plane
-    skin : solid to draw
-    colours : (t, 3, 3) RGB colours at the corners of the contact triangles
-    arrows : whether to draw friction arrows
-    """
-    from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.colors import to_rgb
-
-    body = shaded(skin.body[:, _RING], to_rgb(BODY), AXES[2])
-    contact = shaded(skin.contact, colours.mean(axis=1), AXES[2])
-    depth = np.concatenate([faces.mean(axis=1) @ AXES[2] for faces, _ in (body, contact)])
-    polygons = [*flat(body[0]), *flat(contact[0])]
-    fill = np.concatenate([body[1], contact[1]])
-    # Mesh lines are drawn on the body only; on the contact surface, edges in the colour of the face close white seams.
-    edge = np.concatenate([np.tile(to_rgb(LINE), (len(body[1]), 1)), contact[1]])
-    order = np.argsort(depth, kind="stable")
-    axes.add_collection(LineCollection(list(flat(skin.rest)), colors=REST, lw=0.8, linestyles="dotted", zorder=1))
-    axes.add_collection(
-        PolyCollection([polygons[i] for i in order], facecolors=fill[order], edgecolors=edge[order], lw=0.25, zorder=2)
-    )
-    if len(skin.thing):
-        seen, tint = shaded(skin.thing, to_rgb(OBJECT_TINT), AXES[2])
-        axes.add_collection(PolyCollection(list(flat(seen)), facecolors=tint, alpha=OBJECT_OPACITY, lw=0.0, zorder=3))
-    if arrows and len(skin.arrow) and len(contact[0]):
-        from scipy.spatial import cKDTree
-
-        is_seen = cKDTree(contact[0].reshape(-1, 3)).query(skin.arrow_at)[0] <= _AT_CORNER * skin.size
-        for state, colour in ARROWS.items():
-            on = (skin.arrow_status == state) & is_seen
-            at, by = flat(skin.arrow_at[on]), flat(skin.arrow_length * skin.arrow[on])
-            axes.quiver(
-                *at.T,
-                *by.T,
-                color=colour,
-                pivot="mid",
-                angles="xy",
-                scale_units="xy",
-                scale=1.0,
-                width=0.002,
-                zorder=4,
-            )
-    axes.autoscale_view()
-
-
-# --- PyVista ------------------------------------------------------------------------------------------------------
+# --- its picture --------------------------------------------------------------------------------------------------
 
 Extent = tuple[float, float, float, float]
 """Left, right, lower and upper edge of a picture in the picture plane of `flat`, mm."""
@@ -334,45 +273,33 @@ Rendered: TypeAlias = tuple[list[Image], Extent]
 
 
 @contextmanager
-def rendering_solids(
-    pictures: Sequence[tuple[Skin, Float, bool]], window: tuple[int, int] = WINDOW
-) -> Iterator[Callable[[], Rendered | None]]:
-    """Render solids with one camera, beside what else is done within the block.
+def rendering_solid(skin: Skin, *colours: Float) -> Iterator[Callable[[], Rendered]]:
+    """Render a solid once for each of some colours, beside what else is done within the block.
 
     Parameters
     ----------
-    pictures : sequence of (skin, colours, arrows)
-        The solid, RGB colours (t, 3, 3) at the corners of the contact triangles, and whether to draw friction arrows.
-    window : width and height, in pixels
+    colours : (t, 3, 3) RGB colours at the corners of the contact triangles; the last picture has friction arrows
 
     Yields
     ------
-    function that waits for the pictures, and returns them; None if PyVista does not render
+    function that waits for the pictures, and returns them
     """
-    skins = [skin for skin, _, _ in pictures]
-    low, size = seen_box(skins)
-    middle = np.append(low + 0.5 * size, skins[0].points.mean(axis=0) @ AXES[2]) @ AXES
-    camera = Camera(AXES, middle, half_height(size), window)
+    seen = flat(skin.points)
+    low, size = seen.min(axis=0), np.ptp(seen, axis=0)
+    middle = np.append(low + 0.5 * size, skin.points.mean(axis=0) @ AXES[2]) @ AXES
+    camera = Camera(AXES, middle, half_height(size), WINDOW)
 
-    def rendered() -> Rendered | None:
-        found = images()
-        if found is None:
-            return None
-        cropped, extent = framed(np.array(found), (middle, size))
+    def rendered() -> Rendered:
+        cropped, extent = framed(np.array(images()), (middle, size))
         return list(cropped), extent
 
-    with rendering([Drawing(camera, _parts(*picture)) for picture in pictures]) as images:
+    parts = [_parts(skin, own, arrows=own is colours[-1]) for own in colours]
+    with rendering([Drawing(camera, own) for own in parts]) as images:
         yield rendered
 
 
-def seen_box(skins: Sequence[Skin]) -> tuple[Float, Float]:
-    """Return the lower left corner (2,) of the box around all skins in the picture plane, and its size (2,), mm."""
-    seen = np.concatenate([flat(skin.points) for skin in skins])
-    return seen.min(axis=0), np.ptp(seen, axis=0)
-
-
 def _parts(skin: Skin, colours: Float, arrows: bool) -> tuple[Polygons | Polylines | Arrows, ...]:
-    """Return what the renderer draws of a solid; for the parameters see `rendering_solids`."""
+    """Return what the renderer draws of a solid; for the parameters see `rendering_solid`."""
     surfaces = (
         (skin.body[:, TRIANGLES].reshape(-1, 3, 3), BODY),
         (skin.contact, np.round(255.0 * colours.reshape(-1, 3)).astype(np.uint8)),

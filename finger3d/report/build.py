@@ -48,6 +48,11 @@ class HeadlineRow:
     unit: str = ""
     error: float | None = None
 
+    @property
+    def text(self) -> str:
+        """Value, error and unit, as a terminal shows them."""
+        return f"{number(self.value, self.error)} {self.unit}".rstrip().replace("±", "+-").replace("²", "2")
+
 
 @dataclass(frozen=True)
 class Table:

@@ -9,13 +9,13 @@ from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
 
-def calibrate_page(folder: str | Path) -> Path:
-    """Write report.html of a calibration from the files in its folder.
+def calibrate_page(folder: str | Path) -> Page:
+    """Return the page of a calibration, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If calibration.json cannot be read or the page cannot be written.
+        If calibration.json cannot be read.
     """
     folder = Path(folder)
     data = read_json(folder / "calibration.json")
@@ -50,7 +50,7 @@ def calibrate_page(folder: str | Path) -> Path:
     given = " ".join(f"--strain {name}={r['curve'][best]:.5g}" for name, r in readings.items())
     failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
     note = data["about"].get("mesh", {}).get("note")
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: {', '.join(readings)} against friction",
         headline,
         [
@@ -59,13 +59,10 @@ def calibrate_page(folder: str | Path) -> Path:
             PageSection("Scene", how_modelled(data, folder)),
             PageSection("Use it", [Code(f"finger3d estimate {folder}/calibration.json {given}")]),
         ],
-        [
-            Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance"),
-        ],
+        [Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance")],
         command="calibrate",
         outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
         good=not failed,
         notes=[*failed, *([note] if note else [])],
         versions=data["about"].get("versions"),
     )
-    return page.write(folder)

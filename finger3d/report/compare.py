@@ -11,13 +11,13 @@ from finger3d.results.summary import read_json, title_of
 _FORCE = "force_N_per_mm"
 
 
-def compare_page(folder: str | Path) -> Path:
-    """Write report.html of a comparison from the files in its folder.
+def compare_page(folder: str | Path) -> Page:
+    """Return the page of a comparison, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If compare.json cannot be read or the page cannot be written.
+        If compare.json cannot be read.
     """
     folder = Path(folder)
     data = read_json(folder / "compare.json")
@@ -46,7 +46,7 @@ def compare_page(folder: str | Path) -> Path:
         "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
         "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
     )
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: 2D against 3D",
         headline,
         [
@@ -60,7 +60,6 @@ def compare_page(folder: str | Path) -> Path:
         good=data["outcome"] == "converged",
         versions=data["versions"],
     )
-    return page.write(folder)
 
 
 _BARS = (

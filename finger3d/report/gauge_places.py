@@ -9,13 +9,13 @@ from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
 
-def gauge_places_page(folder: str | Path) -> Path:
-    """Write report.html of placed gauges from the files in its folder.
+def gauge_places_page(folder: str | Path) -> Page:
+    """Return the page of placed gauges, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If gauges.json cannot be read or the page cannot be written.
+        If gauges.json cannot be read.
     """
     folder = Path(folder)
     data = read_json(folder / "gauges.json")
@@ -47,7 +47,7 @@ def gauge_places_page(folder: str | Path) -> Path:
     )
     spread = Table(("mu", "sd of mu"), list(zip(data["mu"], data["mu_sd"], strict=True)))
     best = folder / "best.toml"
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: places of {len(gauges)} gauge{'s' if len(gauges) > 1 else ''}",
         headline,
         [
@@ -59,4 +59,3 @@ def gauge_places_page(folder: str | Path) -> Path:
         [Figure("map.png", "Mean standard deviation of mu with a gauge at each place, in its best direction")],
         command="optimise",
     )
-    return page.write(folder)

@@ -9,13 +9,13 @@ from finger3d.report.scene import how_modelled
 from finger3d.results.summary import read_json, title_of
 
 
-def identify_page(folder: str | Path) -> Path:
-    """Write report.html of an identification from the files in its folder.
+def identify_page(folder: str | Path) -> Page:
+    """Return the page of an identification, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If identify.json or task.json cannot be read or the page cannot be written.
+        If identify.json or task.json cannot be read.
     """
     folder = Path(folder)
     data, task = read_json(folder / "identify.json"), read_json(folder / "task.json")
@@ -41,7 +41,7 @@ def identify_page(folder: str | Path) -> Path:
     )
     told = f"Standard deviations are {data['deviations']}."
     scene = folder / "identified.toml"
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: values from {Path(data['measured']).name}",
         headline,
         [
@@ -54,4 +54,3 @@ def identify_page(folder: str | Path) -> Path:
         command="identify",
         notes=list(data["notes"]),
     )
-    return page.write(folder)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table
@@ -18,13 +17,13 @@ _SENSITIVITY = (
 )
 
 
-def optimise_page(folder: str | Path) -> Path:
-    """Write report.html of a design search from the files in its folder.
+def optimise_page(folder: str | Path) -> Page:
+    """Return the page of a design search, from the files in its folder.
 
     Raises
     ------
     Finger3dError
-        If design.json or search.json cannot be read or the page cannot be written.
+        If design.json or search.json cannot be read.
     """
     folder = Path(folder)
     found, search = read_json(folder / "design.json"), read_json(folder / "search.json")
@@ -39,8 +38,10 @@ def optimise_page(folder: str | Path) -> Path:
         *(HeadlineRow(key, value) for key, value in found["values"].items()),
         HeadlineRow("designs evaluated", str(len(rows))),
         HeadlineRow("bodies condensed", str(found["bodies"])),
-        *_increment_error(increments.get("steps"), increments.get("strain_error")),
     ]
+    if steps := increments.get("steps"):
+        name = f"error of the strain with {', '.join(map(str, steps))} increments"
+        headline.append(HeadlineRow(name, f"{increments.get('strain_error') or math.nan:.2g}"))
     free = [
         (key, *bounds[key], found["start_values"][key], value, _at_a_bound(value, *bounds[key]))
         for key, value in found["values"].items()
@@ -51,7 +52,7 @@ def optimise_page(folder: str | Path) -> Path:
     failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
     explanation = [_SENSITIVITY] if objective == "sensitivity" else []
     best_scene = folder / "best.toml"
-    page = Page(
+    return Page(
         f"{title_of(search['scene'])}: design for {objective}",
         headline,
         [
@@ -70,15 +71,6 @@ def optimise_page(folder: str | Path) -> Path:
         outcome=f"{len(good)} of {len(rows)} designs have a number",
         good=bool(good),
     )
-    return page.write(folder)
-
-
-def _increment_error(steps: Sequence[int] | None, error: float | None) -> list[HeadlineRow]:
-    """Return the error of strain for the increments of the best design, if it is known."""
-    if steps is None:
-        return []
-    name = f"error of the strain with {', '.join(map(str, steps))} increments"
-    return [HeadlineRow(name, f"{error or math.nan:.2g}")]
 
 
 def _at_a_bound(value: float, low: float, high: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +11,14 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.mechanics.readings.columns import AREAS, MAIN, MEASURED, SLIP
-from finger3d.mechanics.readings.quantities import OF_INCREMENT, Kind, Quantity, named
-from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Part, Table
+from finger3d.mechanics.readings.columns import MEASURED
+from finger3d.mechanics.readings.quantities import OF_INCREMENT
+from finger3d.report.build import Figure, Page, PageSection, Part, Table
+from finger3d.report.press_rows import headline, spelt
 from finger3d.report.scene import how_modelled
 from finger3d.report.view3d import view_of
 from finger3d.results.states import States, load_states
 from finger3d.results.summary import PressStep, gauges_of, grip_rows, read_json, steps_of, title_of
-
-_HEADLINE = named(*MAIN, "tangential_force_x_N", *AREAS, *SLIP, "external_work_mJ", "dissipation_mJ")
 
 _PICTURES = {
     "finger.png": "Deformed finger to scale: contact pressure, and stick and slip zones",
@@ -40,15 +39,15 @@ _OF_GRIP = (
 _ROUND_OFF = 1e-9  # magnitude of round-off, relative to the force that a number is compared with
 
 
-def press_page(folder: str | Path) -> Path:
-    """Write report.html of a press from the files in its folder.
+def press_page(folder: str | Path) -> Page:
+    """Return the page of a press, from the files in its folder.
 
     The file summary.json is required. The 3D view of a solid needs steps.npz; scene.toml and pictures are optional.
 
     Raises
     ------
     Finger3dError
-        If summary.json cannot be read or the page cannot be written.
+        If summary.json cannot be read.
     """
     folder = Path(folder)
     summary = read_json(folder / "summary.json")
@@ -71,9 +70,9 @@ def press_page(folder: str | Path) -> Path:
         *([_steps(good)] if good else []),
         PageSection("Mesh and cost", [_mesh(summary["mesh"]), _cost(summary["cost"])]),
     ]
-    page = Page(
+    return Page(
         title_of(summary["scene"]),
-        headline(good[-1], bars.totals(), bars.modulus) if good else (),
+        headline(good[-1], bars) if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
         view_of(states, gauges_of(summary["scene"])) if states else None,
@@ -83,51 +82,12 @@ def press_page(folder: str | Path) -> Path:
         notes=[*summary["warnings"], *summary["advice"], *([_remark(bars)] if bars.discretisation else [])],
         versions=summary["versions"],
     )
-    return page.write(folder)
 
 
 def _remark(bars: ErrorBars) -> str:
     """Return what the number after ± is."""
     covered = bars.covered.replace("steps", "increments")
     return f"The number after ± is the {covered}; it does not include the error of the model."
-
-
-def headline(
-    step: PressStep, errors: Mapping[str, float], by_modulus: Mapping[str, float] | None = None
-) -> list[HeadlineRow]:
-    """Return the main numbers of a step with their errors, without a tangential force of the size of round-off.
-
-    Parameters
-    ----------
-    step : the step
-    errors : key of a number -> its error, in the unit of the number
-    by_modulus : key of a number -> its error due to the spread of the modulus, in the unit of the number
-    """
-    by_modulus = by_modulus or {}
-
-    def row(one: Quantity, value: float | None) -> HeadlineRow:
-        error, spread = errors.get(one.name), by_modulus.get(one.name)
-        unit = _spelt(one.unit)
-        if spread is not None:
-            unit = f"{unit}, ± {one.factor * spread:.2g} by the modulus".removeprefix(", ")
-        shown = "unknown" if value is None else one.factor * value
-        title = f"{one.title} {one.where}".rstrip()
-        return HeadlineRow(title, shown, unit, None if error is None else one.factor * error)
-
-    numbers = {one: getattr(step, one.name) for one in (*named("depth_mm"), *_HEADLINE)}
-    least = _ROUND_OFF * max(step.friction_sum_N, 1e-300)
-    rows = [
-        row(one, value)
-        for one, value in numbers.items()
-        if (one.kind is not Kind.DEPTH or one.name in errors) and (one.kind is not Kind.FORCE or abs(value) > least)
-    ]
-    read = step.readings.items()  # a displacement that is zero by symmetry is left out
-    return rows + [row(Quantity.of(c), value) for c, value in read if value != 0.0 or c.kind != "marker"]
-
-
-def _spelt(text: str) -> str:
-    """Return a text with units as they are printed."""
-    return text.replace("mm2", "mm²").replace("Nmm", "N mm")
 
 
 def _error_bars(bars: ErrorBars) -> PageSection:
@@ -222,7 +182,7 @@ def _steps(good: Sequence[PressStep]) -> PageSection:
     columns = [column for column in good[-1].readings if not column.axis]
     rows = [[*(getattr(s, one.name) for one in shown), *(s.readings.get(c) for c in columns)] for s in good]
     names = [f"{MEASURED[c.kind]} {c.sensor}{c.unit and f' ({c.unit})'}" for c in columns]
-    table = Table([*(_spelt(one.label) for one in shown), *names], rows)
+    table = Table([*(spelt(one.label) for one in shown), *names], rows)
     return PageSection(
         "Every increment", ["The file history.csv has these numbers, and more, with all digits.", table], folded=True
     )

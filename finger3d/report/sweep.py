@@ -17,37 +17,34 @@ _MOST_KEYS, _MOST_GAUGES = 3, 2  # varied keys and gauges with a chart
 _MOST_LINES = 8  # of a chart
 
 
-def sweep_page(folder: str | Path) -> Path:
-    """Write report.html of a sweep from the files in its folder; a long table is cut.
+def sweep_page(folder: str | Path) -> Page:
+    """Return the page of a sweep, from the files in its folder; a long table is cut.
 
     Raises
     ------
     Finger3dError
-        If sweep.json cannot be read or the page cannot be written.
+        If sweep.json cannot be read.
     """
     folder = Path(folder)
     data = read_json(folder / "sweep.json")
     rows = read_rows(folder / "results.csv")
     failed = [row for row in rows if row["outcome"] != "converged"]
     forces = [float(row["normal_force_N"]) for row in rows if row["outcome"] == "converged"]
-    names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
     strains = strains_of(data["scene"])
-    names += [*(column.key for column in strains if rows and column.key in rows[0]), "outcome"]
     headline = [
         HeadlineRow("points", f"{len(rows)} of {data['points']}"),
         HeadlineRow("bodies", str(len(data["bodies"]))),
     ]
     if forces:
         headline.append(HeadlineRow("normal force", f"{min(forces):.4g} to {max(forces):.4g}", "N"))
-    shown = [tuple(_number(row.get(name, "")) for name in names) for row in rows[:_MOST_ROWS]]
     more = [f"The first {_MOST_ROWS} of {len(rows)} points; all are in results.csv."] if len(rows) > _MOST_ROWS else []
     is_list = data.get("list", False)
     varied = [(key, _values(values, is_list)) for key, values in data["vary"].items()]
-    page = Page(
+    return Page(
         f"{title_of(data['scene'])}: sweep over {', '.join(data['vary'])}",
         headline,
         [
-            PageSection("Points", [*more, Table(tuple(names), shown)]),
+            PageSection("Points", [*more, points_table(folder, _MOST_ROWS)]),
             PageSection("Varied", [Table(("key", "values"), varied)]),
             PageSection("Scene", [Code(json.dumps(data["scene"], indent=2), "scene before the variation")]),
         ],
@@ -57,7 +54,14 @@ def sweep_page(folder: str | Path) -> Path:
         good=len(rows) == data["points"] and not failed,
         notes=[f"point {row['point']}: {row['outcome']}" for row in failed[:_MOST_FAILURES]],
     )
-    return page.write(folder)
+
+
+def points_table(folder: str | Path, most: int) -> Table:
+    """Return the first points: varied keys, forces, half extents of contact and stick, strains, and the outcome."""
+    data, rows = read_json(Path(folder) / "sweep.json"), read_rows(Path(folder) / "results.csv")
+    names = [*data["vary"], "normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm"]
+    names += [*(column.key for column in strains_of(data["scene"]) if rows and column.key in rows[0]), "outcome"]
+    return Table(names, [tuple(_number(row.get(name, "")) for name in names) for row in rows[:most]])
 
 
 def _values(texts: Sequence[str], is_list: bool) -> str:

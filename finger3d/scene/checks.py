@@ -213,11 +213,7 @@ def _tangential(place: Place, leg: LegTable, before: LegTable | None, solid: boo
 
 def _target(leg: LegTable) -> tuple[float | None, ...]:
     slides, turns = (leg.slide_x_mm, leg.slide_z_mm), (leg.turn_x_deg, leg.turn_y_deg, leg.turn_z_deg)
-    return leg.force_N, leg.depth_mm, *_sideways(leg), *slides, *turns
-
-
-def _sideways(leg: LegTable) -> tuple[float | None, ...]:
-    return tuple(getattr(leg, force) for force, _, _ in _FREE)
+    return leg.force_N, leg.depth_mm, *(getattr(leg, force) for force, _, _ in _FREE), *slides, *turns
 
 
 def _sizes(mesh: MeshTable, design: Design, solid: bool) -> list[str]:

@@ -6,6 +6,8 @@ keys, such as a depth below the finger's height, are checked when the scene is l
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +19,6 @@ from finger3d.materials.elastic import MODULUS_KEYS
 from finger3d.meshing.given.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
-from finger3d.scene.reference import descriptions
 from finger3d.scene.tables import (
     AutoTable,
     FileTable,
@@ -29,6 +30,8 @@ from finger3d.scene.tables import (
     TomlTable,
     table_of,
 )
+
+_SAID = re.compile(r"^    (\w+(?:, \w+)*) : (.+(?:\n     +\S.*)*)", flags=re.MULTILINE)
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -70,6 +73,16 @@ def schema() -> Tree:
     for name, description in descriptions(SceneTable).items():
         keys[name] |= {"description": description}
     return {"$schema": DIALECT, "title": "A scene of finger3d"} | root
+
+
+def descriptions(documented: type) -> dict[str, str]:
+    """Return the description of each key in the docstrings of a class and its bases."""
+    texts: dict[str, str] = {}
+    for base in reversed(documented.__mro__):
+        for names, text in _SAID.findall(base.__doc__ or ""):
+            texts |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+    missing = [f.name for f in dataclasses.fields(documented)] if dataclasses.is_dataclass(documented) else []
+    return dict.fromkeys(missing, "") | texts
 
 
 def _named(key: str, name: str, record: type) -> Tree:

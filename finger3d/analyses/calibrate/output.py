@@ -58,4 +58,4 @@ def write_curve(folder: Path, calibration: Calibration) -> None:
     write_table(calibration, folder / "calibration.csv")
     save(calibration, folder / "calibration.json")
     draw(folder / "calibration.png", calibration)
-    calibrate_page(folder)
+    calibrate_page(folder).write(folder)

@@ -130,7 +130,7 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
     from finger3d.report.compare import compare_page
 
     draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
-    compare_page(folder)
+    compare_page(folder).write(folder)
     return comparison
 
 

@@ -378,4 +378,4 @@ def _write(folder: Path, found: Identification) -> None:
     curve = {name: values[part] for name, values in found.curve.items()}
     panels = [Panel(n, values, found.stds[n], found.simulated[n], curve[n]) for n, values in data.columns.items()]
     draw(folder / "identify.png", data.index, data.at + float(offset), curve[data.index], panels)
-    identify_page(folder)
+    identify_page(folder).write(folder)

@@ -197,4 +197,4 @@ def _write(folder: Path, result: GaugePlaces, model: Model) -> None:
     ]
     draw_places(folder / "map.png", result.mus, result.found.mu_sd, shown, model.design)
     write_json(folder / "gauges.json", result.as_dict())
-    gauge_places_page(folder)
+    gauge_places_page(folder).write(folder)

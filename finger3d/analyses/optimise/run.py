@@ -143,7 +143,7 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
         first.values,
         "sensitivity",
     )
-    optimise_page(folder)
+    optimise_page(folder).write(folder)
     return OptimisationResult(
         keys=tuple(f.key for f in problem.free),
         best=best,

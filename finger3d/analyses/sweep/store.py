@@ -12,6 +12,7 @@ from typing import cast
 
 from finger3d import _extras
 from finger3d._cost import duration
+from finger3d._types import Tree
 from finger3d.analyses.sweep.labels import FILE, PARTS, SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
@@ -131,6 +132,18 @@ class ResultStore:
         for name in (*names, *_LAST):
             found[name] = [str(row[name]) for row in rows] if name in _TEXTS else [number_in(row, name) for row in rows]
         return found
+
+    def as_dict(self) -> Tree:
+        """Return the folder, the numbers of points and bodies, and the rows of results.csv."""
+        columns = self.columns()
+        return {
+            "results": self.folder,
+            "points": len(self.sweep.points),
+            "kept": len(self.rows),
+            "failed": sum(outcome != "converged" for outcome in columns["outcome"]),
+            "bodies": len(self.sweep.bodies),
+            "rows": [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)],
+        }
 
     def said(self) -> str:
         """Return how many points are kept, and where."""

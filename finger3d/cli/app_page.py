@@ -6,7 +6,9 @@ import webbrowser
 from pathlib import Path
 
 from finger3d._extras import require
-from finger3d.cli.common import Interrupted, Set, app, job, load
+from finger3d.cli.common import Interrupted, app, job
+from finger3d.cli.folders import load
+from finger3d.cli.options import Set
 
 
 @app.command(name="app")
