@@ -19,31 +19,24 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from finger3d._machine import cores
 from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.files import read_surface
-from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.meshing.generate import mesh_solid
-from finger3d.objects import MeshObject, Plane, RigidObject, Sphere
 from finger3d.progress import Progress
 
-from ._press import changed, converged, empty_mesh_cache, fig9_finger
+from ._press import changed, converged, fig9_finger
 from ._rows import Row, at_most
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
@@ -213,14 +206,6 @@ def _five_against_one(keys: Sequence[str], repeats: int) -> float:
         return median(five / one for one, five in zip(ones, fives, strict=True))
 
 
-def _warm_cache(size: float) -> tuple[float, float]:
-    """Seconds of a mesh by pytetwild, made and read again, in a cache of its own."""
-    model = fig9(size, mesher="ftetwild")
-    given = model.design, model.mesh, model.first_contact.contact_box, symmetry(model)
-    with empty_mesh_cache():
-        return _seconds(lambda: mesh_solid(*given)), _seconds(lambda: mesh_solid(*given))
-
-
 def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     """Yield the rows of every stage; quick: on a small mesh, where they mean nothing, and without pytetwild."""
     repeats = 1 if quick else 3
@@ -235,17 +220,8 @@ def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     yield list(_sensitivity(quick))
     report.stage("sweeps of five values of mu")
     yield _sweeps(quick)
-    if not quick:
-        report.stage("the cache of meshes")
-        made, read = _warm_cache(2.0)
-        what = f"pytetwild on a warm cache against a cold one ({made:.1f} s)"
-        yield [_row(what, 0.02, read / made, "0: only reading the file is left")]
-    report.stage("objects that are not flat")
-    yield _objects(5.0 if quick else 2.5, repeats)
     report.stage("large deformation")
     yield _large_deformation(QUICK if quick else MIDDLE)
-    report.stage("CalculiX")
-    yield _beside_calculix(quick)
 
 
 def _stages(sizes: Sequence[float], quick: bool) -> list[Row]:
@@ -279,29 +255,6 @@ def _sweeps(quick: bool) -> list[Row]:
     ]
 
 
-def _objects(size: float, repeats: int) -> list[Row]:
-    """Return time of whole presses on a ball and on a gear wheel over one on a plane, on one mesh; and of distances."""
-    gear = MeshObject(surface=read_surface(str(Path(__file__).parents[1] / "geometries" / "gear.stl"), 1.0))
-    objects: dict[str, RigidObject] = {"a plane": Plane(), "a ball": Sphere(radius_mm=30.0), "a gear wheel": gear}
-    model = replace(fig9(size), mesh=MeshOptions(size, size, "swept"), legs=(Leg(4.0, steps=10),))
-
-    def seconds(obj: RigidObject) -> float:
-        return _seconds(lambda: converged(build(replace(model, object=obj, symmetry=()))))
-
-    took = {name: min(seconds(obj) for _ in range(repeats)) for name, obj in objects.items()}
-    rows = [
-        _row(f"a press on {name} against one on a plane, edges of {size:g} mm", 1.5, took[name] / took["a plane"])
-        for name in list(objects)[1:]
-    ]
-    points = np.random.default_rng(0).normal(size=(5000, 3))
-    points *= np.linspace(9.5, 10.5, 5000)[:, None] / np.linalg.norm(points, axis=1)[:, None]
-    ball = trimesh.creation.icosphere(subdivisions=7, radius=10.0)
-    surface = Triangles(np.array(ball.vertices), np.array(ball.faces))
-    surface.signed_distance(points[:10])
-    what = f"distances of 5000 points from {len(ball.faces)} triangles, s"
-    return [*rows, _row(what, 0.5, _seconds(lambda: surface.signed_distance(points)))]
-
-
 def _large_deformation(size: float) -> list[Row]:
     """Return factorisations and time of a press at large deformation, of many presses over one, and of a section."""
     model = LargeDeformation().apply(fig9(size))
@@ -319,21 +272,6 @@ def _large_deformation(size: float) -> list[Row]:
     section = build(LargeDeformation().apply(fig9(1.0, "plane-strain")))
     what = f"large deformation of the section, {section.body.stiffness.upper.shape[0]} unknowns, 10 increments, s"
     return [*rows, _row(what, 1.0, _seconds(lambda: converged(section)))]
-
-
-def _beside_calculix(quick: bool) -> list[Row]:
-    """Return time of CalculiX over finger3d's on the finest meshes of beside_calculix.py; nothing without ccx."""
-    from validation.beside_calculix import cases, measured, times
-
-    from ._ccx import program
-
-    if program() is None:
-        print("ccx is not installed (apt install calculix-ccx): no comparison with CalculiX", file=sys.stderr)
-        return []
-    finest = list({case.body: case for case in cases(quick)}.values())
-    table = measured(finest)
-    rows = [row for ours, theirs in zip(table[::2], table[1::2], strict=True) for row in times(ours, theirs)]
-    return [replace(row, reason=f"{row.reason}; load {os.getloadavg()[0]:.1f}", kind="statement") for row in rows]
 
 
 def _ratios(best: dict[str, float]) -> list[Row]:

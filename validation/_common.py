@@ -176,6 +176,11 @@ def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
     return float(np.sqrt(np.sum(det * w * (value - exact(at.reshape(-1, mesh.dim)).reshape(value.shape)) ** 2)))
 
 
+def increment(start: ContactState, free: Float, compliance: Float, mu: float, scale: float) -> ContactSolution:
+    """Solve one increment under Coulomb friction; `scale` (mm) is the length of the criterion of convergence."""
+    return solve_increment(ContactProblem.of(start, free, compliance, ContactLaw(Coulomb(mu)), scale))
+
+
 @dataclass(frozen=True)
 class Body:
     """A body condensed to the contact points of one side: compliance (c, d, c, d) mm/N in the vertical frame."""
@@ -191,9 +196,12 @@ class Body:
         free = np.zeros((len(gap), d))
         free[:, 0] = gap
         start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
-        return solve_increment(
-            ContactProblem.of(start, free, self.compliance, ContactLaw(Coulomb(mu)), scale or float(-gap.min()))
-        )
+        return increment(start, free, self.compliance, mu, scale or float(-gap.min()))
+
+    def normal_force(self, gap: Float) -> Float:
+        """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction; NaN if that does not settle."""
+        found = self.press(gap)
+        return found.state.force[:, 0] if found.outcome.ok else np.full(len(gap), np.nan)
 
     def gap(self, height: Field) -> Float:
         """Weighted mean (c,) of a height above the surface, given at points (q, d)."""

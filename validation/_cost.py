@@ -9,22 +9,22 @@ from __future__ import annotations
 import math
 import resource
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.assembly import Stiffness, stiffness
-from finger3d.fem.laws.material import Elasticity, Isotropic
+from finger3d.fem.assembly import stiffness
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import BoundarySurface, local_rows
+from finger3d.fem.surface.traces import local_rows
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.build import candidate_points, contact_rows
+from finger3d.mechanics.discretise.build import candidate_points, contact_rows, mesh_part
 from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
@@ -32,9 +32,6 @@ from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symme
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.report import MeshReport
-from finger3d.meshing.structured.swept import mesh_section
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
@@ -71,6 +68,11 @@ class Case:
     solver: str = "pardiso"
     way: str = "condensed"
     nu: float | None = None
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Case:
+        """From a dict with lists for tuples, as JSON has it."""
+        return cls(**{**given, "counts": tuple(given["counts"])})
 
 
 def processor_s() -> float:
@@ -111,84 +113,53 @@ def straight(mesh: Mesh) -> Mesh:
     )
 
 
-@dataclass(frozen=True)
-class Parts:
-    """An assembled body, not yet condensed: what `build` has in hand before it condenses."""
-
-    model: Model
-    mesh: Mesh
-    report: MeshReport
-    elastic: Elasticity
-    stiffness: Stiffness
-    surface: BoundarySurface
-    active_dofs: NDArray[np.int64]
-    rows: sp.csr_matrix
-    gauges: sp.csr_matrix
-    fixed_dofs: NDArray[np.int64]
-    first_contact_mm: float
-    axes: tuple[str, ...]
-    seconds: dict[str, float] = field(default_factory=dict)
-    processor_seconds: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def thickness(self) -> float:
-        """Of a section, mm; 1 for a solid."""
-        return 1.0 if self.mesh.dim == 3 else self.model.design.width_mm
-
-
-def assembled(model: Model, element: str) -> Parts:
-    """Mesh and assemble a model with elements of a kind."""
+def assembled(case: Case) -> tuple[Problem, dict[str, float]]:
+    """The problem of a case, meshed and assembled with its elements but not condensed; and processor time (s)."""
+    model = model_of(case)
     way, axes = model.first_contact, symmetry(model)
-    make = mesh_solid if model.domain == "solid" else mesh_section
     begin = processor_s()
-    mesh, report = make(model.design, model.mesh, way.contact_box, axes)
+    mesh, report = mesh_part(model, way.contact_box, axes)
     start, meshed = time.perf_counter(), processor_s()
-    if element == "linear":
+    if case.element == "linear":
         mesh = straight(mesh)
     constants = model.material.elasticity(model.domain == "plane-stress")
-    elastic = replace(constants, mixed=element == "mixed")
+    elastic = replace(constants, mixed=case.element == "mixed")
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
     matrix = stiffness(mesh, elastic, thickness)
     face = candidate_points(model, free_surface(model, mesh, thickness), way.first_contact_mm, MARGIN)
-    kept = active_dofs(face, axes)
-    rows = local_rows(face, vertical_frame(mesh.dim))[kept]
-    gauges = sp.vstack([g.row(mesh, axes) for g in model.gauges], format="csr")
+    mirrored, points = unfold_points(model, mesh, face, axes, elastic)
+    held, nothing = held_dofs(mesh, axes, model.held_ends), np.zeros((0, 0))
+    body = CondensedBody(
+        mesh=mesh, report=report, elastic=elastic, stiffness=matrix, thickness=thickness, fixed_dofs=held,
+        condensed=None,  # type: ignore[arg-type]
+    )  # fmt: skip
+    system = ContactSystem(
+        surface=face, points=points, delassus=nothing, reading_rows=nothing, active_dofs=active_dofs(face, axes),
+        first_contact_mm=way.first_contact_mm,
+    )  # fmt: skip
     seconds = {**report.seconds, "assembly": time.perf_counter() - start}
     processor = {"mesh": meshed - begin, "assembly": processor_s() - meshed}
-    held = held_dofs(mesh, axes, model.held_ends)
-    return Parts(
-        model, mesh, report, elastic, matrix, face, kept, rows, gauges, held, way.first_contact_mm, axes, seconds,
-        processor,
+    problem = Problem(model=model, condensed_body=body, symmetry=mirrored, system=system, seconds=seconds)
+    return problem, processor
+
+
+def rows_of(problem: Problem) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Rows of the contact points that may move, and of the gauges."""
+    contact = local_rows(problem.surface, vertical_frame(problem.dim))[problem.system.active_dofs]
+    gauges = [gauge.row(problem.mesh, problem.axes) for gauge in problem.model.gauges]
+    return contact, sp.vstack(gauges, format="csr")
+
+
+def condensed(problem: Problem, solver: str | None = None) -> Problem:
+    """The problem, condensed as `build` does it."""
+    body, system, rows = problem.body, problem.system, sp.vstack(rows_of(problem), format="csr")
+    small = condense(body.stiffness, body.fixed_dofs, rows, solver)
+    count = len(problem.model.gauges)
+    delassus, reading_rows = contact_rows(small.compliance, system.active_dofs, system.surface, count)
+    return replace(
+        problem, condensed_body=replace(body, condensed=small),
+        system=replace(system, delassus=delassus, reading_rows=reading_rows),
     )  # fmt: skip
-
-
-def condensed(parts: Parts, solver: str | None = None) -> Problem:
-    """The problem, as `build` makes it."""
-    small = condense(parts.stiffness, parts.fixed_dofs, sp.vstack([parts.rows, parts.gauges], format="csr"), solver)
-    delassus, reading_rows = contact_rows(small.compliance, parts.active_dofs, parts.surface, len(parts.model.gauges))
-    mirrored, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes, parts.elastic)
-    return Problem(
-        model=parts.model,
-        condensed_body=CondensedBody(
-            mesh=parts.mesh,
-            report=parts.report,
-            elastic=parts.elastic,
-            stiffness=parts.stiffness,
-            thickness=parts.thickness,
-            fixed_dofs=parts.fixed_dofs,
-            condensed=small,
-        ),
-        symmetry=mirrored,
-        system=ContactSystem(
-            surface=parts.surface,
-            points=points,
-            delassus=delassus,
-            reading_rows=reading_rows,
-            active_dofs=parts.active_dofs,
-            first_contact_mm=parts.first_contact_mm,
-        ),
-        seconds={**parts.seconds, "condensation": small.seconds},
-    )
 
 
 def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:

@@ -13,7 +13,7 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.formulations import formulation_of
 
 from ._common import free_motion
-from ._cost import Case, assembled, condensed, in_steps, model_of, numbers, processor_s
+from ._cost import Case, assembled, condensed, in_steps, numbers, processor_s
 from ._each_iteration import EachIteration
 
 MODULE = __name__.rpartition(".")[2]
@@ -35,16 +35,15 @@ def prepare() -> None:
 
 def measured(given: dict[str, Any]) -> dict[str, Any]:
     """Sizes, seconds and processor time by stage, and numbers by increments of a case, given as a dict."""
-    case = Case(**{**given, "counts": tuple(given["counts"])})
+    case = Case.of(given)
     used = time.process_time()
-    parts = assembled(model_of(case), case.element)
+    parts, processor = assembled(case)
     answer: dict[str, Any] = {
-        "dofs": int(parts.stiffness.upper.shape[0]),
+        "dofs": int(parts.body.stiffness.upper.shape[0]),
         "contact_points": len(parts.surface.nodes),
-        "mesh_from_cache": parts.report.from_cache,
+        "mesh_from_cache": parts.body.report.from_cache,
     }
     seconds = {"mesh": parts.seconds["cad"] + parts.seconds["mesh"], "assembly": parts.seconds["assembly"]}
-    processor = dict(parts.processor_seconds)
     if case.way == "each iteration":
         press = EachIteration(parts)
         begin, spent = time.perf_counter(), processor_s()
@@ -80,9 +79,9 @@ def factored(given: dict[str, Any]) -> dict[str, Any]:
     """Processor time of a plain factorisation (PARDISO, symmetric indefinite) of a case's matrix, held unknowns out."""
     from pypardiso import PyPardisoSolver
 
-    parts = assembled(model_of(Case(**{**given, "counts": tuple(given["counts"])})), given["element"])
-    free = np.setdiff1d(np.arange(parts.stiffness.upper.shape[0]), parts.fixed_dofs)
-    upper = parts.stiffness.upper[free][:, free].tocsr()
+    body = assembled(Case.of(given))[0].body
+    free = np.setdiff1d(np.arange(body.stiffness.upper.shape[0]), body.fixed_dofs)
+    upper = body.stiffness.upper[free][:, free].tocsr()
     solver = PyPardisoSolver(mtype=-2)
     for k, value in zip((1, 2, 10, 21), (1, 3, 13, 1), strict=True):  # as in finger3d.fem.solvers.pardiso
         solver.set_iparm(k, value)
@@ -90,13 +89,13 @@ def factored(given: dict[str, Any]) -> dict[str, Any]:
     begin = processor_s()
     solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
     seconds = {"factorisation": processor_s() - begin}
-    return {"processor_seconds": seconds, "dofs": int(parts.stiffness.upper.shape[0])}
+    return {"processor_seconds": seconds, "dofs": int(body.stiffness.upper.shape[0])}
 
 
 def single(given: dict[str, Any]) -> dict[str, Any]:
     """What a compliance kept in single precision changes, and what a solve in single precision would save."""
-    case = Case(**{**given, "counts": tuple(given["counts"])})
-    problem = condensed(assembled(model_of(case), case.element))
+    case = Case.of(given)
+    problem = condensed(assembled(case)[0])
     rounded = problem.delassus.astype(np.float32).astype(np.float64)
     count = case.counts[0]
     frames = [

@@ -14,12 +14,12 @@ from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_fr
 from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState, next_state
-from finger3d.mechanics.discretise.problem import ContactSystem, Problem
-from finger3d.mechanics.discretise.symmetry import unfold_points
+from finger3d.mechanics.discretise.build import widened
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.path import targets
 
 from ._common import free_motion
-from ._cost import MU, Parts
+from ._cost import MU, rows_of
 
 
 class EachIteration:
@@ -29,47 +29,32 @@ class EachIteration:
     and T as in `finger3d.contact.newton.force_of_sets`; friction makes the matrix unsymmetric.
     """
 
-    def __init__(self, parts: Parts) -> None:
-        self.parts, self.solves = parts, 0
-        size = parts.stiffness.upper.shape[0]
-        self.free = np.setdiff1d(np.arange(size), parts.fixed_dofs)
-        upper = parts.stiffness.upper[self.free][:, self.free]
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.solves = problem, 0
+        body, active = problem.body, problem.system.active_dofs
+        size = body.stiffness.upper.shape[0]
+        self.free = np.setdiff1d(np.arange(size), body.fixed_dofs)
+        upper = body.stiffness.upper[self.free][:, self.free]
         self.whole = (upper + sp.triu(upper, 1).T).tocsr()
-        c, d = parts.surface.points.shape
-        place = sp.csr_matrix(
-            (np.ones(len(parts.active_dofs)), (parts.active_dofs, np.arange(len(parts.active_dofs)))),
-            (c * d, len(parts.active_dofs)),
-        )
-        self.read = (place @ self._columns(parts.rows)).tocsr()
-        self.locked = np.setdiff1d(np.arange(c * d), parts.active_dofs)
+        c, d = problem.surface.points.shape
+        place = sp.csr_matrix((np.ones(len(active)), (active, np.arange(len(active)))), (c * d, len(active)))
+        rows, self.gauges = (widened(part, size)[:, self.free] for part in rows_of(problem))
+        self.read = (place @ rows).tocsr()
+        self.locked = np.setdiff1d(np.arange(c * d), active)
         # any positive weight will do: a column of the finger below each point
-        spring = parts.model.material.E_MPa * parts.surface.area / parts.model.mesh.size_mm  # type: ignore[attr-defined]
+        spring = problem.model.material.E_MPa * problem.surface.area / problem.model.mesh.size_mm  # type: ignore[attr-defined]
         self.rho = np.repeat(spring[:, None], d, axis=1)
-
-    def _columns(self, rows: sp.csr_matrix) -> sp.csr_matrix:
-        size = self.parts.stiffness.upper.shape[0]
-        return sp.csr_matrix((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], size))[:, self.free]
 
     def run(self, count: int) -> dict[str, float]:
         """Force, friction sum and gauge strain after a press in so many increments."""
-        parts = self.parts
-        c, d = parts.surface.points.shape
-        legs = tuple(replace(leg, steps=count) for leg in parts.model.legs)
-        symmetry, points = unfold_points(parts.model, parts.mesh, parts.surface, parts.axes, parts.elastic)
-        system = ContactSystem(  # for the gaps; nothing is condensed
-            surface=parts.surface,
-            points=points,
-            delassus=np.zeros((0, 0, 0, 0)),
-            reading_rows=np.zeros((0, 0)),
-            active_dofs=parts.active_dofs,
-            first_contact_mm=parts.first_contact_mm,
-        )
-        shell = Problem(model=parts.model, condensed_body=None, symmetry=symmetry, system=system)
-        state = ContactState.at_rest(np.maximum(shell.gap(targets(legs)[0]), 0.0), d)
+        problem = self.problem
+        c, d = problem.surface.points.shape
+        legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
+        state = ContactState.at_rest(np.maximum(problem.gap(targets(legs)[0]), 0.0), d)
         for target in targets(legs):
-            free = free_motion(shell, target)
+            free = free_motion(problem, target)
             free[:, 1:] -= state.tangential_displacement
-            problem = ContactProblem(
+            increment = ContactProblem(
                 previous=state,
                 free_motion=free,
                 delassus=np.zeros((0, 0)),
@@ -78,14 +63,14 @@ class EachIteration:
                 friction=np.full(c, MU),
                 augmentation=self.rho,
             )
-            force, moved, status, u = self._settle(problem, state.force)
+            force, moved, status, u = self._settle(increment, state.force)
             state = next_state(state, force, moved, status)
         # a point on a symmetry plane carries its part's share of the force, like all others
-        copies = 2.0 ** len(parts.axes)
+        copies = 2.0 ** len(problem.axes)
         return {
             "force": float(copies * state.force[:, 0].sum()),
             "friction_sum": float(copies * np.linalg.norm(state.force[:, 1:], axis=1).sum()),
-            "gauge_strain": float((self._columns(parts.gauges) @ u)[0]),
+            "gauge_strain": float((self.gauges @ u)[0]),
         }
 
     def _settle(self, problem: ContactProblem, start: Float) -> tuple[Float, Float, NDArray[np.int8], Float]:

@@ -8,20 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.objects import Sphere
 
-from ._common import Body, body, box, graded, held_at
+from ._common import Body, body, box, graded, held_at, increment
 
 RADIUS = 100.0  # a/R = 0.01
 _ZONE = 1.15  # half-width of the evenly spaced part, in a
 _GROWTH = 2.0  # of the cells beyond it; quadratic cells, and the field decays as 1 / distance
+
+
+def graded_block(points: int, height: float) -> Mesh:
+    """Quarter of a block 2 height x height x 2 height, its top at y = 0, with `points` to a."""
+    far = _ZONE + graded(height - _ZONE, _GROWTH / points, _GROWTH)
+    side = np.concatenate([np.linspace(0.0, _ZONE, round(_ZONE * points) + 1), far[1:]])
+    return quadratic(box([side, -graded(height, 1.0 / points, _GROWTH)[::-1], side]))
 
 
 def block(nu: float, points: int, height: float, mirrored: bool = True) -> Body:
@@ -29,10 +33,7 @@ def block(nu: float, points: int, height: float, mirrored: bool = True) -> Body:
 
     `mirrored`: fields are even about x = 0 as in a press; else odd, as under a shear along x.
     """
-    far = _ZONE + graded(height - _ZONE, _GROWTH / points, _GROWTH)
-    side = np.concatenate([np.linspace(0.0, _ZONE, round(_ZONE * points) + 1), far[1:]])
-    down = -graded(height, 1.0 / points, _GROWTH)[::-1]
-    mesh = quadratic(box([side, down, side]))
+    mesh = graded_block(points, height)
     held = held_at(mesh, {"x-": (0,) if mirrored else (1, 2), "y-": (0, 1, 2), "z-": (2,)})
     return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.2)
 
@@ -115,22 +116,15 @@ def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[St
     for depth, slide in path:
         free = np.zeros((len(ball.gap), 3))
         free[:, 0], free[:, 1] = ball.gap - depth, -slide
-        found = solve_increment(
-            ContactProblem.of(state, free, ball.compliance, ContactLaw(Coulomb(mu)), max(depth, 1e-3))
-        )
+        found = increment(state, free, ball.compliance, mu, max(depth, 1e-3))
         if not found.outcome.ok:
             raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
         friction, slips = found.state.force[:, 1:], found.state.status == SLIP
         lost -= float((friction * (found.state.accumulated_slip - state.accumulated_slip))[slips].sum())
         state = found.state
         # points on a plane of symmetry carry the part's share of their force
-        total = ball.parts * state.force.sum(axis=0)
-        steps.append(
-            Step(
-                depth, slide, float(total[0]), float(total[1]),
-                ball.parts * float(np.linalg.norm(friction, axis=1).sum()), ball.parts * lost,
-                ball.parts * float(ball.area[state.status != OPEN].sum()),
-                ball.parts * float(ball.area[state.status == STICK].sum()), state, found.iterations,
-            )
-        )  # fmt: skip
+        normal, along, _ = (ball.parts * state.force.sum(axis=0)).tolist()
+        rubbed = ball.parts * float(np.linalg.norm(friction, axis=1).sum())
+        on, stuck = (ball.parts * float(ball.area[k].sum()) for k in (state.status != OPEN, state.status == STICK))
+        steps.append(Step(depth, slide, normal, along, rubbed, ball.parts * lost, on, stuck, state, found.iterations))
     return steps

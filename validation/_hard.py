@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from finger3d._types import Tree
 from finger3d.analyses.press import press
-from finger3d.contact.conditions import ContactProblem
+from finger3d.analyses.result import PressResult
 from finger3d.contact.friction import OPEN, Coulomb, TwoCoefficients
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.newton import uniqueness
-from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
@@ -27,35 +26,22 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
-from finger3d.scene import load
+from finger3d.scene import scene_of
 
-from ._common import free_motion
+from ._common import free_motion, increment
 from ._press import changed
 from ._rows import Row, at_least, at_most
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
 ROBUST = "what a robust method does; REFERENCES.md, 8.2"
-SCENE = """
-[finger]
-geometry = "block"
-half_length_mm = 10.0
-height_mm = 10.0
-width_mm = 10.0
-[material]
-E_MPa = 1.0
-nu = 0.3
-[friction]
-mu = 0.25
-[model]
-domain = "plane-strain"
-[mesh]
-size_mm = 1.0
-base_size_mm = 3.0
-mesher = "swept"
-[press]
-depth_mm = 0.5
-steps = 2
-"""
+SCENE: Tree = {
+    "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 10.0},
+    "material": {"E_MPa": 1.0, "nu": 0.3},
+    "friction": {"mu": 0.25},
+    "model": {"domain": "plane-strain"},
+    "mesh": {"size_mm": 1.0, "base_size_mm": 3.0, "mesher": "swept"},
+    "press": {"depth_mm": 0.5, "steps": 2},
+}
 
 
 def rows(quick: bool) -> list[Row]:
@@ -83,9 +69,7 @@ def one_point(quick: bool) -> Iterator[Row]:
         for free in loads:
             answers = _admissible(compliance, free, mu)
             rest = ContactState.at_rest(np.zeros(1), 2)
-            found = solve_increment(
-                ContactProblem.of(rest, free[None], compliance.reshape(1, 2, 1, 2), ContactLaw(Coulomb(mu)), 1.0)
-            )
+            found = increment(rest, free[None], compliance.reshape(1, 2, 1, 2), mu, 1.0)
             several += len(answers) > 1
             near = [np.abs(found.state.force[0] - a).max() < 1e-8 for a in answers]
             unlisted += not (found.outcome.ok and any(near))
@@ -123,15 +107,8 @@ def touch(quick: bool) -> Iterator[Row]:
     """No point, one point, and all points at once."""
     arch = designs()["clipped_cylinder"](radius_mm=20.0, half_length_mm=10.0, edge_height_mm=5.0, width_mm=1.0)
     problem = _block(0.3, (Leg(1.0, steps=1),), arch)
-    apart = solve_increment(
-        ContactProblem.of(
-            ContactState.at_rest(problem.gap(problem.origin), 2),
-            free_motion(problem, problem.origin) + [1e-6, 0.0],
-            problem.delassus,
-            ContactLaw(Coulomb(0.25)),
-            1.0,
-        )
-    )
+    rest = ContactState.at_rest(problem.gap(problem.origin), 2)
+    apart = increment(rest, free_motion(problem, problem.origin) + [1e-6, 0.0], problem.delassus, 0.25, 1.0)
     yield _is("no point touches: settled, without force", 0, np.abs(apart.state.force).max() + (not apart.outcome.ok))
     tiny = list(march(_block(0.3, (Leg(0.05, steps=40 if quick else 100), Leg(1.0, steps=2)), arch)))
     counts = [int((f.meshed_state.contact.status != OPEN).sum()) for f in tiny]
@@ -177,31 +154,26 @@ def again(quick: bool) -> Iterator[Row]:
         legs = (Leg(1.0, steps=10), Leg(1.0, 1.5, steps=10), Leg(0.0, 1.5, steps=10))
         problem = _block(0.3, legs, arch)
         law = TwoCoefficients(0.25, 0.1, branch)  # type: ignore[arg-type]
-        frames = list(march(_with(problem, friction=law)))
+        frames = list(march(changed(problem, friction=law)))
         yield _is(f"kinetic ratio .1, branch {branch}: unsettled of 30", 0, 30 - sum(f.outcome.ok for f in frames))
-
-
-def _with(problem: Problem, **changes: Any) -> Problem:
-    return changed(problem, **changes)
 
 
 def coarse_and_deep(quick: bool) -> Iterator[Row]:
     """A mesh of a hundred tets, a press of most of the height, cells that are flat: a warning or a refusal."""
-    with tempfile.TemporaryDirectory() as folder:
-        deep = _pressed(folder, "press.depth_mm=8.0", "press.steps=4")
-        yield _is("depth of 80 % of the height: settled", 1, deep.outcome.ok)
-        yield _is("depth of 80 % of the height: warned of", 1, _warned(deep, "of the finger's height"))
-        tets = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=3.0", "mesh.base_size_mm=5.0")
-        cells = tets.summary()["mesh"]["cells"]
-        yield at_most("coarse solid: tets", ROBUST, 150, cells, "about a hundred")
-        yield _is(f"solid of {cells} tets: settled", 1, tets.outcome.ok)
-        yield _is(f"solid of {cells} tets: warned of", 1, _warned(tets, "too few"))
-        fine = _pressed(folder, 'model.domain="solid"', "mesh.size_mm=1.5", "mesh.base_size_mm=3.0")
-        ratio = tets.summary()["steps"][-1]["normal_force_N"] / fine.summary()["steps"][-1]["normal_force_N"]
-        what = f"solid of {cells} tets: force over that of {fine.summary()['mesh']['cells']}"
-        yield Row(what, ROBUST, 1, ratio, 0.1, "no garbage")
-        refused = _refused(folder, "press.depth_mm=10.0")
-        yield _is("depth of the whole height: refused in one line that names the key", 1, "press.depth_mm" in refused)
+    deep = _pressed("press.depth_mm=8.0", "press.steps=4")
+    yield _is("depth of 80 % of the height: settled", 1, deep.outcome.ok)
+    yield _is("depth of 80 % of the height: warned of", 1, _warned(deep, "of the finger's height"))
+    tets = _pressed('model.domain="solid"', "mesh.size_mm=3.0", "mesh.base_size_mm=5.0")
+    cells = tets.summary()["mesh"]["cells"]
+    yield at_most("coarse solid: tets", ROBUST, 150, cells, "about a hundred")
+    yield _is(f"solid of {cells} tets: settled", 1, tets.outcome.ok)
+    yield _is(f"solid of {cells} tets: warned of", 1, _warned(tets, "too few"))
+    fine = _pressed('model.domain="solid"', "mesh.size_mm=1.5", "mesh.base_size_mm=3.0")
+    ratio = tets.last.normal_force_N / fine.last.normal_force_N
+    what = f"solid of {cells} tets: force over that of {fine.summary()['mesh']['cells']}"
+    yield Row(what, ROBUST, 1, ratio, 0.1, "no garbage")
+    refused = _refused("press.depth_mm=10.0")
+    yield _is("depth of the whole height: refused in one line that names the key", 1, "press.depth_mm" in refused)
     thin = designs()["clipped_cylinder"](radius_mm=100.0, half_length_mm=50.0, edge_height_mm=0.01, width_mm=20.0)
     try:
         _block(0.3, (Leg(1.0, steps=1),), thin)
@@ -211,22 +183,18 @@ def coarse_and_deep(quick: bool) -> Iterator[Row]:
     yield _is("sliver cells: refused, with what to choose", 1, "flatter" in message and "choose" in message)
 
 
-def _pressed(folder: str, *changes: str) -> Any:
-    path = Path(folder, "scene.toml")
-    path.write_text(SCENE, encoding="utf-8")
-    return press(load(path, ["effects.auto=false", *changes]), Path(folder, "out"), figures=False)
+def _pressed(*changes: str, **tables: Tree) -> PressResult:
+    return press(scene_of(SCENE | tables, ["effects.auto=false", *changes]), error=False)
 
 
-def _warned(result: Any, words: str) -> bool:
+def _warned(result: PressResult, words: str) -> bool:
     return any(words in warning for warning in result.summary()["warnings"])
 
 
-def _refused(folder: str, *changes: str, text: str = SCENE) -> str:
+def _refused(*changes: str, **tables: Tree) -> str:
     """The one line that a scene is refused with; empty if it is not, or in more lines."""
-    path = Path(folder, "scene.toml")
-    path.write_text(text, encoding="utf-8")
     try:
-        load(path, changes).model()
+        scene_of(SCENE | tables, changes).model()
     except Finger3dError as error:
         return str(error) if "\n" not in str(error) else ""
     return ""
@@ -239,25 +207,21 @@ _FACES = [(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 
 
 def surfaces(quick: bool) -> Iterator[Row]:
     """STL objects: whole, with a flipped face, with a missing face; touching at an edge."""
-    wedge = SCENE + '[object]\nshape = "wedge"\nangle_deg = 45.0\n'
     with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "object.stl")
+        prism = {"shape": "mesh", "path": str(file)}
         for name, faces, word in (
             ("a flipped face", [_FACES[0][::-1], *_FACES[1:]], "flipped"),
             ("a missing face", _FACES[1:], "not closed"),
         ):
-            _write_stl(Path(folder, "object.stl"), faces)
-            message = _refused(folder, text=SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n')
-            yield _is(f"STL with {name}: refused in one line that says so", 1, word in message)
-        _write_stl(Path(folder, "object.stl"), _FACES)
-        forces = []
-        for text in (wedge, SCENE + '[object]\nshape = "mesh"\npath = "object.stl"\n'):
-            path = Path(folder, "scene.toml")
-            path.write_text(text, encoding="utf-8")
-            # the edge is averaged over a hat, which must be low beside the depth of 0.5 mm
-            result = press(load(path, ["effects.auto=false", "mesh.size_mm=0.25"]), Path(folder, "out"), figures=False)
-            forces.append(result.summary()["steps"][-1]["normal_force_N"] if result.outcome.ok else np.nan)
-        yield Row("STL prism touching at its edge: force over that of the wedge", ROBUST, 1, forces[1] / forces[0],
-                  1e-9, "the same surface")  # fmt: skip
+            _write_stl(file, faces)
+            yield _is(f"STL with {name}: refused in one line that says so", 1, word in _refused(object=prism))
+        _write_stl(file, _FACES)
+        # the edge is averaged over a hat, which must be low beside the depth of 0.5 mm
+        both = [_pressed("mesh.size_mm=0.25", object=o) for o in ({"shape": "wedge", "angle_deg": 45.0}, prism)]
+    forces = [found.last.normal_force_N if found.outcome.ok else np.nan for found in both]
+    yield Row("STL prism touching at its edge: force over that of the wedge", ROBUST, 1, forces[1] / forces[0], 1e-9,
+              "the same surface")  # fmt: skip
 
 
 def _write_stl(path: Path, faces: list[Any]) -> None:
@@ -282,11 +246,7 @@ def turned(quick: bool) -> Iterator[Row]:
         compliance = np.einsum("ab,ibjc,dc->iajd", turn, problem.delassus, turn)
         state = ContactState.at_rest(problem.gap(problem.origin), 3)
         for frame in march(problem):
-            state = solve_increment(
-                ContactProblem.of(
-                    state, free_motion(problem, frame.target) @ turn.T, compliance, ContactLaw(Coulomb(0.25)), 0.3
-                )
-            ).state
+            state = increment(state, free_motion(problem, frame.target) @ turn.T, compliance, 0.25, 0.3).state
         states.append(state.force @ turn)
     apart = np.abs(states[1] - states[0]).max() / np.abs(states[0]).max()
     yield _is("solid turned by 30 degrees about the normal: change of forces", 0, apart, 1e-8, "the residual")
@@ -312,14 +272,13 @@ def refusals(quick: bool) -> Iterator[Row]:
         ("compliance with NaN", free, spoilt, Outcome.NOT_FINITE),
         ("floating body", free, floating.reshape(problem.delassus.shape), Outcome.INDEFINITE),
     ):
-        found = solve_increment(ContactProblem.of(state, gap, compliance, ContactLaw(Coulomb(0.25)), 0.5))
+        found = increment(state, gap, compliance, 0.25, 0.5)
         message = found.outcome is wanted and found.state is state
         yield _is(f"{what}: outcome says so, and the state before is handed back", 1, message)
-    legs = "[[press.leg]]\ndepth_mm = {}\nslide_x_mm = {}\n[[press.leg]]\ndepth_mm = 0.5\nslide_x_mm = 1.0\n"
-    with tempfile.TemporaryDirectory() as folder:
-        for what, first, word in (
-            ("slide before first touch", (0.0, 1.0), "moves before first touch"),
-            ("leg that goes nowhere", (0.5, 1.0), "goes nowhere"),
-        ):
-            text = SCENE.split("[press]")[0] + legs.format(*first)
-            yield _is(f"{what}: refused in one line that says so", 1, word in _refused(folder, text=text))
+    last = {"depth_mm": 0.5, "slide_x_mm": 1.0}
+    for what, depth, word in (
+        ("slide before first touch", 0.0, "moves before first touch"),
+        ("leg that goes nowhere", 0.5, "goes nowhere"),
+    ):
+        refused = _refused(press={"leg": [last | {"depth_mm": depth}, last]})
+        yield _is(f"{what}: refused in one line that says so", 1, word in refused)

@@ -26,17 +26,15 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import StepResult, contact_table
 
 from ._press import fig9_finger
-from ._rows import Measure, Row
+from ._rows import listed
 
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
-NUS = (0.3, 0.45, 0.49)
 STRESS, STRAIN = "plane stress", "plane strain"
 CASES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.45), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.45), (STRAIN, 0.49))
 """Plane states and Poisson's ratios of the half cylinder."""
 SHOWN = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.49))
 """Those that the figures show."""
 BELOW_R5, BELOW_FIG9 = 0.5, 3.29  # mm under the surface, see above
-PAPER = "Maeno 2004"
 
 
 def half_cylinder(nu: float, plane: str = STRESS, size: float = 0.1, gauges: Sequence[Gauge] = ()) -> Problem:
@@ -171,11 +169,8 @@ def moved(problem: Problem, frame: StepResult) -> Float:
     return displacement(problem.mesh, problem.unknowns(force))
 
 
-def said(
-    what: str, where: str, wanted: float, got: float, reason: str, tolerance: float = 0.0, measure: Measure = "relative"
-) -> Row:
-    """A statement of the paper, measured; `where` is its section or figure."""
-    return Row(what, f"{PAPER}, {where}", wanted, float(got), tolerance, reason, "statement", measure)
+said = listed(__file__)
+"""Rows of the paper's statements, which _paper.toml lists."""
 
 
 def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: dict[Any, dict[str, Any]]) -> None:

@@ -14,11 +14,10 @@ import numpy as np
 from scipy.special import ellipe, ellipkm1
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
+
+from ._common import increment
 
 _ORDER = 24
 
@@ -111,7 +110,7 @@ def press(body: Rings, radius: float, mu: float, depths: Sequence[float]) -> Pre
     lost, most = 0.0, 0
     for depth in depths:
         free = np.stack([gap - depth, np.zeros_like(gap)], axis=1)
-        found = solve_increment(ContactProblem.of(state, free, body.compliance, ContactLaw(Coulomb(mu)), depth))
+        found = increment(state, free, body.compliance, mu, depth)
         if not found.outcome.ok:
             raise AssertionError(f"rings, mu = {mu:g}, depth {depth:g}: {found.outcome}")
         slips = found.state.status == SLIP

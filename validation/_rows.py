@@ -5,14 +5,16 @@ from __future__ import annotations
 import csv
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from finger3d._types import Tree
+from finger3d._types import Tree, TreeView
 from finger3d.errors import MissingError
 
 Kind = Literal["verification", "validation", "sensitivity", "statement"]
@@ -98,6 +100,25 @@ def zero(what: str, reference: str, got: float, tolerance: float, reason: str, k
     return Row(what, reference, 0.0, got, tolerance, reason, kind, "absolute")
 
 
+def listed(file: str) -> Callable[..., Row]:
+    """Return a function that makes the rows which the data of a study, a TOML file beside it, list by name.
+
+    It takes the name, the number found, what is wanted and the tolerance where these are not listed, and by keyword the
+    words that stand in braces in the texts.
+    """
+    rows: Tree = tomllib.loads(Path(file).with_suffix(".toml").read_text("utf-8"))["row"]
+
+    def judged(
+        name: str, got: float, /, wanted: float | None = None, tolerance: float | None = None, **words: Any
+    ) -> Row:
+        given = {"wanted": wanted, "tolerance": tolerance}
+        row = rows[name] | {key: value for key, value in given.items() if value is not None}
+        texts = {key: row[key].format(**given, **words) for key in ("what", "reference", "reason")}
+        return Row(**row | texts | {"got": float(got), "wanted": float(row["wanted"])})
+
+    return judged
+
+
 class Settled(NamedTuple):
     """Increments of all histories of a study: how many converged, of how many, and their largest residual."""
 
@@ -158,9 +179,13 @@ def together(size: tuple[float, ...], /, **parts: Result) -> Result:
         for name, part in parts.items()
         for line in zip(*part.table.values(), strict=True)
     ]
+    return Result(tuple(row for part in parts.values() for row in part.rows), of_records(lines), draw)
+
+
+def of_records(lines: Sequence[TreeView]) -> dict[str, list[Any]]:
+    """Return the table of a study from lines by column; a line may lack some."""
     names = dict.fromkeys(name for line in lines for name in line)
-    table = {name: [line.get(name, "") for line in lines] for name in names}
-    return Result(tuple(row for part in parts.values() for row in part.rows), table, draw)
+    return {name: [line.get(name, "") for line in lines] for name in names}
 
 
 def number(value: float) -> str:
@@ -210,6 +235,15 @@ def columns(names: str, lines: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
     """Return the table of a study with numbers of five digits, which keep the files small."""
     short = [[float(f"{v:.5g}") if isinstance(v, float) else v for v in line] for line in lines]
     return exact_columns(names, short)
+
+
+def grouped(table: Mapping[str, ArrayLike], *by: str, **where: Any) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Yield values of one or several columns and, as arrays, the lines that have them, of all that meet `where`."""
+    arrays = {name: np.asarray(column) for name, column in table.items()}
+    chosen = np.logical_and.reduce([np.full(len(arrays[by[0]]), True), *(arrays[k] == v for k, v in where.items())])
+    for values in dict.fromkeys(zip(*(arrays[name][chosen].tolist() for name in by), strict=True)):
+        which = np.logical_and.reduce([chosen, *(arrays[k] == v for k, v in zip(by, values, strict=True))])
+        yield values if len(by) > 1 else values[0], {name: array[which] for name, array in arrays.items()}
 
 
 def committed(name: str) -> list[dict[str, str]]:

@@ -115,13 +115,13 @@ def _scenes(package: Path) -> list[Path]:
 
 
 def _with_helpers(path: Path) -> list[Path]:
-    """A study's file and those beside it that it imports, and those that these import."""
+    """A study's file, those beside it that it imports, and those that these import; and their data."""
     found = [path]
     for file in found:
         imports = re.findall(r"^from \.(\w*) import (.*)", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
         names = [name for module, what in imports for name in ([module] if module else what.split(", "))]
         found += [p for n in names if (p := path.with_name(f"{n}.py")) not in found and p.is_file()]
-    return found
+    return found + [data for file in found if (data := file.with_suffix(".toml")).is_file()]
 
 
 def studies(folder: Path | None = None) -> dict[str, Study]:

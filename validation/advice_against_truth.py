@@ -35,7 +35,9 @@ from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn
 from ._press import fig9_finger, in_edges
-from ._rows import Result, Row, at_least, columns
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 SEED = 23
 """The factors of the estimates were chosen with the seed 2026."""
@@ -46,7 +48,6 @@ LEAST_STRAIN = 0.05
 FACTOR, SHARE, COVERED = 1.5, 0.9, 0.8
 KINDS = {"normal_force_N": "normal force", "friction_sum_N": "friction sum", "gauge": "gauge"}
 LARGE = "large deformation"
-CLAIM = "claim of finger3d for its advice"
 COLUMNS = "scene by number value change error reported true_change"
 
 
@@ -158,8 +159,7 @@ def run(quick: bool) -> Result:
 
 def _estimated(found: list[Judged], pressed: int) -> Row:
     share = len({j.scene for j in found if j.by == LARGE}) / pressed
-    return at_least(f"share of {pressed} scenes whose change by large deformation was estimated", CLAIM, SHARE, share,
-                    "the others have small strains, or a coarse press of them fails")  # fmt: skip
+    return judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)
 
 
 def _rows(found: list[Judged], what: str) -> Iterator[Row]:
@@ -168,17 +168,17 @@ def _rows(found: list[Judged], what: str) -> Iterator[Row]:
     if said:
         text = f"{what}, {len(said)} reported of {len(found)}"
         within, covered = (float(np.mean([getattr(j, key) for j in said])) for key in ("within", "covered"))
-        yield at_least(f"share of reported changes within a factor of {FACTOR:g}: {text}", CLAIM, SHARE, within)
-        yield at_least(f"share of reported changes whose interval holds: {text}", CLAIM, COVERED, covered)
+        yield judged("share-of-reported-changes-within-a", within, SHARE, text=text)
+        yield judged("share-of-reported-changes-whose-interval", covered, COVERED, text=text)
     if silent:
         covered = float(np.mean([j.covered for j in silent]))
-        yield at_least(
-            f"share of changes not reported whose interval holds: {what}, {len(silent)} of {len(found)}",
-            "nothing is claimed of them",
-            COVERED,
+        yield judged(
+            "share-of-changes-not-reported-whose",
             covered,
-            "that of reported changes",
-            "statement",
+            COVERED,
+            what=what,
+            count=len(silent),
+            other_count=len(found),
         )
 
 

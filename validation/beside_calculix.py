@@ -27,7 +27,7 @@ from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
 from ._cost_runs import MODULE
-from ._rows import Result, Row, at_least, committed_instead
+from ._rows import Result, Row, at_least, committed_instead, grouped
 
 BY_NAME = True
 CALCULIX = "CalculiX 2.20, same mesh"
@@ -150,15 +150,10 @@ def times(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[Row]:
 def _draw(figure: Any, columns: dict[str, Any]) -> None:
     """Times of both programs over unknowns, and the forces."""
     left, right = figure.subplots(1, 2)
-    for body, colour in ((SECTION, "C0"), (SOLID, "C1")):
-        for name, mark in (("finger3d", "o-"), ("CalculiX", "s--")):
-            on = [i for i, b in enumerate(columns["body"]) if b == body and columns["program"][i] == name]
-            dofs = [columns["dofs"][i] for i in on]
-            if not on:
-                continue
-            left.loglog(dofs, [columns["wall_s"][i] for i in on], mark, color=colour, label=f"{name}, {body}")
-            right.semilogx(
-                dofs, [columns["force_N"][i] for i in on], mark, color=colour, label=f"{name}, {body}", mfc="none"
-            )
+    for (body, name), t in grouped(columns, "body", "program"):
+        style = {"color": "C0" if body == SECTION else "C1", "label": f"{name}, {body}"}
+        mark = "o-" if name == "finger3d" else "s--"
+        left.loglog(t["dofs"], t["wall_s"], mark, **style)
+        right.semilogx(t["dofs"], t["force_N"], mark, mfc="none", **style)
     left.set(xlabel="unknowns", ylabel="wall time (s)", title="mesh to last of 10 increments")
     right.set(xlabel="unknowns", ylabel="force at 10 mm (N)", title="nu = 0.45, mu = 0.25")

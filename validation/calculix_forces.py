@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import finger3d
+from finger3d._types import Tree
 from finger3d.analyses.calculix.deck import Contact
 from finger3d.analyses.calculix.press import press_deck
 from finger3d.contact.friction import Coulomb
@@ -26,128 +28,25 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.scene import Scene
+from finger3d.scene import Scene, scene_of
 
 from ._ccx import printed_forces, program, solve
 from ._ccx import run as run_calculix
 from ._press import converged, fig9_finger
-from ._rows import Result, Row, at_least, together
+from ._rows import Result, Row, at_least, exact_columns, grouped, together
 
-TOLERANCE, REASON_DECKS = (
-    0.01,
-    "wanted of the deck: 1 %; penalty and multipliers, facets and surface: 0.8 % or less measured",
-)
+TOLERANCE = 0.01
+REASON_DECKS = "wanted of the deck: 1 %; penalty and multipliers, facets and surface: 0.8 % or less measured"
 LIMIT_S_DECKS = 1200.0
-
-BLOCK = """
-[finger]
-geometry = "block"
-half_length_mm = 10.0
-height_mm = 8.0
-width_mm = 8.0
-"""
-FINGERTIP = """
-[finger]
-geometry = "fingertip"
-radius_mm = 12.0
-half_length_mm = 8.0
-edge_height_mm = 4.0
-width_mm = 8.0
-skin_mm = 1.5
-core_half_length_mm = 3.0
-core_height_mm = 2.0
-[parts.skin]
-E_MPa = 0.5
-nu = 0.4
-[parts.core]
-E_MPa = 20.0
-nu = 0.3
-"""
-REST = """
-[material]
-E_MPa = 1.0
-nu = 0.45
-[friction]
-mu = 0.25
-[mesh]
-mesher = "swept"
-size_mm = 1.5
-base_size_mm = 2.0
-"""
-SECTION = ('model.domain="plane-strain"', "mesh.size_mm=0.4", "mesh.base_size_mm=1.0")
-CYLINDER = 'object={shape="cylinder",radius_mm=10.0}'
-BALL = 'object={shape="sphere",radius_mm=10.0}'
-SLIDE = (
-    "press={leg=[{depth_mm=1.0,steps=4},{depth_mm=1.0,slide_x_mm=0.5,steps=5},{depth_mm=0.5,slide_x_mm=0.5,steps=3}]}"
-)
-PRESS = "press={depth_mm=1.0,steps=5}"
+DECKS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+"""Tables that all scenes have, those of both fingers, and cases: keys, and the force (N) along -y of CalculiX 2.20."""
 
 
-@dataclass(frozen=True)
-class Deck:
-    """A press: its name, the finger, keys, and the force (N) along -y that CalculiX 2.20 gave."""
-
-    name: str
-    keys: tuple[str, ...]
-    kept_N: float
-    finger: str = BLOCK
-
-    def scene(self) -> Scene:
-        """The scene."""
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "scene.toml")
-            path.write_text(self.finger + REST + "[press]\ndepth_mm = 1.0\n", encoding="utf-8")
-            return finger3d.load(path, self.keys)
-
-
-CASES = (
-    Deck("plane strain, cylinder, pressed, slid and half released", (*SECTION, CYLINDER, SLIDE), 4.450849),
-    Deck(
-        "plane strain, rounded wedge",
-        (*SECTION, PRESS, 'object={shape="wedge",angle_deg=20.0,tip_radius_mm=1.0}'),
-        6.737336,
-    ),
-    Deck("plane strain, wave", (*SECTION, PRESS, 'object={shape="wave",wavelength_mm=6.0,amplitude_mm=0.5}'), 20.8933),
-    Deck("plane strain, tilted plane", (*SECTION, PRESS, 'object={shape="plane",tilt_deg=3.0}'), 17.88315),
-    Deck("plane stress, cylinder", ('model.domain="plane-stress"', *SECTION[1:], CYLINDER, PRESS), 8.039136),
-    Deck(
-        "plane strain, cylinder, Mooney-Rivlin",
-        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="mooney-rivlin",c01_share=0.3}'),
-        13.058834,
-    ),
-    Deck(
-        "plane strain, cylinder, Yeoh",
-        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="yeoh",c2_over_c1=0.2,c3_over_c1=0.1}'),
-        13.151518,
-    ),
-    Deck(
-        "plane strain, cylinder, Ogden",
-        (*SECTION, CYLINDER, PRESS, 'effects.large_deformation={law="ogden",terms=[[0.7,2.0],[0.3,-3.0]]}'),
-        13.111784,
-    ),
-    Deck("solid, cylinder", (CYLINDER, PRESS), 8.812384),
-    Deck(
-        "solid, ball, neo-Hookean",
-        (
-            PRESS,
-            'object={shape="sphere",radius_mm=10.0}',
-            "effects.large_deformation={}",
-            "mesh.size_mm=1.0",
-            "mesh.base_size_mm=3.0",
-        ),
-        6.556044,
-    ),
-    Deck(
-        "solid with a skin and a core, plane, neo-Hookean",
-        (PRESS, "effects.large_deformation={}"),
-        12.693952,
-        FINGERTIP,
-    ),
-)
+def deck_scene(case: Tree) -> Scene:
+    """Return the scene of a case."""
+    return scene_of(DECKS["all"] | DECKS[case.get("finger", "block")], case["keys"])
 
 
 def _decks(quick: bool) -> Result:
@@ -168,15 +67,16 @@ def _decks(quick: bool) -> Result:
             "calculix_forces: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
         )
     source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
-    rows: list[Row] = []
-    table: dict[str, list[Any]] = {"case": [], "calculix_N": [], "finger3d_N": []}
-    for case in CASES[:3] if quick else CASES:
-        scene = case.scene()
+    lines = []
+    for case in DECKS["case"][:3] if quick else DECKS["case"]:
+        scene = deck_scene(case)
         ours = finger3d.press(scene.with_effects(scene.fixed_effects), error=False).last.normal_force_N
-        theirs = calculix(scene) if runs else case.kept_N
-        for key, value in zip(table, (case.name, theirs, ours), strict=True):
-            table[key].append(value)
-        rows.append(Row(f"force (N): {case.name}", source, theirs, ours, TOLERANCE, REASON_DECKS, "validation"))
+        lines.append((case["name"], calculix(scene) if runs else case["kept_N"], ours))
+    rows = [
+        Row(f"force (N): {name}", source, theirs, ours, TOLERANCE, REASON_DECKS, "validation")
+        for name, theirs, ours in lines
+    ]
+    table = exact_columns("case calculix_N finger3d_N", lines)
     return Result(tuple(rows), table, lambda figure: _draw_decks(figure, table))
 
 
@@ -274,23 +174,18 @@ def _faces(quick: bool) -> Result:
 
     Every case by both programs.
     """
-    rows: list[Row] = []
-    table: dict[str, list[Any]] = {
-        key: []
-        for key in "name domain nu mu depth_mm dofs calculix_N finger3d_N points_on_walls calculix_s ours_s".split()
-    }
-    for case in cases(quick):
-        rows += _compared(case, quick, table)
+    lines: list[tuple[Any, ...]] = []
+    rows = [row for case in cases(quick) for row in _compared(case, quick, lines)]
+    names = "name domain nu mu depth_mm dofs calculix_N finger3d_N points_on_walls calculix_s ours_s"
+    table = exact_columns(names, lines)
     return Result(tuple(rows), table, lambda figure: _draw_faces(figure, table))
 
 
-def _compared(case: Press, quick: bool, table: dict[str, list[Any]]) -> Iterator[Row]:
+def _compared(case: Press, quick: bool, lines: list[tuple[Any, ...]]) -> Iterator[Row]:
     begin = time.perf_counter()
     problem = build(case.model())
-    *_, end = march(problem)
+    end = converged(problem)[-1]
     ours_s = time.perf_counter() - begin
-    if not end.outcome.ok:
-        raise AssertionError(f"{case.what}: {end.outcome}")
     force = measure(problem.points, end)["normal_force_N"]
     theirs, source = None, "CalculiX 2.20, same mesh and law, number kept"
     if not quick and program():
@@ -299,12 +194,8 @@ def _compared(case: Press, quick: bool, table: dict[str, list[Any]]) -> Iterator
         source = "CalculiX, same mesh and law, run for this"
     wanted = case.kept if theirs is None else theirs.force
     on_walls = np.count_nonzero(end.state.force[problem.points.face > 0, 0] > 0.0)
-    values = (
-        case.name, case.domain, case.nu, case.mu, case.depth, problem.mesh.points.size, wanted, force, on_walls,
-        theirs.wall if theirs else np.nan, ours_s,
-    )  # fmt: skip
-    for key, value in zip(table, values, strict=True):
-        table[key].append(value)
+    given = case.name, case.domain, case.nu, case.mu, case.depth, problem.mesh.points.size
+    lines.append((*given, wanted, force, on_walls, theirs.wall if theirs else np.nan, ours_s))
     yield Row(f"force, {case.what}, N", source, wanted, force, 0.012, REASON_FACES, "validation")
     if case.is_timed and theirs:
         what = f"time of CalculiX over finger3d's, {case.what}, {problem.mesh.points.size} displacements"
@@ -313,12 +204,10 @@ def _compared(case: Press, quick: bool, table: dict[str, list[Any]]) -> Iterator
 
 def _draw_faces(figure: Any, table: dict[str, list[Any]]) -> None:
     left, right = figure.subplots(1, 2)
-    error = 100.0 * (np.array(table["finger3d_N"]) / np.array(table["calculix_N"]) - 1.0)
-    bodies = [f"{name}, {domain}" for name, domain in zip(table["name"], table["domain"], strict=True)]
-    for k, body in enumerate(dict.fromkeys(bodies)):
-        own = np.array([b == body for b in bodies])
+    for k, ((name, domain), t) in enumerate(grouped(table, "name", "domain")):
+        error = 100.0 * (t["finger3d_N"] / t["calculix_N"] - 1.0)
         for axes, key in ((left, "nu"), (right, "mu")):
-            axes.plot(np.array(table[key])[own], error[own], f"C{k}o", mfc="none", label=body)
+            axes.plot(t[key], error, f"C{k}o", mfc="none", label=f"{name}, {domain}")
     for axes, key in ((left, "nu"), (right, "mu")):
         axes.axhspan(-1.0, 1.0, color="0.92", label="1 %")
         axes.axhline(0.0, color="k", lw=0.6)
@@ -327,28 +216,12 @@ def _draw_faces(figure: Any, table: dict[str, list[Any]]) -> None:
 
 WIDTH = 20.0
 DEPTHS = (5.0, 10.0)
-SIZES = (4.0, 2.0)
-KEPT = {
-    4.0: (8.81694, 28.5524),
-    2.0: (8.80263, 28.4931),
-}  # N per mm at DEPTHS by mesh, CalculiX 2.20: this study in full
+KEPT = {4.0: (8.81694, 28.5524), 2.0: (8.80263, 28.4931)}
+"""N per mm at DEPTHS by mesh, CalculiX 2.20: this study in full."""
+
 REASON_SECTION = "two contact formulations, penalty and multipliers; 0.3 % or less measured"
 PENALTY_SECTION = 100.0  # MPa/mm: under 1 MPa the surfaces overlap by 0.01 mm, 1e-3 of the depth
 STICK_SECTION = 10.0  # MPa/mm: friction of 0.1 MPa takes 0.01 mm; ten times as stiff, CalculiX does not settle
-_SECONDS = 900.0  # a busy machine: 100 s on a quiet one
-
-
-def problem(size: float) -> Problem:
-    """The finger as half a section."""
-    mesh, legs = MeshOptions(size, 4.0 * size, "swept"), (Leg(10.0, steps=10),)
-    model = Model(fig9_finger(), Isotropic(1.0, 0.45), mesh, legs, friction=Coulomb(0.25), domain="plane-strain")
-    return build(Effect().apply(model))
-
-
-def pressed(body: Problem) -> np.ndarray:
-    """Depth (mm) and force (N per mm width) (10, 2) of this code."""
-    frames = converged(body)
-    return np.array([(f.target.depth_mm, measure(body.points, f)["normal_force_N"] / WIDTH) for f in frames])
 
 
 def _section(quick: bool) -> Result:
@@ -363,37 +236,35 @@ def _section(quick: bool) -> Result:
 
     Meshes of 4 and 2 mm; quick: of 4 mm, against the number kept.
     """
-    rows: list[Row] = []
-    table: dict[str, list[Any]] = {"size_mm": [], "depth_mm": [], "calculix": [], "finger3d": []}
-    curves = {}
-    for size in SIZES[:1] if quick else SIZES:
-        body = problem(size)
-        curves[size] = pressed(body)
+    rows, lines, curves = [], [], {}
+    for size in list(KEPT)[:1] if quick else KEPT:
+        case = Press("Fig. 9 finger", fig9_finger(), "plane-strain", 0.45, 0.25, DEPTHS[-1], size, np.nan)
+        model = replace(case.model(), mesh=MeshOptions(size, 4.0 * size, "swept"))
+        body = build(model)
+        frames = [(f.target.depth_mm, measure(body.points, f)["normal_force_N"] / WIDTH) for f in converged(body)]
+        curves[size] = np.array(frames)
         other, source = np.array(KEPT[size]), "CalculiX 2.20, same mesh and law, numbers kept"
         if not quick and program():
-            legs = tuple(Leg(depth, steps=4) for depth in DEPTHS)
-            answer = run_calculix(
-                replace(body.model, legs=legs), Contact(PENALTY_SECTION, STICK_SECTION, 0.25), _SECONDS
-            )
-            other = answer.forces[:, 1] / WIDTH
-            source = "CalculiX, same mesh and law, run for this"
+            slow = replace(model, legs=tuple(Leg(depth, steps=4) for depth in DEPTHS))
+            answer = run_calculix(slow, Contact(PENALTY_SECTION, STICK_SECTION, 0.25), LIMIT_S_FACES)
+            other, source = answer.forces[:, 1] / WIDTH, "CalculiX, same mesh and law, run for this"
         for depth, theirs in zip(DEPTHS, other, strict=True):
             ours = float(np.interp(depth, *curves[size].T))
-            for key, value in zip(table, (size, depth, float(theirs), ours), strict=True):
-                table[key].append(value)
+            lines.append((size, depth, float(theirs), ours))
             what = f"force at {depth:g} mm, mesh of {size:g} mm, N per mm"
             rows.append(Row(what, source, float(theirs), ours, 0.02, REASON_SECTION, "validation"))
+    table = exact_columns("size_mm depth_mm calculix finger3d", lines)
     return Result(tuple(rows), table, lambda figure: _draw_section(figure, curves, table))
 
 
 def _draw_section(figure: Any, curves: dict[float, np.ndarray], table: dict[str, list[Any]]) -> None:
     left, right = figure.subplots(1, 2)
-    size, depth, theirs, ours = (np.array(table[key]) for key in table)
-    for k, (h, curve) in enumerate(curves.items()):
-        here = size == h
-        left.plot(*curve.T, f"C{k}-", label=f"finger3d, mesh of {h:g} mm")
-        left.plot(depth[here], theirs[here], f"C{k}o", mfc="none", label=f"CalculiX, mesh of {h:g} mm")
-        right.plot(depth[here], 100.0 * (ours[here] / theirs[here] - 1.0), f"C{k}o-", label=f"mesh of {h:g} mm")
+    for k, (size, t) in enumerate(grouped(table, "size_mm")):
+        left.plot(*curves[size].T, f"C{k}-", label=f"finger3d, mesh of {size:g} mm")
+        left.plot(t["depth_mm"], t["calculix"], f"C{k}o", mfc="none", label=f"CalculiX, mesh of {size:g} mm")
+        right.plot(
+            t["depth_mm"], 100.0 * (t["finger3d"] / t["calculix"] - 1.0), f"C{k}o-", label=f"mesh of {size:g} mm"
+        )
     left.set(xlabel="depth, mm", ylabel="force, N per mm width")
     right.set(xlabel="depth, mm", ylabel="finger3d over CalculiX - 1, %", ylim=(-2.5, 2.5))
     right.axhspan(-2.0, 2.0, color="0.92", label="tolerance: 2 %")

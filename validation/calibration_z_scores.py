@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,9 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
 from finger3d.sensor import Calibration, estimate
 
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, at_most, columns, listed
+
+judged = listed(__file__)
 
 Steps = int | Literal["auto"]
 
@@ -39,8 +41,7 @@ SAME, FINER = "same mesh", "finer mesh"
 LEVELS = (10, 20, 40, 80, 160)
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """One reading of a calibrated gauge, and what was made of it."""
 
     nu: float
@@ -85,9 +86,8 @@ def run(quick: bool) -> Result:
             found += _readings(nu, size, steps, mus, random, bare, quick)
     rows = list(_rows(found))
     rows += [] if quick else [_compared(nus[-1], size)]
-    lines = [tuple(vars(r).values()) for r in found]
     names = "nu steps mesh read_steps gauge mu z z_without_increments z_mu in_set"
-    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found))
+    return Result(tuple(rows), columns(names, found), lambda figure: _draw(figure, found))
 
 
 def _readings(
@@ -145,19 +145,16 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
             if len(z_mu) > 10:
                 yield from _near_one(f"rms of z of mu: {what}, {len(z_mu)} with an estimate of mu", z_mu)
             share = float(np.mean([r.inside for r in some]))
-            why = "systematic errors are stated by their size, so more may be covered"
-            what_share = f"share of 90 % sets that contain the true mu: {what}"
-            yield at_least(what_share, "mu drawn evenly", 0.9, share, why, "statement")
+            yield judged("share-of-90-sets-that-contain", share, what=what)
             worst = float(np.abs([r.z_without for r in some]).max())
-            yield at_least(f"largest z of the strain without the tolerance of the increments: {what}", "no reference",
-                           3.0, worst, "a reading off by more than three standard deviations", "statement")  # fmt: skip
+            yield judged("largest-z", worst, what=what)
 
 
 def _near_one(what: str, z: Float) -> Iterator[Row]:
     """Yield two rows: the stated errors are not too small, and they are not much too large."""
     why = "all readings of a body share one error of that body"
     yield at_most(what, "1 if the errors are right", 1.3, _rms(z), why, "sensitivity")
-    yield at_least(f"{what}; not less than half", "1 if the errors are right", 0.5, _rms(z), why, "statement")
+    yield judged("not-less-than-half", _rms(z), what=what)
 
 
 def _rms(z: Float) -> float:
@@ -171,10 +168,7 @@ def _compared(nu: float, size: float) -> Row:
     stated = np.array([increment_error(strains[b], strains[b // 2], 0.5) for b in LEVELS[1:]])
     off = np.array([np.abs(strains[b] - strains[640]) for b in LEVELS[1:]])
     big = off > 0.1 * NOISE
-    return at_least(
-        "share of strains in error by more than a tenth of the noise whose error is within twice its estimate",
-        "no reference", 0.9, float(np.mean(off[big] <= 2.0 * stated[big])), "nine in ten",
-        "statement")  # fmt: skip
+    return judged("share-of-strains-in-error-by", float(np.mean(off[big] <= 2.0 * stated[big])))
 
 
 def _draw(figure: Any, found: list[Reading]) -> None:
@@ -184,15 +178,12 @@ def _draw(figure: Any, found: list[Reading]) -> None:
     for k, (steps, mesh) in enumerate(cases):
         some = [r for r in found if (r.steps, r.mesh) == (steps, mesh)]
         where = k + np.random.default_rng(k).uniform(-0.3, 0.3, len(some))
-        first = k == 0
-        left.semilogy(
-            where, np.abs([r.z_without for r in some]), ".", ms=3, color="#aaaaaa",
-            label="without the tolerance of the increments" if first else None,
-        )  # fmt: skip
-        left.semilogy(
-            where, np.abs([r.z for r in some]), ".", ms=3, color="#2166ac",
-            label="with all tolerances" if first else None,
-        )  # fmt: skip
+        for which, colour, label in (
+            ("z_without", "#aaaaaa", "without the tolerance of the increments"),
+            ("z", "#2166ac", "with all tolerances"),
+        ):
+            size = np.abs([getattr(r, which) for r in some])
+            left.semilogy(where, size, ".", ms=3, color=colour, label=None if k else label)
     left.set(xticks=range(len(cases)), xlabel="increments of the calibration, mesh of the reading")
     left.set(ylabel="|z| of the strain", ylim=(1e-2, None), title="Error over its standard deviation")
     left.set_xticklabels([f"{s}\n{m}" for s, m in cases], fontsize=8)

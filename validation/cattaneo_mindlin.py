@@ -23,13 +23,13 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
 from . import _halfplane, _halfspace
-from ._rows import Result, Row, at_least, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 NU, MU = 0.5, 0.25
 DEPTH = float(_halfplane.depth(1.0, _halfplane.DEPTH_OF_BLOCK))
 SHARES = (0.5, 1.0, 1.4)  # of mu times the depth: slides of the cylinder
-JOHNSON_2D = "Cattaneo 1938; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.1"
-JOHNSON_3D = "Mindlin and Deresiewicz 1953; Johnson 1985, secs. 7.2 and 7.4; REFERENCES.md, 3.2"
 COLUMNS = "dim points_per_a increments s a_mm c_over_a c_over_a_exact W_over_exact loop_over_exact shift_over_exact"
 
 
@@ -75,20 +75,8 @@ def cylinder(points: int, increments: int) -> list[tuple[float, ...]]:
         exact = line_loss(s, force)
         lost = found[-1].frame.dissipation_mJ - found[peak].frame.dissipation_mJ
         c = 0.5 * (float(np.ptp(stuck)) + spacing) / before.a
-        rows.append(
-            (
-                2,
-                points,
-                increments,
-                s,
-                before.a,
-                c,
-                float(np.sqrt(1.0 - s)),
-                lost / exact,
-                np.trapezoid(q, at) / exact,
-                np.nan,
-            )
-        )
+        shares = lost / exact, np.trapezoid(q, at) / exact
+        rows.append((2, points, increments, s, before.a, c, float(np.sqrt(1.0 - s)), *shares, np.nan))
     return rows
 
 
@@ -133,44 +121,35 @@ def run(quick: bool) -> Result:
 
 def _line_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
     wide = 0.03 if fine >= 40 else 0.1
-    why = "first order in the point spacing; 0.3 % or less measured at 40 points to a"
     most = max(r[2] for r in table if r[:2] == (2, fine))
     for _, points, count, s, _, c, exact, lost, area, _ in [r for r in table if r[:2] == (2, fine)]:
         here = f"cylinder, s = {s:.3f}, {points:g} points to a, {count:g} increments"
         if count == 10:
-            near = f"half a point spacing, a/{points:g}"
-            yield Row(f"c/a, {here}", JOHNSON_2D, exact, c, 0.5 / points, near, measure="absolute")
-            yield Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_2D, 1.0, lost, wide, why)
+            yield judged("c-a", c, exact, tolerance=0.5 / points, here=here, points=points)
+            yield judged("work-lost-in-a-cycle-over", lost, tolerance=wide, here=here)
         if count == most:
-            yield Row(f"area of the loop over the exact one, {here}", JOHNSON_2D, 1.0, area, wide, why)
+            yield judged("area", area, tolerance=wide, here=here)
     if most == 20:
         few, many = ([r for r in table if r[:3] == (2, fine, n)] for n in (5, most))
         for k, name in ((5, "c/a"), (7, "work lost in a cycle over the exact one")):
             change = max(abs(one[k] - other[k]) for one, other in zip(few, many, strict=True))
-            what = f"{name}, cylinder: largest change from 5 to {most} increments"
-            why = "a hundredth of what the mesh leaves"
-            yield zero(what, "a limit that few increments reach", change, 3e-5, why)
+            yield judged("cylinder", change, name=name, most=most)
         first, last = (max(abs(r[7] - 1.0) for r in table if r[:3] == (2, n, 10)) for n in (10, fine))
         falls = float(np.log(first / last) / np.log(fine / 10))
-        what = "rate at which the error of the work lost falls with the mesh, cylinder"
-        yield at_least(what, "first order in the spacing, like c", 1.0, falls)
+        yield judged("rate-at-which-the-error", falls)
         gaps = [max(abs(r[8] - r[7]) for r in table if r[:3] == (2, fine, n)) for n in (5, 20)]
         falls = float(np.log(gaps[0] / gaps[1]) / np.log(4.0))
-        what = "rate at which the area of the loop nears the work lost with the increments, cylinder"
-        yield Row(what, "trapezoidal rule: 2", 2.0, falls, 0.2, "from two halvings", measure="at least")
+        yield judged("rate-at-which-the-area", falls)
 
 
 def _ball_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
     for _, points, _, s, _, c, exact, lost, area, shift in [r for r in table if r[:2] == (3, fine)]:
         here = f"ball, s = {s:.3f}, {points:g} points to a"
-        why = "the formula neglects slip across the load; 0.4 % measured at 8 points to a"
-        yield Row(f"slide over the exact one, {here}", JOHNSON_3D, 1.0, shift, 0.03, why)
-        near = f"one point spacing, a/{points:g}"
-        yield Row(f"c/a, {here}", JOHNSON_3D, exact, c, 1.0 / points, near, measure="absolute")
+        yield judged("slide-over-the-exact-one", shift, here=here)
+        yield judged("c-a-of-ball", c, exact, tolerance=1.0 / points, here=here, points=points)
         if np.isfinite(lost):
-            why = "the formula neglects slip across the load; 0.9 % measured at 8 points to a, and 4 must pass too"
-            yield Row(f"work lost in a cycle over the exact one, {here}", JOHNSON_3D, 1.0, lost, 0.1, why)
-            yield Row(f"area of the loop over the exact one, {here}", JOHNSON_3D, 1.0, area, 0.1, why)
+            yield judged("work-lost-by-ball", lost, here=here)
+            yield judged("area-of-ball", area, here=here)
 
 
 def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:

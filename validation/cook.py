@@ -120,24 +120,18 @@ def run(quick: bool) -> Result:
         why = "the reference has four digits; its own extrapolation leaves 0.02 %"
         rows.append(Row(f"deflection at (48, 52), {panel.name} (mm)", _COOK, panel.wanted, limit, 1e-3, why))
         why = "the extrapolation uses the leading term alone, and the graded mesh is coarse away from the corner"
-        rows.append(
-            Row(f"the same, extrapolated against graded, {panel.name} (mm)", "graded mesh", corner, limit, 5e-4, why)
-        )
+        what = f"the same, extrapolated against graded, {panel.name} (mm)"
+        rows.append(Row(what, "graded mesh", corner, limit, 5e-4, why))
         why = "the next term of the error decays slowly, and raises the rate that three levels show"
-        rate = float(np.log2(steps[-2] / steps[-1]))
-        rows.append(
-            Row(f"rate of the deflection, {panel.name}", _WILLIAMS, panel.rate, rate, 0.15, why, measure="absolute")
-        )
+        what, rate = f"rate of the deflection, {panel.name}", float(np.log2(steps[-2] / steps[-1]))
+        rows.append(Row(what, _WILLIAMS, panel.rate, rate, 0.15, why, measure="absolute"))
         if not panel.plane_stress:
             solid = [deflection(slab(n), panel) for n in thick]
             table += [(panel.name, 3, n, v) for n, v in zip(thick, solid, strict=True)]
             flat = deflection(square(thick[-1]), panel)
             why = "the diagonals of the slab's cells differ from the section's"
-            rows.append(
-                Row(
-                    f"held slab against section, {thick[-1]} cells, {panel.name} (mm)", "2D", flat, solid[-1], 1e-3, why
-                )
-            )
+            what = f"held slab against section, {thick[-1]} cells, {panel.name} (mm)"
+            rows.append(Row(what, "2D", flat, solid[-1], 1e-3, why))
     rows += [_locking(0.3, "at most", 0.06), _locking(0.4999, "at least", 0.25)]
     names = "case dim cells_per_side deflection_mm"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, errors, table))

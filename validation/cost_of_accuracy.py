@@ -14,13 +14,16 @@ of the load converges as h^(2 e).  A section under a plane has no increments; el
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from finger3d._machine import memory_bytes
+from finger3d._types import Tree
 from finger3d.scene.mesh_sizes import BASE_SHARE, MOST_OF_EXTENT, SIZE_SHARE
 
 from ._child import Bench, best_of
@@ -31,27 +34,19 @@ from ._cost_figure import draw
 from ._cost_runs import MODULE
 from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
 from ._press import empty_mesh_cache
-from ._rows import Result, Row, at_least, at_most, zero
+from ._rows import Result, Row, listed, of_records, zero
+
+judged = listed(__file__)
 
 BY_NAME = True
-WILLIAMS = "2e of the base's edge, Williams 1952; REFERENCES.md, 5.3"
-ALL = (1, 2, 5, 10, 20, 50, 100, 200)
-LARGE_COUNTS = (5, 10, 20, 50, 100)
 TARGETS = (0.05, 0.01, 0.001)
-BEST = {SECTION: "mixed", SOLID: "mixed", HALF: "quadratic"}
-BEST |= {LARGE[body]: BEST[body] for body in LARGE}
-HEIGHT = {SECTION: 50.0, SOLID: 50.0, HALF: 5.0}
-HEIGHT |= {LARGE[body]: HEIGHT[body] for body in LARGE}
 WIDTH = 20.0  # of the solid
 NEED_GB = 14.0  # of free memory, for 500 000 unknowns
 
-# What the defaults claim, relative; lengths in units of the edge length at the contact.
-CLAIM = {
-    SECTION: {"force": 0.01, "friction_sum": 0.01, "gauge_strain": 0.05, "contact_length": 1.0, "stick_length": 1.0},
-    SOLID: {"force": 0.01, "friction_sum": 0.10, "gauge_strain": 0.10, "contact_length": 1.5, "stick_length": 3.0},
-    HALF: {"force": 0.01, "friction_sum": 0.05, "gauge_strain": 0.05, "contact_length": 1.0, "stick_length": 2.0},
-}
-CLAIM |= {LARGE[body]: CLAIM[body] | {"stick_length": 3.0} for body in LARGE}
+BODIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["body"]
+"""By body: its height, its best element, the claims of the defaults, and the edge lengths of all series."""
+
+BEST = {body: given["best"] for body, given in BODIES.items()}
 Runs = dict[Case, dict[str, Any]]
 Groups = dict[str, list[Case]]
 
@@ -59,7 +54,7 @@ Groups = dict[str, list[Case]]
 def default(body: str) -> Case:
     """What a scene that gives no sizes and no steps is solved with."""
     kind = "ftetwild" if body in (SOLID, LARGE[SOLID]) else "section"
-    height = HEIGHT[body]
+    height = BODIES[body]["height_mm"]
     longest = min(height * BASE_SHARE[kind], MOST_OF_EXTENT * WIDTH)
     return Case(body, height * SIZE_SHARE[kind], longest, BEST[body], "swept" if kind == "section" else kind)
 
@@ -69,9 +64,8 @@ def groups(body: str, quick: bool) -> Groups:
     sizes = _sizes(body, quick)
     best = BEST[body]
     middle = sizes["ladder"]
-    counts = (5, 10, 20) if quick else ALL
     made = {e: [Case(body, h, 4.0 * h, e) for h in sizes[e]] for e in ("mixed", "quadratic", "linear") if e in sizes}
-    made["steps"] = [Case(body, middle, 4.0 * middle, best, counts=sizes.get("counts", counts))]
+    made["steps"] = [Case(body, middle, 4.0 * middle, best, counts=tuple(sizes["counts"]))]
     if body in LARGE.values():
         return made
     made["grading"] = [Case(body, middle, r * middle, best) for r in sizes["ratios"]]
@@ -83,33 +77,12 @@ def groups(body: str, quick: bool) -> Groups:
     return made
 
 
-def _sizes(body: str, quick: bool) -> dict[str, Any]:
-    if quick:
-        down = [4.0, 2.0, 1.0, 0.5]
-        return {BEST[body]: down, "linear": [1.0], "ladder": 1.0, "ratios": (8,), "slow": [4.0]}
-    if body == LARGE[SECTION]:
-        return {"mixed": [4.0, 2.0, 1.0, 0.5, 0.25], "ladder": 1.0, "counts": LARGE_COUNTS}
-    if body == LARGE[SOLID]:
-        return {"mixed": [4.0, 3.0, 2.0, 1.5, 1.0], "ladder": 3.0, "counts": LARGE_COUNTS}
-    if body == SECTION:
-        down = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625]
-        return {"mixed": down, "quadratic": down[:-1], "linear": down, "ladder": 0.25, "ratios": (1, 2, 4, 8, 16, 32),
-                "slow": [2.0, 1.0, 0.5]}  # fmt: skip
-    if body == HALF:
-        down = [0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.00625]
-        return {
-            "quadratic": down,
-            "linear": down,
-            "ladder": 0.025,
-            "ratios": (1, 2, 4, 8, 16),
-            "slow": [0.2, 0.1, 0.05],
-        }
-    down = [4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.6]
+def _sizes(body: str, quick: bool) -> Tree:
+    sizes = dict(BODIES[body]["quick" if quick else "series"])
     memory = memory_bytes()
-    if memory and memory[1] / 1e9 > NEED_GB:
-        down.append(0.5)
-    return {"mixed": down, "quadratic": down[:6], "linear": [*down[2:6], 0.5], "ladder": 1.5, "ratios": (2, 4, 8),
-            "slow": [4.0, 3.0], "pytetwild": [5.0, 4.0, 3.0, 2.0, 1.5]}  # fmt: skip
+    if body == SOLID and not quick and memory and memory[1] / 1e9 > NEED_GB:
+        sizes["mixed"] = [*sizes["mixed"], 0.5]
+    return sizes
 
 
 def run(quick: bool) -> Result:
@@ -158,13 +131,12 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
     rows += [*_float_rows(floats), *_extrapolation_rows(made, runs, errors, truths, rates)]
     holes = sum(a.case is None for _, a in advices)
     if not quick:
-        rows.append(zero("cells of the table without a mesh", "each has one", holes, 0.0, "none"))
+        rows.append(judged("cells", holes))
     lines += [_advice_line(body, a) for body, a in advices]
     lines += [{"kind": "rate of the error", "quantity": q, "rate": round(power, 3)} for q, power in rates.items()]
     lines += [_plain_line(c, p, runs[c]) for c, p in plain.items()] + [_float_line(c, f) for c, f in floats.items()]
-    names = list(dict.fromkeys(k for line in lines for k in line))
-    table = {name: [line.get(name, "") for line in lines] for name in names}
-    return Result(tuple(rows), table, lambda figure: draw(figure, [dict.fromkeys(names, "") | line for line in lines]))
+    table = of_records(lines)
+    return Result(tuple(rows), table, lambda figure: draw(figure, [dict.fromkeys(table, "") | line for line in lines]))
 
 
 def _even(series: Groups) -> list[list[Case]]:
@@ -194,33 +166,30 @@ def _extrapolation_rows(
     """What is extrapolated to the finest meshes from the coarser ones, beside what these have."""
     ratios = [
         constant(q, cases[:-1], errors, truths[body][q], rates[q]) * cases[-1].size ** rates[q] / errors[cases[-1]][q]
-        for body, series in made.items() for cases in _even(series) for q in QUANTITIES
+        for body, series in made.items()
+        for cases in _even(series)
+        for q in QUANTITIES
         if errors[cases[-1]][q] > 2.0 * truths[body][q].uncertainty and math.isfinite(rates[q])
-    ]  # fmt: skip
+    ]
     if ratios:
-        what = f"error extrapolated to the finest mesh over that found there, median of {len(ratios)}"
-        yield at_most(what, "no error is larger than its law", 3.0, float(np.median(ratios)),
-                      "errors of coarser meshes scatter, and the largest counts", "sensitivity")  # fmt: skip
+        yield judged("error-extrapolated-to-the-finest-mesh", float(np.median(ratios)), count=len(ratios))
     for body, series in made.items():
         *coarser, finest = (runs[c] for c in series[BEST[body]])
         dofs, peaks = ([run[key] for run in coarser] for key in ("dofs", "peak_MB"))
         time = at(finest["dofs"], dofs, list(map(seconds, coarser))) / seconds(finest)
         memory = memory_mb(finest["dofs"], dofs, peaks, EMPTY * min(peaks)) / finest["peak_MB"]
         for what, got in (("processor time", time), ("peak memory", memory)):
-            yield Row(f"{what} extrapolated to the finest mesh over that found there, {body}", "this study", 1.0, got,
-                      0.5, "a power from three meshes", "statement")  # fmt: skip
+            yield judged("extrapolated-to-the-finest-mesh-over", got, what=what, body=body)
 
 
 def _truth_rows(body: str, truths: Mapping[str, Truth], quick: bool) -> list[Row]:
     """What was extrapolated without the finest run, against the finest run."""
     far = {"force": 0.002, "friction_sum": 0.02, "gauge_strain": 0.05, "contact_length": 0.05, "stick_length": 0.15}
-    why = "levels differ by more than this; a wrong extrapolation would show"
     return [
-        zero(f"{q} of the finest run over that extrapolated from the coarser ones, less 1, {body}", "finest run",
-            truths[q].check, far[q] * (4.0 if quick else 1.0), why)
+        judged("finest-run", truths[q].check, tolerance=far[q] * (4.0 if quick else 1.0), q=q, body=body)
         for q in QUANTITIES
         if q not in LENGTHS or not quick
-    ]  # fmt: skip
+    ]
 
 
 def _rate_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
@@ -233,9 +202,7 @@ def _rate_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
             rate = observed([c.size for c in cases], [value(runs[c], "force") for c in cases])
         except ValueError:  # no rate fits
             rate = math.nan
-        why = "three meshes, and a contact that grows from point to point"
-        yield Row(f"rate of the force, {BEST[body]} elements, {body}", WILLIAMS, wanted, rate, 0.35, why,
-                  measure="absolute")  # fmt: skip
+        yield judged("rate", rate, wanted, value=BEST[body], body=body)
 
 
 def _solver_rows(body: str, series: Groups, runs: Runs) -> Iterator[Row]:
@@ -261,8 +228,7 @@ def _slower_row(body: str, series: Groups, runs: Runs) -> list[Row]:
     what = (
         f"time of {runs[case]['factorizations']} factorisations over that of one condensation, {own['dofs']} unknowns"
     )
-    why = "for so small a body the contact solves cost as much as some factorisations"
-    return [at_least(f"{what}, {body}", "a factorisation each iteration saved", 5.0, times, why, "sensitivity")]
+    return [judged("factorisations-saved", times, what=what, body=body)]
 
 
 def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
@@ -270,9 +236,7 @@ def _large_row(body: str, series: Groups, runs: Runs) -> list[Row]:
     case = series["mixed"][-1]
     small = replace(case, body=next(b for b, large in LARGE.items() if large == body))
     times = seconds(runs[case]) / seconds(runs[small])
-    what = f"time of a press at large deformation over one in small strain, {runs[case]['dofs']} unknowns, {body}"
-    why = "ten increments, each a solution of its own, with fewer factorisations than increments"
-    return [at_most(what, "a goal of this project", 20.0, times, why, "sensitivity")]
+    return [judged("time-of-a-press-at-large", times, value=runs[case]["dofs"], body=body)]
 
 
 def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, float]]) -> list[Row]:
@@ -282,12 +246,9 @@ def _locking_rows(body: str, series: Groups, errors: Mapping[Case, Mapping[str, 
     got = errors[case]["force"]
     here = f"error of the force, linear elements of {case.size:g} mm, {body}"
     if body == HALF:
-        return [at_most(f"{here}: no locking at nu = .3", "truth above", 0.01, got, "plane stress")]
+        return [judged("no-locking", got, here=here)]
     factor = got / best[case.size]
-    return [
-        at_least(f"{here}, over that of {BEST[body]} ones: they lock", "Hughes 2000, ch. 4; cook.py", 10.0, factor,
-            "volumetric locking at nu = .49")
-    ]  # fmt: skip
+    return [judged("over-that-of-ones", factor, here=here, value=BEST[body])]
 
 
 def _default_rows(
@@ -296,24 +257,20 @@ def _default_rows(
 ) -> Iterator[Row]:  # fmt: skip
     """Whether the defaults keep what they claim, mesh and increments together."""
     case = default(body)
-    for q, claim in CLAIM[body].items():
+    for q, claim in BODIES[body]["claims"].items():
         limit = claim * case.size / truths[q].value if q in LENGTHS else claim
         got = errors[case][q] + steps[q][10]
         unit = f"{claim:g} edge length{'s' if claim > 1.0 else ''}" if q in LENGTHS else f"{100 * claim:g} %"
-        yield Row(f"error of {q} at the defaults ({case.size:g} mm, {case.base:g} mm, {case.mesher}, 10 steps), {body}",
-                  "truth above", abs(limit), got, truths[q].uncertainty,
-                  f"claimed: {unit}, plus the uncertainty of the reference", "sensitivity", "at most")  # fmt: skip
+        words = {"size": case.size, "base": case.base, "mesher": case.mesher, "body": body, "unit": unit}
+        yield judged("error-of-at-the-defaults-mm", got, abs(limit), truths[q].uncertainty, q=q, **words)
 
 
 def _float_rows(floats: Runs) -> Iterator[Row]:
     """A compliance kept in single precision: what it changes, and how near to the limit of a step it stops."""
     for case, found in floats.items():
         here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
-        yield zero(f"largest change of force, friction sum and strain, {here}", "double precision", found["change"],
-                   1e-5, "its last digit is 6e-8", "sensitivity")  # fmt: skip
-        why = "less than a digit below that, which is too close"
-        yield at_least(f"violation of the gaps, over the depth, {here}", "a step converges at a residual of 1e-8",
-                       1e-9, found["residual"], why, "sensitivity")  # fmt: skip
+        yield judged("largest-change-of-force-friction-sum", found["change"], here=here)
+        yield judged("violation", found["residual"], here=here)
 
 
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:

@@ -44,15 +44,16 @@ from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
 from ._press import changed
-from ._rows import Result, Row, at_least, at_most, columns, committed_instead, zero
+from ._rows import Result, Row, columns, committed_instead, listed
 from .held_weights import largest_change
+
+judged = listed(__file__)
 
 MASS, NORMAL, MU, G, HOLD_S = 0.045, 12.0, 1.0, 9.81, 60.0
 LEAST_GRIP = 0.5 * MASS * G / MU
 FALLS = 10.0
 """Fall (mm) in a second from which an object is not held."""
 
-DOCS = "MuJoCo documentation, Computation, Solver parameters"
 COLUMNS = (
     "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min "
     "least_grip_N"
@@ -182,24 +183,17 @@ def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[
     soft = [line for line in t if not line["noslip_iterations"]]
     ratios = [line["creep_mm_per_min"] / line["formula_mm_per_min"] for line in soft]
     here = "MuJoCo, default settings"
-    yield at_most("creep in a minute, finger3d (mm)", "a contact that sticks does not creep", 1e-12, ours,
-                  "a bound above round-off")  # fmt: skip
-    yield Row("least grip, finger3d (N)", "m g / (2 mu)", LEAST_GRIP, least, 0.01, "bisection to 1 %")
-    yield at_least(f"least grip, {here}: a fall of {FALLS:g} mm in 1 s (N)", "m g / (2 mu)", LEAST_GRIP,
-                   default["least_grip_N"], "soft friction creeps before it slips", "sensitivity")  # fmt: skip
-    yield at_least(f"creep in a minute, {here} (mm)", "nothing creeps", 1e-3, default["creep_mm_per_min"], "a micron",
-                   "sensitivity")  # fmt: skip
-    yield at_most("creep in a minute, MuJoCo, noslip_iterations = 10 (mm)", f"creep of {here}",
-                  default["creep_mm_per_min"], abs(noslip["creep_mm_per_min"]), "what it is made for",
-                  "sensitivity")  # fmt: skip
-    yield Row(f"creep of MuJoCo over v = R f / b, models without noslip: {len(soft)}, furthest from 1", DOCS, 1.0,
-              max(ratios, key=lambda ratio: abs(ratio - 1.0)), 0.01,
-              "overlap and load of all contacts are equal")  # fmt: skip
+    yield judged("creep-in-a-minute-finger3d-mm", ours)
+    yield judged("least-grip-finger3d-n", least, LEAST_GRIP)
+    yield judged("least-grip", default["least_grip_N"], LEAST_GRIP, here=here)
+    yield judged("creep-in-a-minute-mm", default["creep_mm_per_min"], here=here)
+    left = abs(noslip["creep_mm_per_min"])
+    yield judged("creep-in-a-minute-mujoco-noslip", left, default["creep_mm_per_min"], here=here)
+    yield judged("creep-of-mujoco-over-v-r", max(ratios, key=lambda ratio: abs(ratio - 1.0)), count=len(soft))
     steps = [line["creep_mm_per_min"] for line in soft if line["time_step_ms"] != default["time_step_ms"]]
     if steps:
         away = max(abs(creep / default["creep_mm_per_min"] - 1.0) for creep in steps)
-        yield zero("change of that creep with time steps of 0.5, 1 and 4 ms, largest", f"{DOCS}: none", away, 1e-3,
-                   "the formula has no time step", "sensitivity")  # fmt: skip
+        yield judged("change-of-that-creep", away)
 
 
 def _label(line: tuple[Any, ...]) -> str:

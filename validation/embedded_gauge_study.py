@@ -28,14 +28,15 @@ from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Mod
 
 from ._foil import alone, by_mesh, wing
 from ._press import fig9_finger, under
-from ._rows import Result, Row, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 FOIL = Effect(3000.0, 0.02, 3.0)
 NU, SLOPE, NOISE = 0.49, 1.5e-3, 1.5e-4
 MUS = (0.06, 0.125, 0.25, 0.4, 0.5, 0.6, 1.0)
 LENGTHS = (1.0, 2.0, 4.0, 10.0)
 DEPTHS = (1.0, 0.5, 0.25)  # of a foil under a free surface, in its lengths
-PAPER, WING = "Maeno 2004, Sec. IV", "Prandtl's equation, Glauert 1926"
 COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_free resolution_read"
 
 
@@ -82,41 +83,30 @@ def run(quick: bool) -> Result:
 def _plane_rows(quick: bool) -> Iterator[Row]:
     foil = Foils(3000.0, 0.02, 0.15)  # 3 of 20 mm, on 1 mm
     for length in (1.0, 4.0, 10.0):
-        want = wing(length, 9.0, 1.0, NU)
-        yield Row(
-            f"read over free, {length:g} mm, plane strain without end", WING, want,
-            alone(length, foil, 1.0, NU, 2), 0.005, "16 patches along the foil",
-        )  # fmt: skip
-    fine = [by_mesh(4.0, foil, 1.0, NU, 2, n) for n in ((4, 8) if quick else (8, 16))]
-    yield Row(
-        "the same by a graded mesh alone, 4 mm, extrapolated in the spacing", WING, wing(4.0, 9.0, 1.0, NU),
-        2.0 * fine[1] - fine[0], 0.005, "error ~ spacing: the ends of a stiff foil",
-    )  # fmt: skip
+        got, wanted = alone(length, foil, 1.0, NU, 2), wing(length, 9.0, 1.0, NU)
+        yield judged("read-in-plane", got, wanted, length=length)
+    counts, free = (4, 8) if quick else (8, 16), wing(4.0, 9.0, 1.0, NU)
+    yield judged("read-by-graded-mesh", _by_meshes(4.0, foil, NU, 2, counts), free)
     for below in DEPTHS[1:] if quick else DEPTHS:
-        near = [by_mesh(4.0, foil, 1.0, NU, 2, n, 4.0 * below) for n in ((4, 8) if quick else (8, 16))]
-        yield Row(
-            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, plane strain",
-            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / wing(4.0, 9.0, 1.0, NU), 0.15,
-            "left out by the effect", "sensitivity",
-        )  # fmt: skip
+        share = _by_meshes(4.0, foil, NU, 2, counts, 4.0 * below) / free
+        yield judged("free-surface-in-plane", share, below=below)
 
 
 def _space_rows() -> Iterator[Row]:
-    foil = Foils(3000.0, 0.02, 3.0)
+    foil, counts = Foils(3000.0, 0.02, 3.0), (2, 4)
     for length in (1.0, 4.0, 10.0):
-        meshes = [by_mesh(length, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
-        yield Row(
-            f"read over free, {length:g} mm, in space, nu = .3", "graded mesh, extrapolated in the spacing",
-            2.0 * meshes[1] - meshes[0], alone(length, foil, 1.0, 0.3, 3), 0.03, "two coarse meshes, first order",
-        )  # fmt: skip
-    endless = [by_mesh(4.0, foil, 1.0, 0.3, 3, n) for n in (2, 4)]
+        got, wanted = alone(length, foil, 1.0, 0.3, 3), _by_meshes(length, foil, 0.3, 3, counts)
+        yield judged("read-in-space", got, wanted, length=length)
+    endless = _by_meshes(4.0, foil, 0.3, 3, counts)
     for below in DEPTHS:
-        near = [by_mesh(4.0, foil, 1.0, 0.3, 3, n, 4.0 * below) for n in (2, 4)]
-        yield Row(
-            f"what a free surface {below:g} lengths away takes from the reading, 4 mm, in space",
-            "graded mesh, extrapolated", 1.0, (2.0 * near[1] - near[0]) / (2.0 * endless[1] - endless[0]), 0.15,
-            "left out by the effect", "sensitivity",
-        )  # fmt: skip
+        share = _by_meshes(4.0, foil, 0.3, 3, counts, 4.0 * below) / endless
+        yield judged("free-surface-in-space", share, below=below)
+
+
+def _by_meshes(length: float, foil: Foils, nu: float, dim: int, counts: tuple[int, int], *below: float) -> float:
+    """What is read over the free strain by two meshes alone, extrapolated in the spacing."""
+    coarse, fine = (by_mesh(length, foil, 1.0, nu, dim, count, *below) for count in counts)
+    return 2.0 * fine - coarse
 
 
 def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, ...]) -> Iterator[Row]:
@@ -125,21 +115,17 @@ def _finger_rows(found: dict[tuple[str, float], np.ndarray], mus: tuple[float, .
     for domain, name in (("plane-strain", "plane strain"), ("solid", "solid")):
         slopes = np.gradient(found[domain, 4.0], np.array(mus), axis=0)[at]
         for slope, what in zip(slopes, ("free strain", "as a foil of 4 mm reads it"), strict=True):
-            yield zero(f"slope of the strain at mu = .5, {what}, {name}: |slope| over 1.5e-3, log10", PAPER,
-                       float(np.log10(abs(slope) / SLOPE)), 0.48, "within a factor 3", "statement")  # fmt: skip
-            yield zero(f"error of mu at mu = .5 for 1.5e-4 of strain, {what}, {name}: over 0.1, log10", PAPER,
-                       float(np.log10(NOISE / abs(slope) / 0.1)), 0.48, "within a factor 3", "statement")  # fmt: skip
+            yield judged("slope", float(np.log10(abs(slope) / SLOPE)), what=what, name=name)
+            yield judged("error-of-mu", float(np.log10(NOISE / abs(slope) / 0.1)), what=what, name=name)
         strain = found[domain, 4.0][:, 1]
         rising = np.maximum(np.diff(strain), 0.0).sum() / np.abs(np.diff(strain)).sum()
-        yield zero(f"the strain read falls as mu grows, {name}: rising steps over all movement", "Maeno 2004, Fig. 14",
-                   float(rising), 0.05, "round-off and increments", "statement")  # fmt: skip
+        yield judged("the-strain-read-falls-as-mu", float(rising), name=name)
 
 
 def _steps_row(domain: str, value: np.ndarray, half: np.ndarray, mus: tuple[float, ...], steps: int) -> Row:
     """What half as many increments change the slope at mu = 0.5 by, which is about the error that is left."""
     slope, other = (np.gradient(v[:, 1], np.array(mus))[mus.index(0.5)] for v in (value, half))
-    text = f"slope of the strain at mu = .5 as a foil of 4 mm reads it, {domain}: with half of {steps} increments"
-    return Row(text, f"{steps} increments", slope, other, 0.2, "small beside the factor 3", "statement")
+    return judged("slope-by-half-the-increments", other, slope, domain=domain, steps=steps)
 
 
 def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarray) -> None:

@@ -18,8 +18,8 @@ import math
 import secrets
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,8 +74,7 @@ MET = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """One number of one press: its estimate beside its true error."""
 
     scene: str
@@ -251,10 +250,7 @@ def run(quick: bool, seed: int | None = None) -> Result:
     rows += [row for kind in STEP_KINDS for row in _rows(kind, automatic, "by automatic steps", ROUND)]
     rows += [_met(kind, [j for j in automatic if j.part.endswith(" met") and "not" not in j.part]) for kind in MET]
     meshes = found + [judged for here in anew.values() for judged in here]
-    every = [
-        (j.scene, j.part, j.dofs, j.mu, j.depth_mm, j.number, j.value, j.estimate, j.error) for j in meshes + steps
-    ]
-    return Result(tuple(rows), columns(COLUMNS, every), lambda figure: _draw(figure, meshes, steps))
+    return Result(tuple(rows), columns(COLUMNS, meshes + steps), lambda figure: _draw(figure, meshes, steps))
 
 
 def _by_kind_of_mesh(found: list[Judged], meshes: Mapping[str, str]) -> Iterator[Row]:

@@ -176,13 +176,11 @@ def _compatible(curves: list[Curve]) -> Iterator[Row]:
     for model in dict.fromkeys(c.model for c in curves):
         own = [c for c in curves if c.model == model and c.kind == FREE]
         for reading, count in (("slope", sum(c.by_slope for c in own)), ("vertex", sum(c.by_vertex for c in own))):
-            what = f"compatible with the figure read by its {reading}: of {len(own)} gauges, free strain, {model}"
-            yield said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least")
+            yield said("compatible-one-reading", count, reading=reading, count=len(own), here=model)
         foils = [c for c in curves if c.model == model and c.kind == READ]
         if foils:
-            what = f"compatible with the figure, either reading: of {len(foils)} foils, {model}"
-            count = sum(c.by_slope or c.by_vertex for c in foils)
-            yield said(what, "Fig. 14", 1.0, count, "at least one", 0.0, "at least")
+            compatible = sum(c.by_slope or c.by_vertex for c in foils)
+            yield said("compatible-either-reading", compatible, count=len(foils), here=model)
 
 
 def _claims(curves: list[Curve]) -> Iterator[Row]:
@@ -190,10 +188,8 @@ def _claims(curves: list[Curve]) -> Iterator[Row]:
     for c in curves:
         if (c.nu, c.leaning, (c.y, c.z)) == (NUS[-1], "30", PLACE):
             here = f"{c.kind}, {c.model}"
-            yield said(f"error of mu at .5 from a noise of 1.5e-4 by the change between neighbours, {here}",
-                       "Sec. IV", ERROR, c.error, "the paper's number", 0.0, "at most")  # fmt: skip
-            yield said(f"a second-order equation describes the strain: largest distance over the range, {here}",
-                       "Fig. 14", 0.05, c.bend, "the width of a drawn line", 0.0, "at most")  # fmt: skip
+            yield said("error-between-neighbours", c.error, wanted=ERROR, here=here)  # fmt: skip
+            yield said("second-order-range", c.bend, here=here)  # fmt: skip
 
 
 def _draw_models(figure: Any, curves: list[Curve]) -> None:

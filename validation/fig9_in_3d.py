@@ -18,8 +18,10 @@ from finger3d.mechanics.results.history import measure
 
 from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
 from ._press import fig9_finger, under
-from ._rows import Result, Row, columns
+from ._rows import Result, Row, columns, listed
 from .fig9_strains import ANGLES, gauges, statements
+
+judged = listed(__file__)
 
 SOLID = "solid"
 PLANES = (SOLID, STRAIN, STRESS)
@@ -63,15 +65,10 @@ def _checks(nu: float, size: float, numbers: dict) -> list[Row]:
     held = build(replace(held.model, held_ends=True))
     found = [measure(p.points, under(p, 0.25, STEPS[SOLID])[-1])["normal_force_N"] / 20.0 for p in (coarse, held)]
     here = f"N per mm, mu = .25, nu = {nu:g}"
-    what = f"force, 20 mm wide, edges of {1.5 * size:g} mm against {size:g} mm, {here}"
-    why = "singular corners of the base: order 1.2"
     return [
-        Row(what, "this code", numbers[SOLID, nu][2][0], found[0], 0.01, why),
-        Row(
-            f"force, 20 mm wide with ends held, {here}", "plane strain on the same in-plane sizes",
-            numbers[STRAIN, nu][2][0], found[1], 0.005, "diagonals of the cells; 0.01 % measured",
-        ),
-    ]  # fmt: skip
+        judged("force-20-mm-wide-edges-of", found[0], numbers[SOLID, nu][2][0], value=1.5 * size, size=size, here=here),
+        judged("force-20-mm-wide", found[1], numbers[STRAIN, nu][2][0], here=here),
+    ]
 
 
 def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict) -> list[Row]:
@@ -80,23 +77,11 @@ def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict
     change = {plane: float(np.ptp(shear[plane, nu], axis=0).max()) for plane in PLANES}
     at = {plane: float(np.ptp(gauge[plane, nu][30])) for plane in PLANES}
     rows = [
-        said(
-            f"the force is that of plane strain: N per mm, mu = .25, {here}", "Sec. III", numbers[STRAIN, nu][2][0],
-            numbers[SOLID, nu][2][0], "5 %: what a designer would accept", 0.05,
-        ),
-        said(
-            f"contact about 79 mm wide: as deformed, at z = 0, mm, mu = .25, {here}", "Sec. III-B", 79.0,
-            2.0 * profile.deformed, '"approximately", and the points', 1.0 + 2.0 * profile.edge_error(), "absolute",
-        ),
-        said(
-            f"gamma_xy changes with mu as in plane strain: largest change over that, {here}", "Fig. 11", 0.5,
-            change[SOLID] / change[STRAIN], "half of the signal", 0.0, "at least",
-        ),
-        said(
-            f"the gauge at 30 degrees changes with mu as in plane strain: change over that, {here}", "Fig. 12", 0.5,
-            at[SOLID] / at[STRAIN], "half of the signal", 0.0, "at least",
-        ),
-    ]  # fmt: skip
+        said("force-of-plane-strain", numbers[SOLID, nu][2][0], wanted=numbers[STRAIN, nu][2][0], here=here),
+        said("width-79-middle", 2.0 * profile.deformed, tolerance=1.0 + 2.0 * profile.edge_error(), here=here),
+        said("shear-as-in-plane-strain", change[SOLID] / change[STRAIN], here=here),
+        said("gauge-as-in-plane-strain", at[SOLID] / at[STRAIN], here=here),
+    ]
     return [*rows, *statements("20 mm wide", nu, np.array(MUS), gauge[SOLID, nu])]
 
 

@@ -56,27 +56,15 @@ def _statements(nu: float, x: np.ndarray, found: dict, small: dict, slip: dict) 
     values = found[STRAIN, nu][:, np.argmin(np.abs(x - 36.0))]
     a, c = slip[STRAIN, nu][-1]
     rows = [
-        said(
-            f"larger change of gamma_xy than in Fig. 7: ratio, {plane} against plane stress there, nu = {nu:g}",
-            "Fig. 11", 1.0, change[plane, nu] / before[STRESS, nu], "larger", 0.0, "at least",
-        )
+        said("more-than-fig-7", change[plane, nu] / before[STRESS, nu], plane=plane, nu=nu)
         for plane in (STRAIN, STRESS)
     ]  # fmt: skip
     return [
         *rows,
-        said(
-            f"the geometry does it: ratio of the changes, both in plane strain, nu = {nu:g}", "Sec. III-B",
-            1.0, change[STRAIN, nu] / before[STRAIN, nu], "larger", 0.0, "at least",
-        ),
-        said(
-            f"gamma_xy at x = 36 changes at large mu: .5 to 1 over .06 to 1, plane strain, nu = {nu:g}", "Fig. 11",
-            0.1, abs(values[-1] - values[-2]) / np.ptp(values), "a tenth of the signal", 0.0, "at least",
-        ),
-        said(
-            f"the edge slips at large mu: slip zone at mu = 1 over a, plane strain, nu = {nu:g}", "Sec. III-B",
-            0.02, (a - c) / a, "one of 50 points", 0.0, "at least",
-        ),
-    ]  # fmt: skip
+        said("the-geometry-does-it", change[STRAIN, nu] / before[STRAIN, nu], nu=nu),
+        said("shear-at-36", abs(values[-1] - values[-2]) / np.ptp(values), here=f"plane strain, nu = {nu:g}"),
+        said("edge-slips", (a - c) / a, here=f"plane strain, nu = {nu:g}"),
+    ]
 
 
 def _draw_shear(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
@@ -150,23 +138,11 @@ def statements(plane: str, nu: float, mus: np.ndarray, strain: dict[int, np.ndar
     bent = {t: bend(mus, s) for t, s in strain.items()}
     steps = np.diff(strain[30])
     return [
-        said(
-            f"strain at 30 degrees falls as mu grows: rising steps over all movement, {here}", "Fig. 14", 0.0,
-            steps[steps > 0.0].sum() / np.abs(steps).sum(), "round-off and increments", 0.05, "absolute",
-        ),
-        said(
-            f"strain grows with the angle to 60 degrees: change of strain at 60 over that at 30 degrees, {here}",
-            "Fig. 12", 1.0, change[60] / change[30], "larger", 0.0, "at least",
-        ),
-        said(
-            f"30 degrees is the most linear of 15, 30, 45, 60: its bend over the smallest of them, {here}", "Fig. 12",
-            1.0, bent[30] / min(bent[t] for t in (15, 30, 45, 60)), "within a tenth", 0.1, "at most",
-        ),
-        said(
-            f"the strain tells mu: change of strain at 30 degrees from .06 to 1 over its value, {here}", "Fig. 12", 0.1,
-            change[30] / np.abs(strain[30]).max(), "a signal of a tenth", 0.0, "at least",
-        ),
-    ]  # fmt: skip
+        said("strain-at-30-falls", steps[steps > 0.0].sum() / np.abs(steps).sum(), here=here),
+        said("grows-with-angle", change[60] / change[30], here=here),
+        said("most-linear", bent[30] / min(bent[t] for t in (15, 30, 45, 60)), here=here),
+        said("strain-tells-mu", change[30] / np.abs(strain[30]).max(), here=here),
+    ]
 
 
 def _draw_gauges(figure: Any, mus: np.ndarray, found: dict[Any, np.ndarray]) -> None:

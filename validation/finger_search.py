@@ -68,10 +68,8 @@ def _statements_shear(nu: float, found: dict[Any, tuple[float, float]], sound: d
         here = {k[1:]: found[k] for k, kept in chosen.items() if k[0] == nu and kept}
         for k, what in ((0, "smallest change from mu to mu"), (1, "change from mu = .06 to 1")):
             best = max(here, key=lambda case: here[case][k])
-            against = f"over that of the best{among}, R = {best[0]:g}, H = {best[1]:g}, nu = {nu:g}"
-            text = f"R = 100, H = 36.6 is the most sensitive: its {what} {against}"
-            share = found[(nu, *CHOSEN)][k] / here[best][k]
-            yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
+            share, words = found[(nu, *CHOSEN)][k] / here[best][k], {"radius": best[0], "edge": best[1], "nu": nu}
+            yield said("finger-by-shear", share, what=what, among=among, **words)
 
 
 def _draw_shear(figure: Any, nus: Any, radii: Any, edges: Any, found: dict[Any, tuple[float, float]]) -> None:
@@ -203,17 +201,10 @@ def _statements_gauges(plane: str, over: str, found: dict[Any, Judged], x: Float
     ):
         best = max(here, key=lambda k: here[k].best(x, over)[0])
         share = own.best(x, over)[0] / here[best].best(x, over)[0]
-        text = (
-            f"R = 100, H = 36.6 is the most sensitive, {where}: over the best{among}, R = {best[0]:g}, H = {best[1]:g}"
-        )
-        yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
+        yield said("finger-by-gauge", share, here=where, among=among, radius=best[0], edge=best[1])
     value, at, angle = own.best(x, over)
     i, j = int(np.argmin(abs(ANGLES - GAUGE[1]))), int(np.argmin(abs(x - GAUGE[0])))
-    text = (
-        f"x = 36 mm, 30 degrees is the most sensitive gauge, {where}: over that at x = {at:.0f} mm, {angle:.0f} degrees"
-    )
-    share = own.value[over][i, j] / value
-    yield said(text, "Sec. III-B", 1.0, share, "within a tenth of the best", 0.1, "at least")
+    yield said("gauge-at-36", own.value[over][i, j] / value, here=where, x=at, angle=angle)
     error, step = own.error[over].ravel()[own.value[over].argmax()], np.diff(MUS).min()
     text = f"error of the strain by the increments at the best gauge, {where}, over the least change from mu to mu"
     yield at_most(text, "half as many increments", 0.3, float(error / (abs(value) * step)),

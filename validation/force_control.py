@@ -29,20 +29,18 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Sphere
 
-from ._press import changed, fig9_finger
-from ._rows import Result, Row, at_least, zero
+from ._press import changed, converged, fig9_finger
+from ._rows import Result, Row, listed
+
+judged = listed(__file__)
 
 E, PRONY = 1.0, ((0.5, 1.0),)
 RAMP, HELD = 1.0, 40.0  # s
-SAME = "the same increments"
-CREEP = "Lee and Radok 1960; REFERENCES.md, 4.3"
-CONTROL = "REFERENCES.md, 7.3"
 
 
 def finger(size: float, material: Isotropic, mu: float) -> Model:
@@ -61,11 +59,7 @@ def block(size: float, material: Isotropic, mu: float) -> Model:
 
 def history(problem: Problem, legs: tuple[Leg, ...]) -> list[Tree]:
     """What is measured after every increment."""
-    out = []
-    for frame in march(changed(problem, legs=legs)):
-        assert frame.outcome.ok, frame.outcome
-        out.append(measure(problem.points, frame))
-    return out
+    return [measure(problem.points, frame) for frame in converged(changed(problem, legs=legs))]
 
 
 def by_depths(problem: Problem, steps: list[Tree]) -> list[Tree]:
@@ -107,18 +101,12 @@ def run(quick: bool) -> Result:
         rows += _cycle_rows(name, problem, cycles[name], count, force)
         smooth = changed(problem, friction=Coulomb(0.0))
         free = _cycle(smooth, depth, force, count)
-        rows.append(
-            zero(f"depth on the way down less that on the way up, over it, mu = 0, {name}", "unique",
-                float(_loop(free, count).max()), 1e-8, "the contact's residual")
-        )  # fmt: skip
+        rows.append(judged("depth-without-friction", float(_loop(free, count).max()), name=name))
     found, curve = _creep(quick)
     rows += found
     steps = cycles["finger, plane strain"]
-    table = {
-        "force_N": column(steps, "normal_force_N").tolist(),
-        "depth_mm": column(steps, "depth_mm").tolist(),
-        "friction_sum_N": column(steps, "friction_sum_N").tolist(),
-    }
+    names = {"force_N": "normal_force_N", "depth_mm": "depth_mm", "friction_sum_N": "friction_sum_N"}
+    table = {title: column(steps, name).tolist() for title, name in names.items()}
     return Result(tuple(rows), table, lambda figure: _draw(figure, cycles, count, curve))
 
 
@@ -141,14 +129,11 @@ def _cycle_rows(name: str, problem: Problem, steps: list[Tree], count: int, forc
     found = column(steps, "normal_force_N")
     top, end = (difference(steps[k], again[k], height) for k in (count - 1, -1))
     return [
-        zero(f"largest error of the force over it, {name}", CONTROL, float((np.abs(found - wanted) / wanted).max()),
-            1e-10, "the tolerance of prescribed forces"),
-        zero(f"largest difference of any quantity from the press by depths, at the largest force, {name}", SAME, top,
-            2e-5, "the first increment begins in shares of a depth known to a thousandth"),
-        zero(f"the same after the way down, {name}", SAME, end, 2e-5, "as before"),
-        at_least(f"depth on the way down less that on the way up, over it, largest, {name}", "Spence 1975, Turner 1979",
-            1e-6, float(_loop(steps, count).max()), "friction is not reversible: far above the residual"),
-    ]  # fmt: skip
+        judged("largest-error", float((np.abs(found - wanted) / wanted).max()), name=name),
+        judged("largest-difference-of-any-quantity-from", top, name=name),
+        judged("the-same-after-the-way-down", end, name=name),
+        judged("depth-with-friction", float(_loop(steps, count).max()), name=name),
+    ]
 
 
 def creep(t: float) -> float:
@@ -178,16 +163,15 @@ def _creep(quick: bool) -> tuple[list[Row], dict[str, Any]]:
             end = history(build(replace(elastic, material=relaxed)), (Leg(4.0, steps=per_second, force_N=force),))
             what = f"{'constant nu' if constant else 'constant K'}, mu = {mu:g}"
             ratio = steps[-1]["depth_mm"] / end[-1]["depth_mm"]
-            row = Row(f"depth after {HELD:g} s over that at the relaxed moduli, {what}", CREEP, 1.0, ratio, 1e-7,
-                      "exp(-20) of the creep is left")  # fmt: skip
+            row = judged("depth-after-40-s-over-that", ratio, what=what)
             if mu:
                 why = "the path differs: friction follows a force that grows, or a contact that grows while it is held"
                 row = replace(row, reference="elastic press", tolerance=1e-2, reason=why, kind="statement")
             rows.append(row)
             if constant and not mu:
                 rows += _creep_rows(elastic, steps, per_second, force)
-                curve = {"time": column(steps, "time_s"), "depth": column(steps, "depth_mm"),
-                         "end": end[-1]["depth_mm"]}  # fmt: skip
+                curve = {"time": column(steps, "time_s"), "depth": column(steps, "depth_mm")}
+                curve["end"] = end[-1]["depth_mm"]
     return rows, curve
 
 
@@ -198,14 +182,10 @@ def _creep_rows(model: Model, steps: list[Tree], per_second: int, force: float) 
     early = int(np.argmin(np.abs(time - RAMP - 4.0)))
     held = column(steps, "normal_force_N")[per_second:]
     return [
-        zero("elastic force at the depth over F J, up to 4 s of the hold, largest error", CREEP,
-            float(away[: early + 1].max()), 0.25 / per_second**2,
-            "second order in the increment: the elastic force is linear within it"),
-        zero("largest error of the held force over it", CONTROL, float(np.abs(held / force - 1.0).max()), 1e-9,
-            "the tolerance of prescribed forces"),
-        Row("least increase of the depth in an increment of the hold, mm", "creep", 0.0,
-            float(np.diff(depth[per_second - 1 :]).min()), 1e-8, "it grows all the time", measure="at least"),
-    ]  # fmt: skip
+        judged("elastic-force-at-the-depth-over", float(away[: early + 1].max()), tolerance=0.25 / per_second**2),
+        judged("error-of-held-force", float(np.abs(held / force - 1.0).max())),
+        judged("least-increase", float(np.diff(depth[per_second - 1 :]).min())),
+    ]
 
 
 def _draw(figure: Any, cycles: dict[str, list[Tree]], count: int, curve: dict[str, Any]) -> None:

@@ -30,11 +30,11 @@ from finger3d.scene import load
 
 from . import _layer
 from ._press import changed
-from ._rows import Result, Row, exact_columns
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 SCENES = Path(__file__).resolve().parents[1] / "geometries"
-LAYER = "bonded layer; REFERENCES.md, 1.1 and 1.7"
-HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1 and 1.3"
 SCATTER = "pytetwild's meshes differ from run to run"
 RIM = "first order at the sharp rim: swept meshes of 0.12 to 0.28 mm differ by 1.3 %"
 SIZES = {"edge": 0.2, "gear": 0.2, "coin_rim": 0.2, "wavy_plate": 0.3, "ball": 0.2, "soft_ball": 0.25}
@@ -114,16 +114,15 @@ def _theory_rows(ball: Problem, soft_ball: Problem) -> list[Row]:
     soft, b = at_equal_radius(soft_ball, radius, both)
     q = b**2 * (8.0**-3 + 10.0**-3) * radius
     return [
-        Row(
-            f"ball without friction: force over Hertz's at equal a = {a:.2f} mm", LAYER,
-            layer * round_by_parabola((a / 8.0) ** 2), hard, 0.01 + 0.1 * a / 8.0,
-            "the block's sides, 12 mm away, are neglected, and slopes, of the order (1 - 2 nu) a / R",
+        judged(
+            "ball-without-friction",
+            hard,
+            layer * round_by_parabola((a / 8.0) ** 2),
+            tolerance=0.01 + 0.1 * a / 8.0,
+            a=a,
         ),
-        Row(
-            f"soft ball without friction: force over Hertz's at equal a = {b:.2f} mm", HERTZ,
-            round_by_parabola(q), soft, 0.02, "theory for half-spaces; half balls are held 3 a away",
-        ),
-    ]  # fmt: skip
+        judged("soft-ball-without-friction", soft, round_by_parabola(q), b=b),
+    ]
 
 
 def _draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:

@@ -24,9 +24,10 @@ from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, columns, listed
 
-SOURCE = "Helmut et al. 2024; REFERENCES.md, 9.1"
+judged = listed(__file__)
+
 DEPTHS, FORCES = np.array([0.5, 1.0, 1.5, 2.0]), np.array([1.6503, 5.9641, 13.5257, 23.2532])
 SHARE = 0.03
 """Standard deviation of a force over the force; the publication has none."""
@@ -135,24 +136,16 @@ def _rows(models: list[Model], best: Model) -> Iterator[Row]:
     """What fits, what the forces tell, and the prediction."""
     fitting = [m for m in models if m.misfit <= FITS]
     told = f"{best.law}, mu = {best.mu:g}, nu = {best.nu:g}, E = {best.E:.3f} MPa"
-    yield at_most(f"largest distance from the four forces, best of {len(models)} models: {told}", SOURCE, FITS,
-                  best.misfit, "a block for a gel with a rounded rim; force and zero without published errors",
-                  "validation")  # fmt: skip
-    yield at_least("models that fit within 5 %, over all models", SOURCE, 1.0, len(fitting) / len(models),
-                   "if the forces told nothing but modulus and zero", "statement")  # fmt: skip
+    yield judged("largest-distance-from-the-four-forces", best.misfit, FITS, count=len(models), told=told)
+    yield judged("models-that-fit-within-5-over", len(fitting) / len(models))
     for name, values in {"friction coefficient": [m.mu for m in fitting], "Young's modulus": [m.E for m in fitting],
                          "Poisson's ratio": [m.nu for m in fitting]}.items():  # fmt: skip
         ratio = max(values, default=np.nan) / min(values, default=np.nan)
-        yield at_most(f"the forces tell the {name} within 10 %: largest over smallest of the models that fit", SOURCE,
-                      1.1, ratio, "10 %", "statement")  # fmt: skip
+        yield judged("the-forces-tell-the-within-10", ratio, name=name)
     # of all models: which of them fit is known only with the fourth force
     band = [m.predicted + sign * 2.0 * m.predicted_sd for m in models for sign in (-1.0, 1.0)]
     outside = max(min(band) - FORCES[3], FORCES[3] - max(band), 0.0)
-    yield Row(
-        f"distance of the force at 2 mm from what the first three depths predict, {min(band):.1f} "
-        f"to {max(band):.1f} N, N", SOURCE, 0.0, outside, 0.0,
-        "two standard deviations about every model", "validation", "absolute",
-    )  # fmt: skip
+    yield judged("distance", outside, value=min(band), other_value=max(band))
 
 
 def _checks(best: Model, finer: Model, size: float) -> list[Row]:
@@ -161,19 +154,10 @@ def _checks(best: Model, finer: Model, size: float) -> list[Row]:
     depth, force = ([0.0, *(getattr(s, key) for s in tied.steps)] for key in ("depth_mm", "normal_force_N"))
     theirs = np.interp(DEPTHS, depth, force) / FORCES
     return [
-        Row(
-            f"Young's modulus on edges of {0.7 * size:.2g} mm, MPa", f"edges of {size:g} mm", best.E, finer.E, 0.1,
-            "the contact of 2 mm is some 9 mm wide", "sensitivity",
-        ),
-        Row(
-            "force by the published constant, tied, at 2 mm over the measured one", "Helmut et al. 2024, C10", 1.0,
-            float(theirs[3]), 0.1, "their rim is rounded, and their loss has absolute forces", "statement",
-        ),
-        Row(
-            "force by the published constant, tied, at 0.5 mm over the measured one", "Helmut et al. 2024, C10", 1.0,
-            float(theirs[0]), 0.1, "their rim is rounded, and their loss has absolute forces", "statement",
-        ),
-    ]  # fmt: skip
+        judged("young-s-modulus-on-edges-of", finer.E, best.E, value=0.7 * size, size=size),
+        judged("published-constant-at-2-mm", float(theirs[3])),
+        judged("published-constant-at-half-mm", float(theirs[0])),
+    ]
 
 
 def _draw(figure: Any, models: list[Model], best: Model) -> None:

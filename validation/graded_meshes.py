@@ -13,9 +13,9 @@ too: a bar is what tells a user that a mesh is fine enough.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -28,7 +28,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, MeshOptions, Model
 
-from ._rows import Result, Row, at_least, at_most, columns, committed
+from ._rows import Result, Row, columns, committed, listed
+
+judged = listed(__file__)
 
 FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
 STEPS, ROUNDING = 10, 1e-9
@@ -48,8 +50,7 @@ WAYS = {
 }
 
 
-@dataclass(frozen=True)
-class Mesh:
+class Mesh(NamedTuple):
     """A mesh and the error that it leaves in its goal, relative to the truth; `told` is its error bar, nan without."""
 
     domain: str
@@ -65,20 +66,13 @@ def run(quick: bool) -> Result:
     """All goals; quick: the force of the section."""
     wanted = {("plane-strain", GOAL): (3e-3,)} if quick else TOLERANCES
     found = [mesh for (domain, goal), tolerances in wanted.items() for mesh in _meshes(domain, goal, tolerances)]
-    lines = [tuple(vars(mesh).values()) for mesh in found]
     names = "domain goal way dofs value estimate true_error"
-    return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
+    return Result(tuple(_rows(found)), columns(names, found), lambda figure: _draw(figure, found))
 
 
 def _meshes(domain: Domain, goal: str, tolerances: tuple[float, ...]) -> Iterator[Mesh]:
     """Yield the meshes of equal grading or edges, then those graded towards the goal."""
-    keys = [
-        f"press.steps={STEPS}",
-        "mesh.mesher=swept",
-        f"model.domain={domain}",
-        "friction.mu=0.25",
-        "material.nu=0.49",
-    ]
+    keys = f"press.steps={STEPS}", f"model.domain={domain}", "mesh.mesher=swept", "friction.mu=0.25", "material.nu=0.49"
     model = replace(finger3d.load(FIG9, keys).model(), mesh=MeshOptions(*START[domain], "swept"))
     if (domain, goal) == ("solid", GAUGE):
         truth = _value(build(replace(model, mesh=FINEST)), goal)
@@ -116,11 +110,12 @@ def _uniform(domain: str, goal: str) -> tuple[np.ndarray, np.ndarray, np.ndarray
     """Return edge lengths, unknowns and values of the mixed elements of cost_of_accuracy, coarse to fine."""
     body = "section" if domain == "plane-strain" else "solid"
     rows = [
-        row for row in committed("cost_of_accuracy")
+        row
+        for row in committed("cost_of_accuracy")
         if (row["kind"], row["body"], row["element"], row["mesher"]) == ("run", body, "mixed", "swept")
         and (row["solver"], row["way"], row["steps"]) == ("pardiso", "condensed", str(STEPS))
         and abs(float(row["base_size_mm"]) / float(row["size_mm"]) - 4.0) < ROUNDING
-    ]  # fmt: skip
+    ]
     unique = {float(row["size_mm"]): row for row in rows}
     sizes = np.array(sorted(unique, reverse=True))
     chosen = [unique[size] for size in sizes]
@@ -145,21 +140,16 @@ def _rows(found: list[Mesh]) -> Iterator[Row]:
         equal = [mesh for mesh in some if mesh.way != "graded"]
         for mesh in (mesh for mesh in some if mesh.way == "graded"):
             name = f"{goal}, {domain}, {mesh.dofs} unknowns"
-            yield at_most(f"true error over the estimate: {name}", "claim of finger3d for its error bars", 2.0,
-                          mesh.error / mesh.told, "two error bars")  # fmt: skip
+            yield judged("true-error-over-the-estimate", mesh.error / mesh.told, name=name)
             # an error may be small by chance: the bar of the graded mesh counts, and no finer mesh may exceed it
             large = [other.dofs for other in equal if other.error > max(mesh.error, mesh.told)]
             enough = [other.dofs for other in equal if other.dofs > max(large, default=0)]
             ratio = min(enough, default=equal[-1].dofs) / mesh.dofs
-            yield at_least(
-                f"unknowns of {equal[0].way} for an error below its bar, over those of the graded mesh: {name}",
-                "goal of this project", WANTED, ratio, "the finest of them where none suffices",
-                "statement")  # fmt: skip
+            yield judged("unknowns-of-for-an-error-below", ratio, WANTED, way=equal[0].way, name=name)
             if not any(np.isnan(other.told) for other in equal):
                 enough = [other.dofs for other in equal if other.told <= mesh.told]
-                yield at_least(f"unknowns of {equal[0].way} with as small a bar, over those of the graded mesh: {name}",
-                               "goal of this project", WANTED, min(enough, default=equal[-1].dofs) / mesh.dofs,
-                               "the finest of them where none has", "statement")  # fmt: skip
+                ratio = min(enough, default=equal[-1].dofs) / mesh.dofs
+                yield judged("unknowns-of", ratio, WANTED, way=equal[0].way, name=name)
 
 
 def _draw(figure: Any, found: list[Mesh]) -> None:

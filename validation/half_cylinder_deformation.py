@@ -40,12 +40,9 @@ def _r5(quick: bool) -> Result:
     for plane, nu in SHOWN:
         other = half_cylinder(nu, plane, size / 2.0)
         fine = Profile.of(other, under(other, 0.25)[-1]).force
-        rows.append(
-            Row(
-                f"force at 1 mm, N per mm, {plane}, nu = {nu:g}", "this code, edges half as long", fine,
-                found[plane, nu][2].force, 0.004 if quick else 0.002, "mesh: the corners of the base are singular",
-            )
-        )  # fmt: skip
+        what, own = f"force at 1 mm, N per mm, {plane}, nu = {nu:g}", found[plane, nu][2].force
+        source, why = "this code, edges half as long", "mesh: the corners of the base are singular"
+        rows.append(Row(what, source, fine, own, 0.004 if quick else 0.002, why))
     problem, frame, profile = found[STRESS, 0.3]
     gap = np.abs(frame.state.gap[frame.state.status != 0]).max()
     what = "distance of the contact from the plate, mm"
@@ -53,12 +50,7 @@ def _r5(quick: bool) -> Result:
     for plane in (STRESS, STRAIN):
         for what, key in (("force", "force"), ("contact half-width at rest", "a"), ("stick half-width", "c")):
             low, high = (getattr(found[plane, nu][2], key) for nu in (0.3, 0.49))
-            rows.append(
-                said(
-                    f"nu need not be told: {what} at nu = .49 is that at .3, {plane}", "gives no nu", low, high,
-                    "10 % would be read off a figure", 0.1,
-                )
-            )  # fmt: skip
+            rows.append(said("nu-not-told-section", high, low, what=what, plane=plane))
     names = "plane nu force_N_per_mm a_mm a_deformed_mm c_mm widest_half_mm"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw_r5(figure, found))
 
@@ -119,8 +111,7 @@ def _fig9(quick: bool) -> Result:
 def _said(plane: str, nu: float, mu: float, which: int, widths: dict[Any, tuple[float, ...]]) -> Row:
     where = f"{('at rest', 'as deformed')[which]}, mm, {plane}, nu = {nu:g}, mu = {mu:g}"
     got, error = widths[plane, nu, mu][which], widths[plane, nu, mu][2]
-    reason = '"approximately": a millimetre, and the points'
-    return said(f"contact about 79 mm wide: {where}", "Sec. III-B", WANTED, got, reason, 1.0 + error, "absolute")
+    return said("width-79-section", got, wanted=WANTED, tolerance=1.0 + error, where=where)
 
 
 def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:

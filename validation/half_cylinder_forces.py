@@ -95,19 +95,10 @@ def statements_depths(here: str, profiles: Sequence[Profile]) -> list[Row]:
     shown = "all depths" if len(profiles) > 1 else "full depth"
     net = max(abs(p.q @ p.area) / (np.abs(p.q) @ p.area) for p in profiles)
     return [
-        said(
-            f"f_n is semi-circular: largest distance from a half ellipse over its peak, {shown}, {here}",
-            "Fig. 3", 0.0, max(map(roundness, profiles)), "5 % is the width of a drawn line", 0.05, "absolute",
-        ),
-        said(
-            f"f_t has one minimum and one maximum: extrema at full depth, {here}", "Fig. 3", 2.0,
-            extrema(profiles[-1].q), "a count; wiggles below a fifth of the range are not counted", 0.0, "absolute",
-        ),
-        said(
-            f"the sum of f_t is zero: |sum f_t| / sum |f_t|, {here}", "Sec. II-B", 0.0, net, "round-off", 1e-6,
-            "absolute",
-        ),
-    ]  # fmt: skip
+        said("semi-circular", max(map(roundness, profiles)), shown=shown, here=here),
+        said("two-extrema", extrema(profiles[-1].q), here=here),
+        said("no-net-friction", net, here=here),
+    ]
 
 
 def _draw_depths(figure: Any, found: dict[Any, list[Profile]]) -> None:
@@ -156,20 +147,10 @@ def statements_zones(here: str, early: Profile, last: Profile) -> list[Row]:
     """What the paper says of the zones, at a fifth of the depth and at full depth."""
     error = last.edge_error() + early.edge_error()
     return [
-        said(
-            f"stick in the middle between two slip zones at full depth (1: yes), {here}", "Fig. 4", 1.0,
-            last.slips_at_edges_only, "yes or no", 0.0, "absolute",
-        ),
-        said(
-            f"slip zones grow with depth: width at full depth less that at a fifth, mm, {here}", "Sec. II-B", error,
-            (last.a - last.c) - (early.a - early.c), "more than the points can tell", 0.0, "at least",
-        ),
-        said(
-            f"slip zones grow in their share of the contact: 1 - c/a at full depth less at a fifth, {here}",
-            "Sec. II-B", error / early.a, last.c / -last.a + early.c / early.a, "more than the points can tell", 0.0,
-            "at least",
-        ),
-    ]  # fmt: skip
+        said("stick-between-slip", last.slips_at_edges_only, here=here),
+        said("slip-zones-grow", (last.a - last.c) - (early.a - early.c), wanted=error, here=here),
+        said("slip-share-grows", last.c / -last.a + early.c / early.a, wanted=error / early.a, here=here),
+    ]
 
 
 def _draw_zones(figure: Any, found: dict[Any, list[Profile]]) -> None:
@@ -230,19 +211,10 @@ def statements_mus(
     """What Sec. II-B says of the normal force and of the sum of |f_t| for the five coefficients."""
     slip = [p.a - p.c for p in profiles]
     return [
-        said(
-            f"f_n does not differ greatly: force at mu = 1 is that at .06, {here}", "Fig. 6", force[0], force[-1],
-            "10 % would be read off a figure", 0.1,
-        ),
-        said(
-            f"f_t is large when mu is: sum |f_t| at mu = 1 over that at .25, {here}", "Fig. 6", 1.1,
-            friction[-1] / friction[2], "10 % would be read off a figure", 0.0, "at least",
-        ),
-        said(
-            f"the slip zone is small when mu is large: width at mu = 1 over that at .06, {here}", "Fig. 6", 0.5,
-            slip[-1] / max(slip[0], profiles[0].edge_error()), "half would be called small", 0.0, "at most",
-        ),
-    ]  # fmt: skip
+        said("normal-force-stays", force[-1], wanted=force[0], here=here),
+        said("friction-grows", friction[-1] / friction[2], here=here),
+        said("slip-zone-shrinks", slip[-1] / max(slip[0], profiles[0].edge_error()), here=here),
+    ]
 
 
 def _draw_mus(figure: Any, found: dict[Any, Profile]) -> None:

@@ -67,12 +67,9 @@ def statements_depths(here: str, early: np.ndarray, last: np.ndarray) -> Iterato
     """What Sec. II-B says of the strains (3, n) at a fifth of the depth and at full depth."""
     change = np.abs(last - early).max(axis=1)
     shape = np.abs(_normalised(last) - _normalised(early)).max(axis=1)
-    reason = "a quarter would still be noticed"
     for k in (0, 1):
-        what = f"{NAMES[k]} changes little with depth: largest change over that of gamma_xy, {here}"
-        yield said(what, "Fig. 5", 0.25, change[k] / change[2], reason, 0.0, "at most")
-        what = f"{NAMES[k]} keeps its shape: largest change of the normalised profile over that of gamma_xy, {here}"
-        yield said(what, "Fig. 5", 0.25, shape[k] / shape[2], reason, 0.0, "at most")
+        yield said("little-with-depth", change[k] / change[2], name=NAMES[k], here=here)
+        yield said("keeps-its-shape", shape[k] / shape[2], name=NAMES[k], here=here)
 
 
 def _normalised(strain: np.ndarray) -> np.ndarray:
@@ -131,19 +128,10 @@ def statements_mus(here: str, x: np.ndarray, values: np.ndarray, a: float) -> li
     change = np.ptp(values, axis=0)
     middle, most = len(x) // 2, int(np.argmax(change[2]))
     return [
-        said(
-            f"gamma_xy changes with mu: its largest change over its largest value, {here}", "Fig. 7", 0.05,
-            change[2].max() / np.abs(values[:, 2]).max(), "5 % would be seen in a figure", 0.0, "at least",
-        ),
-        said(
-            f"gamma_xy changes more than eps_x at x = 0: change of eps_x over the largest of gamma_xy, {here}",
-            "Fig. 7", 1.0, change[0][middle] / change[2].max(), "more", 0.0, "at most",
-        ),
-        said(
-            f"gamma_xy changes most near the edge: |x|/a of its largest change, {here}", "Fig. 7", 0.5,
-            abs(x[most]) / a, "the outer half of the contact", 0.0, "at least",
-        ),
-    ]  # fmt: skip
+        said("shear-changes", change[2].max() / np.abs(values[:, 2]).max(), here=here),
+        said("shear-more-than-eps-x", change[0][middle] / change[2].max(), here=here),
+        said("shear-near-edge", abs(x[most]) / a, here=here),
+    ]
 
 
 def _on_all_lines(found: dict[Any, np.ndarray]) -> Iterator[Row]:
@@ -153,8 +141,7 @@ def _on_all_lines(found: dict[Any, np.ndarray]) -> Iterator[Row]:
     more = {body: c[2].max() > c[0][c.shape[1] // 2] for body, c in change.items()}
     for plane in (STRESS, STRAIN):
         judged = [wins for (_, own, _), wins in more.items() if own == plane]
-        what = f"gamma_xy changes more than eps_x at x = 0: of {len(judged)} combinations of line and nu, {plane}"
-        yield said(what, "Fig. 7", len(judged), sum(judged), "in all of them", 0.0, "at least")
+        yield said("shear-more-on-all-lines", sum(judged), len(judged), plane=plane)
 
 
 def _draw_mus(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
@@ -211,18 +198,12 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], signal: flo
             whole = found[plane, nu, static, branch, 1.0]
             return float(np.abs(found[plane, nu, static, branch, ratio] - whole).max())
 
-        close, far = max(change(0.7), change(0.5)), change(0.1)
-        eye, tenth = "5 % would be seen in a figure", "a tenth of the signal"
-        what = "change of gamma_xy over the largest gamma_xy"
-        told = f"ratios .7 and .5 change little: {what}, {here}"
-        rows.append(said(told, "Fig. 8", 0.05, close / largest, eye, 0.0, "at most"))
-        rows.append(said(f"ratio .1 changes more: {what}, {here}", "Fig. 8", 0.05, far / largest, eye, 0.0, "at least"))
+        rows.append(said("kinetic-half", max(change(0.7), change(0.5)) / largest, here=here))
+        rows.append(said("kinetic-tenth", change(0.1) / largest, here=here))
         if len(statics) > 1:
             worst = max(change(0.5, s) for s in statics if s != 0.25)
-            said_of = f"the same at mu = .125 and .5: ratio .5, {what}, {here}"
-            rows.append(said(said_of, "Sec. II-B", 0.05, worst / largest, eye, 0.0, "at most"))
-        what = f"mu can be told at ratio .5: change of gamma_xy over that by mu = .06 to 1, {here}"
-        rows.append(said(what, "Sec. II-B", 0.1, change(0.5) / signal, tenth, 0.0, "at most"))
+            rows.append(said("kinetic-other-mu", worst / largest, here=here))
+        rows.append(said("kinetic-told", change(0.5) / signal, here=here))
     return rows
 
 

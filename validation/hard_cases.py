@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from finger3d.objects import ObjectPose
 
 from . import _hard
 from ._common import free_motion
-from ._rows import Result, Row, Settled, at_least, at_most, zero
+from ._rows import Result, Row, Settled, at_least, at_most, grouped, zero
 
 DEPTH = 10.0
 NU = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5)
@@ -206,23 +207,21 @@ def _grid_rows(dim: int, columns: dict[str, list[Any]], counts: tuple[list[float
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
-    t = {k: np.array(v) for k, v in columns.items()}
     left, middle, right = figure.subplots(1, 3)
-    mus = np.unique(t["mu"])
-    names = [f"{m:g}" for m in mus]
     for dim, mark in ((2, "o"), (3, "s")):
+        legs = dict(sorted(grouped(columns, "mu", dim=dim), key=itemgetter(0)))
+        names = [f"{mu:g}" for mu in legs]
         for axes, key in ((left, "iterations_median"), (middle, "iterations_max")):
             for quantile, style, name in ((0.5, "-", "median"), (1.0, "--", "largest")):
-                legs = [t[key][(t["dim"] == dim) & (t["mu"] == m)] for m in mus]
-                values = [np.quantile(v, quantile) if len(v) else np.nan for v in legs]
+                values = [np.quantile(part[key], quantile) for part in legs.values()]
                 axes.semilogy(names, values, mark + style, label=f"{dim}D, {name} of the legs")
     left.axhline(10, color="k", lw=0.8, ls=":")
     below = 0.03  # room for the legend
     left.set(xlabel="mu", ylabel="median iterations per part", ylim=(below, None))
     middle.set(xlabel="mu", ylabel="largest iterations per part", ylim=(below, None))
     for key, label in (("settled", "finger3d"), ("paper_settled", "the paper's rule")):
-        share = [100 * t[key][t["mu"] == m].sum() / t["increments"][t["mu"] == m].sum() for m in mus]
-        right.plot(names, share, "o-", label=label)
+        share = {mu: 100 * t[key].sum() / t["increments"].sum() for mu, t in grouped(columns, "mu")}
+        right.plot([f"{mu:g}" for mu in sorted(share)], [share[mu] for mu in sorted(share)], "o-", label=label)
     right.set(xlabel="mu", ylabel="settled increments, %", ylim=(0, 105))
     for axes in (left, middle, right):
         axes.tick_params(axis="x", rotation=45)

@@ -43,7 +43,7 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
-from ._rows import Result, Row, Settled, at_least, at_most, settled
+from ._rows import Result, Row, Settled, at_least, at_most, grouped, of_records, settled
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -343,22 +343,17 @@ def _table(found: dict[str, list[tuple[int, Model, Found]]]) -> dict[str, list[A
         for mesh, scenes in found.items()
         for number, model, f in scenes
     ]  # fmt: skip
-    return {key: [row[key] for row in rows] for key in rows[0]}
+    return of_records(rows)
 
 
 def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
     left, right = figure.subplots(1, 2)
-    t = {key: np.array(values) for key, values in table.items()}
-    share = 100.0 * np.maximum(t["penetration_over_depth"].astype(float), 1e-6)
-    size = t["size_mm"].astype(float)
-    for mesh, mark in (("coarse", "."), ("default", "o"), ("balls", "^")):
-        for kind, solid, color in (("sections", False, "C0"), ("solids", True, "C1")):
-            which = (t["mesh"] == mesh) & ((t["domain"] == "solid") == solid)
-            if which.any():
-                name = "balls, default meshes" if mesh == "balls" else f"{kind}, {mesh} meshes"
-                left.loglog(size[which], share[which], color + mark, label=name)
-                style = color + {"coarse": ":", "default": "-", "balls": "--"}[mesh]
-                right.step(np.sort(share[which]), np.linspace(0.0, 100.0, which.sum()), style, label=name)
+    for (mesh, solid), t in grouped(table | {"solid": [d == "solid" for d in table["domain"]]}, "mesh", "solid"):
+        share, color = 100.0 * np.maximum(t["penetration_over_depth"], 1e-6), "C1" if solid else "C0"
+        name = "balls, default meshes" if mesh == "balls" else f"{'solids' if solid else 'sections'}, {mesh} meshes"
+        left.loglog(t["size_mm"], share, color + {"coarse": ".", "default": "o", "balls": "^"}[mesh], label=name)
+        style = color + {"coarse": ":", "default": "-", "balls": "--"}[mesh]
+        right.step(np.sort(share), np.linspace(0.0, 100.0, len(share)), style, label=name)
     left.axhline(1.0, color="k", lw=0.8, ls=":")
     right.axvline(1.0, color="k", lw=0.8, ls=":")
     left.set(xlabel="edge length at the contact (mm)", ylabel="largest penetration, % of the depth")

@@ -23,8 +23,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import astuple, dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,7 +45,9 @@ from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press
 from ._press import changed, fig9_finger
-from ._rows import Result, Row, at_least, at_most, columns, zero
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 DEPTH, STEPS, DEVIATIONS, LIMIT = 10.0, 4, 3.0, 0.1
 BELOW = 0.999  # of the least normal force: slips
@@ -53,13 +55,10 @@ READINGS = 25  # of each object, as in the tutorial; three standard deviations o
 HELD_N, HELD_MU = 50.0, 0.5  # of the long hold, under half of the largest tangential force
 NOISE, WEIGHT = (2.5e-4, 1e-3), (0.3, 3.0)  # kg
 G = 9.81
-COULOMB = "Coulomb's law, Q = mu N"
-GOAL = "goal of this project"
 COLUMNS = "weight_kg mu noise mu_read mu_std status normal_N least_N slips used single_N"
 
 
-@dataclass(frozen=True)
-class Lift:
+class Lift(NamedTuple):
     """An object and its lift; forces in N; without a normal force if mu was not determined.
 
     `single` is the normal force after the first reading alone, without a lift.
@@ -178,7 +177,7 @@ def run(quick: bool) -> Result:
     if not quick:
         creeps["20 mm wide"] = creep(held("solid", 4.0), hold)
     rows = _rows(lifts, dropped(section, lifts)) + [_creep_row(name, hold, mm) for name, mm in creeps.items()]
-    return Result(tuple(rows), columns(COLUMNS, [astuple(x) for x in lifts]), lambda figure: _draw(figure, lifts))
+    return Result(tuple(rows), columns(COLUMNS, lifts), lambda figure: _draw(figure, lifts))
 
 
 def dropped(problem: Problem, lifts: list[Lift]) -> Float:
@@ -200,27 +199,19 @@ def _rows(lifts: list[Lift], said: Float) -> list[Row]:
     alone = np.array([x.single / x.least for x in lifts if math.isfinite(x.single)])
     here = f"{len(acted)} of {len(lifts)} objects whose mu the gauge determines"
     return [
-        at_least(f"share lifted without slip, {here}", "one-sided, 3 standard deviations", 0.99, float(safe),
-            "normal distribution: 0.9987"),
-        zero(f"lifts whose outcome is not Coulomb's, {here}", COULOMB, float(wrong), 0.0, "none"),
-        at_most(f"normal force over the least, median, {here}", GOAL, 1.3, float(np.median(ratios))),
-        at_most(f"normal force over the least, largest, {here}", GOAL, 1.3, float(ratios.max())),
-        at_most(f"normal force over the least by one reading, largest, {len(alone)} objects", GOAL, 1.3,
-            float(alone.max()), kind="statement"),
-        at_least(f"share held with at most 1.3 times the least by one reading, {len(alone)} objects", GOAL, 1.0,
-            float(np.mean(alone <= 1.3)), "every one", "statement"),
-        zero(f"objects held at {BELOW:g} of the least force, of {len(lifts)}", COULOMB, float(np.isnan(said).sum()),
-            0.0, "none"),
-        Row("largest force that these can hold, as told, over mu N, furthest from 1", COULOMB, 1.0,
-            float(said[np.argmax(np.abs(said - 1.0))]), 1e-8, "nine digits are told"),
-    ]  # fmt: skip
+        judged("share-lifted-without-slip", float(safe), here=here),
+        judged("lifts-whose-outcome-is-not-coulomb", float(wrong), here=here),
+        judged("normal-force-over-the-least-median", float(np.median(ratios)), here=here),
+        judged("normal-force-over-the-least-largest", float(ratios.max()), here=here),
+        judged("normal-force-over-the-least-by", float(alone.max()), count=len(alone)),
+        judged("share-held", float(np.mean(alone <= 1.3)), count=len(alone)),
+        judged("objects-held-at-0-999", float(np.isnan(said).sum()), count=len(lifts)),
+        judged("largest-force-that-these-can-hold", float(said[np.argmax(np.abs(said - 1.0))])),
+    ]
 
 
 def _creep_row(name: str, count: int, mm: float) -> Row:
-    return at_most(
-        f"largest change of any pose, gap, slip or displacement in a hold of {count} increments, {name} (mm)",
-        "a contact that sticks does not creep", 1e-12, mm,
-        "a bound; round-off of the displacements, of about 2 mm, is 4e-16 mm")  # fmt: skip
+    return judged("largest-change-of-any-pose-gap", mm, count=count, name=name)
 
 
 def _draw(figure: Any, lifts: list[Lift]) -> None:

@@ -23,7 +23,9 @@ from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 from finger3d.io import write_csv
 
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.02, 1.0), "material.nu": (0.3, 0.495)}
 CASES, IF_QUICK = {"plane-strain": 80, "solid": 20, "drawn": 24}, {"plane-strain": 12, "drawn": 6}
@@ -142,18 +144,14 @@ def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
         z, bare = (np.array([getattr(f, which) for f in some]) for which in ("z", "z_of_noise"))
         what = f"{name}, {len(some)} values"
         # a posterior that is flat up to a bound, or has two maxima, has longer tails
-        yield at_most(f"largest |z|: {what}", "normally distributed errors", 4.0, float(np.abs(z).max()),
-                      "one in 16 000 is beyond", "statement")  # fmt: skip
+        yield judged("largest-z", float(np.abs(z).max()), what=what)
         if len(some) >= 8:
             share = float(np.mean(np.abs(z) <= 2.0))
-            yield at_least(f"share within two stated deviations: {what}", "0.954 if errors are normally distributed",
-                           0.9, share, "bars of nine in ten; readings bend with mu")  # fmt: skip
+            yield judged("share-within-two-stated-deviations", share, what=what)
         if len(some) >= 8:
             rms, of_noise = (float(np.sqrt(np.mean(v**2))) for v in (z, bare))
-            yield Row(f"rms of z: {what}", "deviations that hold", 1.0, rms, 0.2, "goal of this project", "statement",
-                      "absolute")  # fmt: skip
-            yield Row(f"rms of z, noise alone: {what}", "deviations that hold", 1.0, of_noise, 0.2,
-                      "goal of this project", "statement", "absolute")  # fmt: skip
+            yield judged("rms-of-z", rms, what=what)
+            yield judged("rms-of-z-noise-alone", of_noise, what=what)
 
 
 def _draw(figure: Any, found: list[Fitted]) -> None:

@@ -22,13 +22,14 @@ from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere
 
 from ._press import converged
-from ._rows import Result, Row, at_most, exact_columns, together, zero
+from ._rows import Result, exact_columns, grouped, listed, together
+
+judged = listed(__file__)
 
 DOME_BALL, BAR, ANGLE = 20.0, 5.0, math.radians(30.0)
 BESIDE = (DOME_BALL + BAR) * math.sin(ANGLE)
 E, NU, WIDTH_BALL = 1.0, 0.3, 4.0
 DEPTHS = (0.05, 0.1, 0.2)
-HERTZ = "Johnson 1985, Sec. 4.2"
 
 
 def pressed(obj: RigidObject, depth: float, size: float, domain: Any) -> tuple[Problem, dict[str, Any], float]:
@@ -72,17 +73,13 @@ def _ball(quick: bool) -> Result:
         at = f"depth {depth:g} mm, edges of {sizes[-1]:g} mm"
         shift = 0.2 * math.degrees(depth / BAR)  # the contact moves along the bar by a share of the depth
         rows += [
-            Row(f"inclination of the force, {at}, deg", "the line between the centres", 30.0, lean, shift,
-                "the contact moves by a part of the depth", measure="absolute"),
-            Row(f"half width of contact over Hertz's, {at}", HERTZ, 1.0, half / hertz, sizes[-1] / half + 0.02,
-                "an edge length, and 2 % for the curvature over the contact"),
-            zero(f"distance of the force from the bar's axis, {at}, mm", "statics", arm, depth,
-                "forces act on the finger at rest, off by less than the depth"),
-        ]  # fmt: skip
+            judged("inclination", lean, tolerance=shift, at=at),
+            judged("half-width-of-contact-over-hertz", half / hertz, tolerance=sizes[-1] / half + 0.02, at=at),
+            judged("distance", arm, tolerance=depth, at=at),
+        ]
     _, found, _ = pressed(Sphere(BESIDE, radius_mm=BAR), 0.2, 0.5 if quick else 0.25, "solid")
     ratio = -found["force_x_N"] / -found["force_y_N"]
-    rows.append(Row("sideways over vertical force of a ball, solid", "tan 30 deg", math.tan(ANGLE), ratio, 0.1,
-                    "the depth over the radius, 0.2/5, both ways"))  # fmt: skip
+    rows.append(judged("sideways-over-vertical-force-of-a", ratio, math.tan(ANGLE)))
     columns = "size_mm depth_mm force_N inclination_deg half_width_mm hertz_mm off_axis_mm"
     data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw_ball(figure, data))
@@ -90,16 +87,12 @@ def _ball(quick: bool) -> Result:
 
 def _draw_ball(figure: Any, data: dict[str, list[float]]) -> None:
     left, right = figure.subplots(1, 2)
-    for size in sorted(set(data["size_mm"]), reverse=True):
-        own = [k for k, s in enumerate(data["size_mm"]) if s == size]
-        depth = [data["depth_mm"][k] for k in own]
-        left.plot(depth, [data["inclination_deg"][k] for k in own], "o-", label=f"edges of {size:g} mm")
-        right.plot(depth, [data["half_width_mm"][k] for k in own], "o", label=f"edges of {size:g} mm")
-    finest = [k for k, s in enumerate(data["size_mm"]) if s == min(data["size_mm"])]
+    for size, t in grouped(data, "size_mm"):
+        left.plot(t["depth_mm"], t["inclination_deg"], "o-", label=f"edges of {size:g} mm")
+        right.plot(t["depth_mm"], t["half_width_mm"], "o", label=f"edges of {size:g} mm")
     left.axhline(30.0, color="k", lw=0.8, label="line between the centres")
     left.set(xlabel="depth (mm)", ylabel="inclination of the force (deg)", ylim=(27.0, 33.0))
-    depth, hertz = ([data[name][k] for k in finest] for name in ("depth_mm", "hertz_mm"))
-    right.plot(depth, hertz, "k-", lw=0.8, label="Hertz")
+    right.plot(t["depth_mm"], t["hertz_mm"], "k-", lw=0.8, label="Hertz")
     right.set(xlabel="depth (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None))
 
 
@@ -186,64 +179,50 @@ def _flanks(quick: bool) -> Result:
     """
     sizes = (0.2, 0.1) if quick else (0.2, 0.1, 0.05)
     effective = E / (1.0 - NU**2)
-    table: dict[str, list[Any]] = {"size_mm": [], "flank_deg": [], "force_N": [], "half_width_mm": [], "hertz_mm": []}
-    rows = []
+    lines, rows = [], []
     for size in sizes:
         found = on_flanks(UNEQUAL, size)
         for angle, force, half in zip(UNEQUAL, found["force_N"], found["half_width_mm"], strict=True):
             hertz = math.sqrt(4.0 * force / WIDTH_FLANKS * DOME_FLANKS / (math.pi * effective))
-            for key, value in zip(table, (size, angle, force, half, hertz), strict=True):
-                table[key].append(value)
-    for angle, half, hertz, arm in zip(
-        UNEQUAL, table["half_width_mm"][-2:], table["hertz_mm"][-2:], found["off_axis_mm"], strict=True
-    ):
+            lines.append((size, angle, force, half, hertz))
+    for (_, angle, _, half, hertz), arm in zip(lines[-2:], found["off_axis_mm"], strict=True):
         at = f"flank of {angle:g} deg, edges of {sizes[-1]:g} mm"
         rows += [
-            Row(f"half width of contact over Hertz's, {at}", "Johnson 1985, Sec. 4.2", 1.0, half / hertz,
-                sizes[-1] / hertz + 0.02, "an edge length at the ends, and 2 % for the finite dome"),
-            zero(f"distance of the force from the dome's axis, {at}, mm", "statics", arm, DEPTH,
-                "the contact moves by a part of the depth"),
-        ]  # fmt: skip
+            judged("half-width-of-flank", half / hertz, tolerance=sizes[-1] / hertz + 0.02, at=at),
+            judged("distance-from-dome-axis", arm, tolerance=DEPTH, at=at),
+        ]
     total = np.array(found["total_N"])
     parts = np.array(found["force_N"]) @ normals_of(UNEQUAL)
-    rows.append(zero("total force less those of the flanks, over it", "statics",
-                     float(np.linalg.norm(total - parts) / np.linalg.norm(total)), 1e-6,
-                     "the normals are those of the flanks but for round-off"))  # fmt: skip
+    rows.append(judged("total-force", float(np.linalg.norm(total - parts) / np.linalg.norm(total))))
     equal = on_flanks(EQUAL, sizes[-1])
     each = -equal["total_N"][1] / (2.0 * math.sin(math.radians(EQUAL[0])))
     for side, force in zip(("left", "right"), equal["force_N"], strict=True):
-        rows.append(Row(f"force of the {side} flank of 45 deg over F / (2 sin 45 deg)", "statics", 1.0, force / each,
-                        1e-6, "the mesh is its own mirror image"))  # fmt: skip
+        rows.append(judged("force-of-equal-flank", force / each, side=side))
     corner_sizes = (1.0, 0.7) if quick else (0.7, 0.45, 0.3)
     corners = [cube_corner(size) for size in corner_sizes]
     forces = corners[-1]
     at = f"edges of {corner_sizes[-1]:g} mm"
     rows += [
-        Row(f"force of the third face of a cube's corner over that of the second, {at}", "mirror image", 1.0,
-            float(forces[2] / forces[1]), 1e-6, "the mesh is its own mirror image"),
-        Row(f"force of the first face over that of the second, {at}", "symmetry of the corner", 1.0,
-            float(forces[0] / forces[1]), 0.15, "the block and its mesh have no threefold symmetry"),
-    ]  # fmt: skip
+        judged("force-of-third-face", float(forces[2] / forces[1]), at=at),
+        judged("force-of-first-face", float(forces[0] / forces[1]), at=at),
+    ]
     if not quick:
         change = [float(np.linalg.norm(b - a)) for a, b in zip(corners, corners[1:], strict=False)]
-        rows.append(at_most("change of the corner's force between the two finest meshes, over that before",
-                            "convergence", 1.0, change[-1] / change[-2], "the differences fall"))  # fmt: skip
-    data = {"table": table, "sizes": corner_sizes, "faces": np.array(corners)}
-    return Result(tuple(rows), table, lambda figure: _draw_flanks(figure, data))
+        rows.append(judged("change", change[-1] / change[-2]))
+    table, faces = exact_columns("size_mm flank_deg force_N half_width_mm hertz_mm", lines), np.array(corners)
+    return Result(tuple(rows), table, lambda figure: _draw_flanks(figure, table, corner_sizes, faces))
 
 
-def _draw_flanks(figure: Any, data: dict[str, Any]) -> None:
+def _draw_flanks(figure: Any, table: dict[str, list[Any]], sizes: tuple[float, ...], faces: Float) -> None:
     left, right = figure.subplots(1, 2)
-    table = data["table"]
-    for k, angle in enumerate(UNEQUAL):
-        own = slice(k, None, 2)
-        left.plot(table["size_mm"][own], table["half_width_mm"][own], "o-", color=f"C{k}", label=f"{angle:g} deg")
-        left.plot(table["size_mm"][own], table["hertz_mm"][own], "--", color=f"C{k}", label=f"{angle:g} deg, Hertz")
+    for k, (angle, t) in enumerate(grouped(table, "flank_deg")):
+        left.plot(t["size_mm"], t["half_width_mm"], "o-", color=f"C{k}", label=f"{angle:g} deg")
+        left.plot(t["size_mm"], t["hertz_mm"], "--", color=f"C{k}", label=f"{angle:g} deg, Hertz")
     left.set(xlabel="edge length (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None), xlim=(0.0, None))
     for k in range(3):
-        right.plot(data["sizes"], data["faces"][:, k], "osv"[k] + "-", mfc="none", label=f"face {k + 1}")
+        right.plot(sizes, faces[:, k], "osv"[k] + "-", mfc="none", label=f"face {k + 1}")
     right.set(xlabel="edge length (mm)", ylabel="normal force on a face of the cube's corner (N)")
-    right.set(xlim=(0.0, None), ylim=(0.0, 1.1 * data["faces"].max()))
+    right.set(xlim=(0.0, None), ylim=(0.0, 1.1 * faces.max()))
 
 
 def run(quick: bool) -> Result:

@@ -75,10 +75,7 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: lis
     here = f"{plane}, nu = {nu:g}"
     off = {n: np.abs(found[plane, nu, n] / found[plane, nu, PATH] - 1.0) for n in counts}
     rows = [
-        said(
-            f".1 mm is small enough for the {NAMES[k]}: change by smaller increments, relative, {here}", "Sec. II-A",
-            0.02, off[10][k], "2 % would be called small", 0.0, "at most",
-        )
+        said("increments-small-enough", off[10][k], name=NAMES[k], here=here)
         for k in (0, 1, 3, 4)
     ]  # fmt: skip
     rate = float(np.log(off[5][3] / off[counts[-1]][3]) / np.log(counts[-1] / 5))

@@ -35,14 +35,9 @@ def numbers(problem: Problem, law: FrictionLaw, count: int) -> np.ndarray:
     """int q/P and c/a as means over the second half of the increments, D/(A P^2), and the most iterations."""
     found = under(problem, law, loading(count))
     half, last = found[count // 2 :], found[-1]
-    return np.array(
-        [
-            sum(p.outward for p in half) / sum(p.force for p in half),
-            last.frame.dissipation_mJ / (compliance(NU) * last.force**2),
-            np.mean([p.c / p.a for p in half]),
-            max(p.frame.iterations for p in found),
-        ]
-    )
+    share, lost = sum(p.outward for p in half) / sum(p.force for p in half), last.frame.dissipation_mJ / last.force**2
+    stuck, most = np.mean([p.c / p.a for p in half]), max(p.frame.iterations for p in found)
+    return np.array([share, lost / compliance(NU), stuck, most])
 
 
 def run(quick: bool) -> Result:

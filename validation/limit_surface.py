@@ -31,13 +31,13 @@ from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 
 from ._press import changed, converged, fig9_finger
-from ._rows import Result, Row, at_least, exact_columns, zero
+from ._rows import Result, Row, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 RADIUS, E, NU, MU = 100.0, 1.0, 0.45, 0.25
 DEPTH, WAY = 2.0, 30.0  # mm; WAY is about the mean way of the plane over the contact
 ACROSS = (0.0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.2, 2.5, math.inf)  # distances of the centre over the width
-GOYAL = "Goyal, Ruina and Papadopoulos 1991"
-HOWE = "Howe and Cutkosky 1996"
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,7 @@ def slid(problem: Problem, centre: float, steps: int) -> Sliding:
 
 
 def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -> StepResult:
-    frames = converged(changed(problem, legs=legs, object=plane or Plane()))
-    return frames[-1]
+    return converged(changed(problem, legs=legs, object=plane or Plane()))[-1]
 
 
 def _sliding(problem: Problem, centre: float, frame: StepResult, turn: float) -> Sliding:
@@ -162,19 +161,14 @@ def run(quick: bool) -> Result:
         one = slid(build(model(width, size)), 0.0, steps)
         table.append((width, 0.0, one.normal, one.largest / MU / one.normal, *one.pair, *one.pair, one.stuck))
     ratio = [next(r[3] for r in table if r[0] == width) for width in (20.0, 40.0)]
-    rows.append(
-        at_least("M_max/(mu P) at 40 mm over that at 20 mm", "at a width of 20 mm", 1.0, ratio[1] / ratio[0],
-            "it grows with the width")
-    )  # fmt: skip
+    rows.append(judged("m-max-mu-p-at-40", ratio[1] / ratio[0]))
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=WAY, steps=steps))
     section = build(replace(model(20.0, size), legs=legs, domain="plane-strain"))
     last = measure(section.points, _last(section, legs))
     rows += [
-        zero("torque about the press axis, plane strain, slid, N mm", "statics", last["moment_y_Nmm"], 0.0,
-            "a section has no z"),
-        Row("F/mu P, plane strain, slid", "Coulomb", 1.0, last["force_x_N"] / MU / last["normal_force_N"], 1e-8,
-            "the solver's residual"),
-    ]  # fmt: skip
+        judged("torque-about-the-press-axis-plane", last["moment_y_Nmm"]),
+        judged("f-mu-p-plane-strain-slid", last["force_x_N"] / MU / last["normal_force_N"]),
+    ]
     columns = "width_mm centre_mm normal_force_N mean_distance_mm F M rigid_F rigid_M stuck_points"
     data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
@@ -187,24 +181,17 @@ def _rows(found: list[Sliding], width: float, size: float) -> list[Row]:
     twist, slide = found[0], found[-1]
     deviation = [math.hypot(*s.pair) - 1.0 for s in found]
     hertz = hertz_mean_distance(twist.normal, width)
-    left = "remaining distance to the steady state"
     return [
-        Row(f"F/mu P of a pure slide, {at}", "Coulomb", 1.0, slide.pair[0], 1e-8, "the solver's residual"),
-        Row(f"M/M_max of a pure twist, {at}", GOYAL, math.cos(twist.step / 2.0), twist.pair[1], 1e-3,
-            "friction opposes the chord of an increment's turn t, hence cos(t/2); forces act at the centroids of hats"),
-        zero(f"largest error of F over mu P, {len(found)} centres, {at}", GOYAL, force, 1e-4, left),
-        zero(f"largest error of M over M_max, {len(found)} centres, {at}", GOYAL, torque, 1e-4, left),
-        Row(f"largest power over that of rigid sliding, {at}", GOYAL, 1.0, max(s.power for s in found), 1e-8,
-            "no other friction dissipates more; the solver's residual", measure="at most"),
-        Row(f"least power over that of rigid sliding, {at}", GOYAL, 1.0, min(s.power for s in found), 1e-5,
-            "of the second order in errors of the direction", measure="at least"),
-        zero(f"points that stick, of all {len(found)} centres, {at}", "full sliding",
-            float(sum(s.stuck for s in found)), 1.0, "the one in the middle of a twist"),
-        Row(f"M_max/(mu P), mm, {at}", "Hertz's line contact", hertz, twist.largest / MU / twist.normal, 0.05,
-            "lower pressure towards free ends, points that end the contact", kind="statement"),
-        zero(f"deviation from the ellipse where it is largest, {at}", HOWE, max(deviation, key=abs), 0.1,
-            "an approximation, whose size this row states", "statement"),
-    ]  # fmt: skip
+        judged("f-mu-p-of-a-pure", slide.pair[0], at=at),
+        judged("m-m-max-of-a-pure", twist.pair[1], math.cos(twist.step / 2.0), at=at),
+        judged("largest-error-of-f-over-mu", force, count=len(found), at=at),
+        judged("largest-error-of-m-over-m", torque, count=len(found), at=at),
+        judged("largest-power-over-that-of-rigid", max(s.power for s in found), at=at),
+        judged("least-power-over-that-of-rigid", min(s.power for s in found), at=at),
+        judged("points-that-stick-of-all-centres", float(sum(s.stuck for s in found)), count=len(found), at=at),
+        judged("m-max-mu-p-mm", twist.largest / MU / twist.normal, hertz, at=at),
+        judged("deviation-from-the-ellipse-where-it", max(deviation, key=abs), at=at),
+    ]
 
 
 def _beside(problem: Problem, centre: float) -> list[Row]:
@@ -217,28 +204,20 @@ def _beside(problem: Problem, centre: float) -> list[Row]:
     other = measure(problem.points, _last(problem, (press, Leg(DEPTH, turn_y=turn, steps=steps)), Plane(z_mm=-centre)))
     names = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
     away = max(abs(one[name] - other[name]) / max(abs(one[name]), one["normal_force_N"]) for name in names)
-    return [
-        zero("largest difference of forces and moments between a slide with a turn and a turn about the centre, over P",
-            "kinematics", away, 1e-8, "the solver's residual")
-    ]  # fmt: skip
+    return [judged("largest-difference-of-forces-and-moments", away)]
 
 
 def _draw(figure: Any, data: dict[str, list[float]]) -> None:
     left, right = figure.subplots(1, 2)
     angle = np.linspace(0.0, math.pi / 2.0, 91)
     left.plot(np.cos(angle), np.sin(angle), "k--", lw=0.8, label="ellipse")
-    for own_width, colour in ((20.0, "C0"), (40.0, "C1")):
-        own = [k for k, w in enumerate(data["width_mm"]) if w == own_width]
-        rigid, found = (
-            [[data[name][k] for k in own] for name in pair] for pair in (("rigid_F", "rigid_M"), ("F", "M"))
-        )
-        left.plot(*rigid, colour, lw=1.0, label=f"{own_width:g} mm wide, rigid sliding")
-        left.plot(*found, colour + "o", mfc="none", label=f"{own_width:g} mm wide, found")
+    for (width, t), colour in zip(grouped(data, "width_mm"), ("C0", "C1"), strict=False):
+        left.plot(t["rigid_F"], t["rigid_M"], colour, lw=1.0, label=f"{width:g} mm wide, rigid sliding")
+        left.plot(t["F"], t["M"], colour + "o", mfc="none", label=f"{width:g} mm wide, found")
     left.set(xlabel="F / (mu P)", ylabel="M / M_max", xlim=(0.0, 1.05), ylim=(0.0, 1.05), aspect="equal")
-    twists = sorted((k for k, c in enumerate(data["centre_mm"]) if c == 0.0), key=lambda k: data["width_mm"][k])
-    names = ("width_mm", "mean_distance_mm", "normal_force_N")
-    width, distance, force = ([data[name][k] for k in twists] for name in names)
-    right.plot(width, [hertz_mean_distance(p, w) for w, p in zip(width, force, strict=True)], "k-", lw=0.8,
-               label="Hertz's line contact")  # fmt: skip
+    ((_, t),) = grouped(data, "centre_mm", centre_mm=0.0)
+    order = np.argsort(t["width_mm"])
+    width, distance, force = (t[name][order] for name in ("width_mm", "mean_distance_mm", "normal_force_N"))
+    right.plot(width, list(map(hertz_mean_distance, force, width)), "k-", lw=0.8, label="Hertz's line contact")
     right.plot(width, distance, "C2o", label="found")
     right.set(xlabel="width (mm)", ylabel="M_max / (mu P) (mm)", xlim=(0.0, None), ylim=(0.0, None))

@@ -8,64 +8,38 @@ netgen's with half of them.
 from __future__ import annotations
 
 import tempfile
+import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from build123d import export_step
 
 import finger3d
+from finger3d._types import Tree
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
-from finger3d.scene import parse
+from finger3d.scene import Scene, parse
 
 from ._press import empty_mesh_cache
-from ._rows import Result, Row, at_least, at_most, columns, zero
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 MESHERS = ("ftetwild", "netgen")
-COMMON = {"material": {"E_MPa": 1.0, "nu": 0.45}, "friction": {"mu": 0.25}, "object": {"shape": "plane"}}
-FINGERTIP = {
-    "geometry": "fingertip", "radius_mm": 10.0, "half_length_mm": 8.0, "edge_height_mm": 8.0, "width_mm": 16.0,
-    "skin_mm": 1.0, "core_half_length_mm": 3.0, "core_height_mm": 6.0,
-}  # fmt: skip
-SMALL = {
-    "geometry": "clipped_cylinder", "radius_mm": 20.0, "half_length_mm": 10.0, "edge_height_mm": 5.0, "width_mm": 8.0,
-}  # fmt: skip
-FIG9 = {
-    "geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6,
-    "width_mm": 20.0,
-}  # fmt: skip
+GIVEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+"""Tables that all scenes have, and those of every body."""
 
 
-@dataclass(frozen=True)
-class Body:
-    """A pressed body: its table, depth (mm), edge lengths (mm), place and angle of a gauge, and other tables."""
-
-    finger: dict[str, Any]
-    depth: float
-    sizes: tuple[float, float]
-    gauge: tuple[float, float, float]
-    more: dict[str, Any]
-
-    def scene(self, mesher: str, share: float = 1.0) -> Any:
-        """Return the scene with a mesher, and edge lengths times `share`."""
-        size, base = self.sizes
-        x, y, angle = self.gauge
-        tree = {
-            **COMMON,
-            "finger": self.finger,
-            "press": {"depth_mm": self.depth, "steps": 4},
-            "mesh": {"size_mm": share * size, "base_size_mm": share * base, "mesher": mesher},
-            "gauge": ({"name": "g", "x_mm": x, "y_mm": y, "angle_deg": angle},),
-            **self.more,
-        }
-        return parse(tree)
+def scene(body: Tree, mesher: str, share: float = 1.0) -> Scene:
+    """Return the scene of a body with a mesher, and edge lengths times `share`."""
+    edges = {key: share * length for key, length in body["mesh"].items()}
+    return parse(GIVEN["all"] | body | {"mesh": {"mesher": mesher, **edges}})
 
 
-@dataclass(frozen=True)
-class Meshed:
+class Meshed(NamedTuple):
     """A body as a mesher left it; errors are relative."""
 
     body: str
@@ -79,78 +53,52 @@ class Meshed:
     gauge_error: float
 
 
-def bodies(folder: Path) -> dict[str, Body]:
-    """Return the bodies by name; a STEP file is written to the folder."""
-    from build123d import export_step
-
-    export_step(finger3d.designs()["clipped_cylinder"](20.0, 10.0, 5.0, 8.0).solid(), folder / "finger.step")
-    parts = {"parts": {"skin": {"E_MPa": 3.0, "nu": 0.45}, "core": {"E_MPa": 100.0, "nu": 0.3}}}
-    return {
-        "Fig. 9": Body(FIG9, 5.0, (4.0, 12.0), (20.0, 40.0, 30.0), {}),
-        "fingertip": Body(FINGERTIP, 0.6, (1.2, 3.0), (4.5, 6.0, 30.0), parts),
-        "STEP": Body({"geometry": str(folder / "finger.step")}, 0.6, (1.0, 2.5), (4.0, 4.0, 30.0), {}),
-        "hemisphere": Body({"geometry": "hemisphere", "radius_mm": 5.0}, 0.6, (0.6, 1.8), (1.0, 3.0, 30.0), {}),
-    }
-
-
 def run(quick: bool) -> Result:
     """All bodies; quick: the one from the STEP file."""
+    found = []
     with tempfile.TemporaryDirectory() as folder:
-        every = bodies(Path(folder))
-        found = []
-        for name, body in every.items():
+        step = Path(folder, "finger.step")
+        export_step(finger3d.designs()["clipped_cylinder"](20.0, 10.0, 5.0, 8.0).solid(), step)
+        for name, given in GIVEN["body"].items():
             if quick and name != "STEP":
                 continue
-            fine = Body(SMALL, body.depth, body.sizes, body.gauge, {}) if name == "STEP" else body
-            truth = _pressed(fine.scene("netgen" if name == "hemisphere" else "swept", 0.5))[1]
+            body = given | {"finger": {"geometry": str(step)}} if name == "STEP" else given
+            truth = _pressed(scene(given, "netgen" if name == "hemisphere" else "swept", 0.5))[1]
             found += [_meshed(name, body, mesher, truth) for mesher in MESHERS]
-    lines = [tuple(vars(m).values()) for m in found]
-    names = "body mesher cells seconds different_meshes min_dihedral_deg volume_error force_error gauge_error"
-    return Result(tuple(_rows(found)), columns(names, lines), lambda figure: _draw(figure, found))
+    return Result(tuple(_rows(found)), columns(" ".join(Meshed._fields), found), lambda figure: _draw(figure, found))
 
 
-def _meshed(name: str, body: Body, mesher: str, truth: dict[str, float]) -> Meshed:
-    runs = [_pressed(body.scene(mesher), press=i == 0) for i in range(3)]
+def _meshed(name: str, body: Tree, mesher: str, truth: dict[str, float]) -> Meshed:
+    runs = [_pressed(scene(body, mesher), press=i == 0) for i in range(3)]
     report, numbers = runs[0]
-    error = {key: abs(numbers[key] / truth[key] - 1.0) for key in ("normal_force_N", "gauge_g")}
+    force, gauge = (abs(numbers[key] / truth[key] - 1.0) for key in ("normal_force_N", "gauge_g"))
+    made = [one for one, _ in runs]
     return Meshed(
-        name,
-        mesher,
-        report.cells,
-        float(np.median([made.seconds["mesh"] for made, _ in runs])),
-        len({made.hash for made, _ in runs}),
-        min(made.min_dihedral_deg for made, _ in runs),
-        abs(report.volume_mm3 / report.cad_volume_mm3 - 1.0),
-        error["normal_force_N"],
-        error["gauge_g"],
-    )
+        name, mesher, report.cells, float(np.median([one.seconds["mesh"] for one in made])),
+        len({one.hash for one in made}), min(one.min_dihedral_deg for one in made),
+        abs(report.volume_mm3 / report.cad_volume_mm3 - 1.0), force, gauge,
+    )  # fmt: skip
 
 
-def _pressed(scene: Any, press: bool = True) -> tuple[Any, dict[str, float]]:
+def _pressed(given: Scene, press: bool = True) -> tuple[Any, dict[str, float]]:
     """Return the report on the mesh, made anew, and the numbers after the press."""
     with empty_mesh_cache():
-        problem = build(scene.model())
+        problem = build(given.model())
     return problem.body.report, press_numbers(problem, list(march(problem))[-1]) if press else {}
 
 
 def _rows(found: list[Meshed]) -> Iterator[Row]:
     for name in dict.fromkeys(m.body for m in found):
         wild, gen = (next(m for m in found if (m.body, m.mesher) == (name, mesher)) for mesher in MESHERS)
-        yield Row(f"{name}: different meshes of three by netgen", "the same program and input", 1, gen.different_meshes,
-                  0.0, "a count", measure="absolute")  # fmt: skip
+        yield judged("different-meshes", gen.different_meshes, name=name)
         for m in (wild, gen):
-            yield zero(f"{name}: volume error, {m.mesher}", "CAD", m.volume_error, 1e-3,
-                       "quadratic cells on the CAD faces: 1e-3 at 30 degrees an edge")  # fmt: skip
-            yield zero(f"{name}: error of the force, {m.mesher}", "mesh with half the edge lengths", m.force_error,
-                       0.03, "the error bar of such meshes, 1 to 3 % (error_bars)")  # fmt: skip
-        yield at_most(f"{name}: seconds of netgen over those of fTetWild", "netgen is faster", 1.0,
-                      gen.seconds / wild.seconds, "a statement", "statement")  # fmt: skip
-        yield at_least(f"{name}: least dihedral angle of netgen over fTetWild's", "netgen's is larger", 1.0,
-                       gen.min_dihedral_deg / wild.min_dihedral_deg, "a claim", "statement")  # fmt: skip
+            yield judged("volume-error", m.volume_error, name=name, mesher=m.mesher)
+            yield judged("error-of-force", m.force_error, name=name, mesher=m.mesher)
+        yield judged("seconds", gen.seconds / wild.seconds, name=name)
+        yield judged("dihedral-angle", gen.min_dihedral_deg / wild.min_dihedral_deg, name=name)
         for key, what in (("force_error", "force"), ("gauge_error", "gauge")):
             ratio = getattr(gen, key) / getattr(wild, key)
-            yield at_most(f"{name}: error of the {what} of netgen over fTetWild's", "netgen's is smaller", 1.0, ratio,
-                          "a statement", "statement")  # fmt: skip
+            yield judged("error-over-other", ratio, name=name, what=what)
 
 
 def _draw(figure: Any, found: list[Meshed]) -> None:

@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
+from finger3d.fem.mesh.simplex import Mesh
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns
@@ -45,30 +46,16 @@ def pair(count: int) -> Body:
     side = contact_axis(step, count, 1.0, _GROWTH)
     up = 1.0 - graded(1.0, 0.7 * step / count, _GROWTH)[::-1]
     round_mesh = mapped(box([side, up]), quarter_disc)
-    cylinder = body(
-        round_mesh,
-        Elasticity.of(210e3, NU),
-        held_at(round_mesh, {"x-": [0], "y-": [0, 1]}),
-        "y+",
-        lambda p: p[:, 0] < 12.0,
-    )
+    cylinder = _half(round_mesh, 210e3)
     facing = np.sort(cylinder.surface.points[:, 0])
     far = facing[-1] + graded(0.5 * SIDE - facing[-1], _GROWTH * (facing[-1] - facing[-2]), _GROWTH)
     x = np.concatenate([facing, far[1:]])
     flat_mesh = mapped(box([x, SIDE - graded(SIDE, 6.2 / count, _GROWTH)[::-1]]), lambda p: p)
-    block = body(
-        flat_mesh,
-        Elasticity.of(70e3, NU),
-        held_at(flat_mesh, {"x-": [0], "y-": [0, 1]}),
-        "y+",
-        lambda p: p[:, 0] < 12.0,
-    )
+    block = _half(flat_mesh, 70e3)
     order = np.argsort(cylinder.surface.points[:, 0]), np.argsort(block.surface.points[:, 0])
     # forces are equal and opposite point by point; without friction the tangents of the two need not be told apart
-    c = (
-        cylinder.compliance[np.ix_(order[0], [0], order[0], [0])]
-        + block.compliance[np.ix_(order[1], [0], order[1], [0])]
-    )
+    first, second = (b.compliance[np.ix_(k, [0], k, [0])] for b, k in zip((cylinder, block), order, strict=True))
+    c = first + second
     whole = np.zeros((len(facing), 2, len(facing), 2))
     whole[:, :1, :, :1] = c
     whole[:, 1, :, 1] = np.eye(len(facing)) * c.max()
@@ -76,15 +63,16 @@ def pair(count: int) -> Body:
     return Body(replace(block.surface, points=np.stack([facing, 0.0 * facing], axis=1), area=area), whole)
 
 
+def _half(mesh: Mesh, modulus: float) -> Body:
+    """Half a body, held on its base, to contact points up to x = 12 mm."""
+    held = held_at(mesh, {"x-": [0], "y-": [0, 1]})
+    return body(mesh, Elasticity.of(modulus, NU), held, "y+", lambda p: p[:, 0] < 12.0)
+
+
 def pressed(both: Body, gap: Float, force: float) -> Float:
     """Nodal pressures (n,) MPa under half of a force (N per mm), found by the depth that gives it."""
-
-    def forces(depth: float) -> Float:
-        state = both.press(gap - depth)
-        return state.state.force[:, 0] if state.outcome.ok else np.full(len(gap), np.nan)
-
-    depth = brentq(lambda d: forces(d).sum() - 0.5 * force, 0.1, 3.0, xtol=1e-10)
-    return forces(float(depth)) / both.surface.area
+    depth = brentq(lambda d: both.normal_force(gap - d).sum() - 0.5 * force, 0.1, 3.0, xtol=1e-10)
+    return both.normal_force(gap - depth) / both.surface.area
 
 
 def ellipse(x: Float, p: Float, a: float) -> tuple[float, float]:

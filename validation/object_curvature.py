@@ -29,12 +29,13 @@ from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, RigidObject
 
 from ._press import converged, fig9_finger
-from ._rows import Result, Row, at_least
+from ._rows import Result, Row, listed
+
+judged = listed(__file__)
 
 FORCE = 200.0  # N over 20 mm: some 5 mm deep on the plane
 TRUE = 0.25
 GAUGE = Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0))
-HALVED = "the same with edges twice as long"
 
 
 def finger(obj: RigidObject, size: float, solid: bool = False) -> Problem:
@@ -73,18 +74,19 @@ def run(quick: bool) -> Result:
     monotonic = all(_is_monotonic(c[:, 1]) for c in (coarse, calibration))
     what = "mu read on a bar of radius 100 mm with the plane's calibration, true 0.25"
     rows = [
-        Row(
-            "strain on a bar of radius 1e5 mm, by that on the plane", "the limit", 1.0, found[1e5][1] / true, 3e-3,
-            "curvatures add: 1e-3 of the finger's",
+        judged("strain-on-a-bar-of-radius", found[1e5][1] / true),
+        judged("calibration-on-the-plane-is-monotonic", float(monotonic)),
+        judged("mu-read-on-a-bar-of", read[100.0], rough[100.0]),
+        judged(
+            "mu-read-by-increments",
+            rough[100.0],
+            fewer[100.0],
+            what=what,
+            coarsest=sizes[0],
+            steps=steps,
+            value=steps // 2,
         ),
-        Row(
-            "calibration on the plane is monotonic (1: yes)", "inverted", 1.0, float(monotonic), 0.0,
-            "yes or no; where all sticks, to the accuracy of the force",
-        ),
-        Row(what, HALVED, rough[100.0], read[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
-        Row(f"{what}; edges of {sizes[0]:g} mm, {steps} increments", f"{steps // 2} increments", fewer[100.0],
-            rough[100.0], 0.02, "a tenth of what is found", "sensitivity", "absolute"),
-    ]  # fmt: skip
+    ]
     rows += _solid_rows((4.0,) if quick else (3.0, 2.0), 4 if quick else 40)
     table = {
         "radius_mm": [np.inf] * len(mus) + list(radii),
@@ -111,13 +113,9 @@ def _solid_rows(sizes: tuple[float, ...], steps: int) -> Iterator[Row]:
         flat = [at_force(plane, mu, steps)[1] for mu in (0.0, TRUE, 1.0)]
         found.append((at_force(bar, TRUE, steps)[1] - flat[1], np.ptp(flat)))
     shape, friction = found[-1]
-    what = "3D: strain on a bar of radius 100 mm less that on a plane, over the range of mu 0 to 1 on the plane"
-    why = "more than 1: the gauge tells the shape, not mu"
-    yield at_least(what, "no reference", 1.0, abs(shape) / friction, why, "sensitivity")
+    yield judged("solid-over-friction", abs(shape) / friction)
     if len(found) > 1:
-        what = "3D: strain on a bar of radius 100 mm less that on a plane, 1e-3"
-        yield Row(what, f"the same at {sizes[0]:g} mm", 1e3 * found[0][0], 1e3 * shape, 0.25,
-                  "sign and size; the gauge lies 4 mm under the surface", "sensitivity")  # fmt: skip
+        yield judged("solid-by-mesh", 1e3 * shape, 1e3 * found[0][0], coarsest=sizes[0])
 
 
 def _measured(

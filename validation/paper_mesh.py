@@ -136,24 +136,14 @@ def _statements(plane: str, nu: float, x: np.ndarray, found: dict[Any, Any]) -> 
     best = found[plane, nu, 0.25, "projection"][1][-1].state
     spacing = float(np.diff(np.sort(body.mesh.points[body.nodes, 0])).max())
     against = f"coarse mesh and swaps against fine, {here}"
-    shape = "20 %: the shape would be right"
     return [
-        said(f"force, N per mm: {against}", "Sec. II-A", fine.force, force, "5 %", 0.05),
-        said(f"stick half-width, mm: {against}", "Sec. II-A", fine.c, c, "one node distance", spacing, "absolute"),
-        said(f"sum of |f_t|, N per mm: {against}", "Sec. II-A", np.abs(fine.q) @ fine.area, friction, shape, 0.2),
-        said(
-            f"gamma_xy along the line, largest difference over the largest: {against}", "Sec. II-A", 0.0,
-            np.abs(coarse - shear).max() / np.abs(shear).max(), shape, 0.2, "absolute",
-        ),
-        said(
-            f'swaps give "the unique and accurate condition": increments that cycle or slip backward, of 50, {here}',
-            "Sec. II-A", 0.0, unsettled, "none", 0.0, "absolute",
-        ),
-        said(
-            f"swaps and projection agree on the coarse mesh: sum of |f_t|, mu = .25, {here}", "Sec. II-A",
-            float(np.abs(best.force[:, 1]).sum()), friction, "1 %", 0.01,
-        ),
-    ]  # fmt: skip
+        said("coarse-force", force, wanted=fine.force, against=against),
+        said("coarse-stick", c, wanted=fine.c, tolerance=spacing, against=against),
+        said("coarse-friction", friction, wanted=np.abs(fine.q) @ fine.area, against=against),
+        said("coarse-shear", np.abs(coarse - shear).max() / np.abs(shear).max(), against=against),
+        said("swaps-unique", unsettled, here=here),
+        said("swaps-as-projection", friction, wanted=float(np.abs(best.force[:, 1]).sum()), here=here),
+    ]
 
 
 def _locking(quick: bool) -> Row:

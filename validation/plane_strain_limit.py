@@ -73,17 +73,14 @@ def run(quick: bool) -> Result:
                 continue  # two of its three sizes make the limit
             last = slice(-5, -2) if dim == "section" else slice(None)
             why = "the contact edge adds an oscillating error of second order; a higher rate passes"
-            got = rate(sizes[last], errors[last])
-            rows.append(
-                Row(f"rate of the force, {dim}, nu = {nu:g}", _WILLIAMS, theory, got, 0.25, why, measure="at least")
-            )
+            what, got = f"rate of the force, {dim}, nu = {nu:g}", rate(sizes[last], errors[last])
+            rows.append(Row(what, _WILLIAMS, theory, got, 0.25, why, measure="at least"))
     rows += _mirrors(6.0)
     if not quick:
         both = [press(2.0, 0.49, mesher)[-1]["normal_force_N"] for mesher in ("swept", "ftetwild")]
         what = "force of the solid with free ends, nu = 0.49, 2 mm cells, ftetwild over swept"
-        rows.append(
-            Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, "order h^1.2 on either mesh; 0.2 % measured")
-        )
+        why = "order h^1.2 on either mesh; 0.2 % measured"
+        rows.append(Row(what, "the other mesher", 1.0, both[1] / both[0], 0.01, why))
     names = "body nu size_mm force_N rms_error"
     return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, curves))
 
@@ -102,16 +99,9 @@ def draw(figure: Any, curves: dict[float, dict[str, tuple[Float, Float]]]) -> No
     """Errors over the cell size."""
     for (nu, both), axes in zip(curves.items(), figure.subplots(1, 2), strict=True):
         theory = 2.0 * clamped_free(np.pi / 2, nu)
+        labels = "cell size at the contact, mm", "force, relative to the limit, rms over depths"
         for name, (sizes, errors) in both.items():
-            slope = {name: errors}
-            convergence(
-                axes,
-                sizes,
-                slope,
-                theory,
-                "cell size at the contact, mm",
-                "force, relative to the limit, rms over depths",
-            )
+            convergence(axes, sizes, {name: errors}, theory, *labels)
         ticks = sorted({s for sizes, _ in both.values() for s in sizes})
         axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
         axes.set_title(f"Fig. 9 finger, plane strain, nu = {nu:g}")

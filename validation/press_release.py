@@ -23,11 +23,11 @@ from finger3d.mechanics.model import Leg
 
 from . import _halfspace
 from ._halfplane import Profile, compliance, line, loading, under
-from ._rows import Result, Row, at_least, at_most, exact_columns, zero
+from ._rows import Result, Row, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 MU = 0.25
-REST = "an elastic body released; REFERENCES.md, 2.7"
-BALANCE = "energy balance of an elastic body; REFERENCES.md, 2.7"
 COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first"
 """Work of the cylinder in A P^2, of the ball in P depth."""
 
@@ -85,14 +85,10 @@ def run(quick: bool) -> Result:
                 table.append(row)
         rows += _cycle_rows(nu, table, counts, found)
     table.append(ball(0.3, 4 if quick else 6, 20.0, 40))
-    what = f"work over work lost, ball, nu = 0.3, {table[-1][2]} points to a, 40 increments"
-    rows.append(Row(what, BALANCE, 1.0, table[-1][7], 0.05, "2/N: the error is of first order in 1/N"))
+    rows.append(judged("work-over-work-lost-ball-nu", table[-1][7], value=table[-1][2]))
     rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
-    what = "rate at which the drop of load that reverses the edge point falls with the mesh, cylinder, nu = 0.3"
-    rows.append(at_least(what, "at once: at least first order in the spacing", 1.0, rate))
-    what = f"drop of load that reverses the edge point, cylinder, nu = 0.3, {meshes[-1]} points to a"
-    why = "the drop that moves the edge by a point is 2 spacings/a"
-    rows.append(at_most(what, "it reverses at once", 2.0 / meshes[-1], drops[meshes[-1]], why))
+    rows.append(judged("rate-at-which-the-drop-of", rate))
+    rows.append(judged("drop-of-load-that-reverses-the", drops[meshes[-1]], 2.0 / meshes[-1], finest=meshes[-1]))
     columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
 
@@ -104,14 +100,12 @@ def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: lis
     rate = float(np.log(abs((at[counts[0]][7] - 1.0) / (at[many][7] - 1.0))) / np.log(many / counts[0]))
     extrapolated = at[many][7] + (at[many][7] - at[few][7]) * few**2 / (many**2 - few**2)
     released = found[2 * many - 1]
-    yield Row(f"work over work lost, {here}, {many} increments", BALANCE, 1.0, at[many][7], 0.01, "0.3 % measured")
-    yield Row(f"work lost in the second cycle over the first, {here}", REST, 1.0, at[many][8], 1e-9, "round-off")
-    yield zero(f"force after release, N, {here}", REST, released.force, 1e-12, "round-off")
+    yield judged("work-over-work-lost-increments", at[many][7], here=here, many=many)
+    yield judged("work-lost", at[many][8], here=here)
+    yield judged("force-after-release-n", released.force, here=here)
     if many == 400:
-        what = f"work over work lost, {here}, extrapolated in 1/N^2 from {few} and {many}"
-        yield Row(what, BALANCE, 1.0, extrapolated, 0.001, "terms of higher order in 1/N")
-        what = f"rate at which the excess of the work falls with N, {here}"
-        yield Row(what, "second order in 1/N", 2.0, rate, 0.5, "points change state one by one", measure="at least")
+        yield judged("work-over-work-lost-extrapolated-in", extrapolated, here=here, few=few, many=many)
+        yield judged("rate-at-which-the-excess", rate, here=here)
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:
@@ -123,22 +117,14 @@ def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], show
     pressing = np.interp(depth, depth[: top + 1], force[: top + 1])
     left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {columns['nu'][-2]:g}, mu = {MU:g}")
     left.set(xlabel="depth / largest", ylabel="1000 (P - P while pressing)/P_max", title="the loop, opened")
-    for nu in dict.fromkeys(columns["nu"]):
-        which = [
-            k
-            for k, n in enumerate(columns["nu"])
-            if n == nu and columns["body"][k] == "cylinder" and columns["points_per_a"][k] == 20
-        ]
-        excess = [100 * abs(columns["work_over_lost"][k] - 1.0) for k in which]
-        middle.loglog([columns["increments"][k] for k in which], excess, "o-", label=f"cylinder, nu = {nu:g}")
-    counts = sorted({columns["increments"][k] for k in which})
+    for nu, t in grouped(columns, "nu", body="cylinder", points_per_a=20):
+        middle.loglog(t["increments"], 100.0 * np.abs(t["work_over_lost"] - 1.0), "o-", label=f"cylinder, nu = {nu:g}")
+    counts = sorted(set(t["increments"]))
     middle.set(xlabel="increments each way", ylabel="|work/work lost - 1|, %", title="energy balance")
     middle.set_xticks(counts, [f"{int(n)}" for n in counts])
     middle.set_xticks([], minor=True)
-    for profile, name in (
-        (shown[0], "loaded"),
-        (shown[-1], f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"),
-    ):
+    less = f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"
+    for profile, name in ((shown[0], "loaded"), (shown[-1], less)):
         inside = (profile.x >= 0.0) & (profile.status != OPEN)
         right.plot(profile.x[inside] / shown[0].a, profile.q[inside] / (MU * profile.p[inside]), ".-", label=name)
     right.set(xlabel="x/a", ylabel="q/(mu p)", title="friction reverses at the edge first")

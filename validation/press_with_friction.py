@@ -15,7 +15,9 @@ from finger3d.contact.friction import SLIP
 from . import _halfspace, _rings
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Result, Row, at_least, exact_columns, together, zero
+from ._rows import Result, Row, exact_columns, listed, together
+
+judged = listed(__file__)
 
 C_OVER_A_LINE = {  # REFERENCES.md, 2.1, fully coupled; (nu, mu)
     (0.0, 0.25): 0.09910, (0.0, 0.5): 0.52191, (0.0, 1.0): 0.88959,
@@ -29,12 +31,6 @@ FULL_STICK_LINE = {0.0: 1.246419, 0.3: 1.065856}  # P/P_H(a), REFERENCES.md, 2.3
 STEPS = {1: (0.2205, 64.1e-4), 5: (0.5128, 11.2e-4), 10: (0.5282, 7.1e-4), 50: (0.5385, 4.6e-4), 200: (0.5436, 4.3e-4)}
 # q A R/a at x/a = 0 ... 1, nu = .3, mu = .25
 CURVE = np.array([0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0])
-SPENCE_LINE = "Spence 1968; REFERENCES.md, 2.1"
-STEPPED = "REFERENCES.md, 2.4"
-THREE_LINE = (
-    "first order in the point spacing, since c lies between two points; 0.6 % or less measured at 40 points to a"
-)
-ONE_LINE = "0.14 % or less measured at 40 points to a; coarser meshes must pass too"
 COLUMNS_LINE = "nu mu block_height_mm points_per_a increments P_over_Hertz q_over_P D_over_AP2 c_over_a"
 COLUMNS_LINE += " reported_D_over_AP2 plain"
 FEW = 5
@@ -61,15 +57,9 @@ def numbers(profiles: list[Profile], nu: float) -> np.ndarray:
     force = sum(p.force for p in half)
     last = profiles[-1]
     stuck = not (last.status == SLIP).any()
-    return np.array(
-        [
-            force / sum(hertz(nu, p.reach if stuck else p.a) for p in half),
-            sum(p.outward for p in half) / force,
-            end_force_loss(profiles) / (compliance(nu) * last.force**2),
-            np.mean([p.c / p.a for p in half]),
-            last.frame.dissipation_mJ / (compliance(nu) * last.force**2),
-        ]
-    )
+    lost = np.array([end_force_loss(profiles), last.frame.dissipation_mJ]) / (compliance(nu) * last.force**2)
+    ratios = force / sum(hertz(nu, p.reach if stuck else p.a) for p in half), sum(p.outward for p in half) / force
+    return np.array([*ratios, lost[0], np.mean([p.c / p.a for p in half]), lost[1]])
 
 
 def _line(quick: bool) -> Result:
@@ -133,57 +123,36 @@ def _gates(nu: float, at: dict[Any, np.ndarray], plain: dict[Any, np.ndarray], f
     value = _extrapolated(at, finest, 0.25, most)
     force, outward, lost = INTEGRALS_LINE[nu]
     here = f"nu = {nu:g}, mu = .25"
-    yield Row(f"P/P_Hertz(a), {here}", SPENCE_LINE, force, value[0], 0.01, ONE_LINE)
-    yield Row(f"int_0^a q/P, {here}", SPENCE_LINE, outward, value[1], 0.03, THREE_LINE)
-    yield Row(f"dissipation/(A P^2), {here}, {most} increments", SPENCE_LINE, lost, value[4], 0.03, THREE_LINE)
+    yield judged("p-p-hertz-a", value[0], force, here=here)
+    yield judged("int-0-a-q-p", value[1], outward, here=here)
+    yield judged("dissipation-a-p-2-increments", value[4], lost, here=here, most=most)
     if most == 200:  # fewer increments are not yet on the line ~ 1/N
         few, many = (_extrapolated(plain, finest, 0.25, n)[2] for n in (50, most))
         in_steps = many + (many - few) * 50 / (most - 50)
-        yield Row(
-            f"dissipation by end forces, {here}, plain increments, extrapolated in 1/N from 50 and 200",
-            SPENCE_LINE,
-            lost,
-            in_steps,
-            0.03,
-            THREE_LINE,
-        )
+        yield judged("dissipation-by-end-forces-plain-increments", in_steps, lost, here=here)
     stuck = [at[HEIGHTS[1], n, STUCK, 400][0] for n in (finest // 4, finest // 2, finest) if most == 200]
     if stuck:
         what = f"P/P_Hertz(a), full stick, nu = {nu:g}"
-        closed = "Spence 1968, full stick; REFERENCES.md, 2.3"
-        yield Row(
-            f"{what}, extrapolated in the spacing",
-            closed,
-            FULL_STICK_LINE[nu],
-            2.0 * stuck[2] - stuck[1],
-            0.01,
-            ONE_LINE,
-        )
+        got = 2.0 * stuck[2] - stuck[1]
+        yield judged("extrapolated", got, FULL_STICK_LINE[nu], what=what)
     if stuck and nu == 0.0:
         rate = float(np.log((stuck[0] - FULL_STICK_LINE[nu]) / (stuck[2] - FULL_STICK_LINE[nu])) / np.log(4.0))
-        why = "mean of two halvings; the increments leave an error of their own"
-        yield Row(f"rate of its error with the mesh, {what}", "order of a: 1", 1.0, rate, 0.1, why, measure="at least")
+        yield judged("rate-of-its-error", rate, what=what)
     for (case_nu, mu), want in C_OVER_A_LINE.items():
         key = (HEIGHTS[1], finest, mu, most)
         if case_nu == nu and key in at:
-            yield Row(
-                f"c/a, nu = {nu:g}, mu = {mu:g}", SPENCE_LINE, want, at[key][3], 0.5 / finest,
-                f"half a point spacing, a/{finest}", measure="absolute",
-            )  # fmt: skip
+            yield judged("c-a-nu-mu", at[key][3], want, tolerance=0.5 / finest, nu=nu, mu=mu, finest=finest)
 
 
 def _few_rows(nu: float, at: dict[Any, np.ndarray], c_own: dict[Any, float], finest: int, most: int) -> list[Row]:
     """Rows of what few increments leave."""
     here = f"nu = {nu:g}, mu = .25"
     change = c_own[HEIGHTS[1], 2 * FEW] - c_own[HEIGHTS[1], most]
-    what = f"c/a at the end, {here}: change from {2 * FEW} to {most} increments"
-    why = f"half a point spacing, a/{finest}"
     lost = {n: at[HEIGHTS[1], finest, 0.25, n][4] for n in (FEW, 2 * FEW, most)}
     rate = float(np.log2((lost[FEW] - lost[most]) / (lost[2 * FEW] - lost[most])))
-    settles = f"rate at which the dissipation settles, {here}, {FEW} to {2 * FEW} increments"
     return [
-        zero(what, "self-similar, whatever the increments", change, 0.5 / finest, why),
-        Row(settles, "second order", 2.0, rate, 0.5, "points close one by one", measure="at least"),
+        judged("c-a-at-the-end", change, tolerance=0.5 / finest, here=here, value=2 * FEW, most=most, finest=finest),
+        judged("rate-at-which-the-dissipation-settles", rate, here=here, value=2 * FEW),
     ]
 
 
@@ -191,23 +160,17 @@ def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int,
     for count in counts:
         want_c, want_d = STEPS[count]
         got = _extrapolated(at, finest, 0.25, count)[2]
-        yield Row(
-            f"dissipation/(A P^2) by end forces, N = {count} plain increments", STEPPED, want_d, got, 0.03, THREE_LINE
-        )
-        yield Row(
-            f"c/a, N = {count} plain increments", STEPPED, want_c, c_last[HEIGHTS[1], count], 1.0 / finest,
-            "one point spacing, since this is no mean over increments", measure="absolute",
-        )  # fmt: skip
+        here, c = f"N = {count} plain increments", c_last[HEIGHTS[1], count]
+        yield judged("dissipation-a-p-2-by-end", got, want_d, here=here)
+        yield judged("c-a", c, want_c, tolerance=1.0 / finest, here=here)
     errors = [_extrapolated(at, finest, 0.25, n)[2] - INTEGRALS_LINE[0.3][2] for n in (1, 10)]
-    yield at_least("rate at which the error of the dissipation by end forces falls with N, 1 to 10 plain increments",
-                   "1/N; REFERENCES.md, 2.4", 1.0, float(np.log10(errors[0] / errors[1])))  # fmt: skip
+    yield judged("rate-at-which-the-error", float(np.log10(errors[0] / errors[1])))
 
 
 def _curve_row(profile: Profile) -> Row:
     got = _normalised(profile, np.linspace(0.0, 1.0, 11))
     worst = float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
-    return zero("q(x), largest deviation over its largest value, nu = .3, mu = .25", SPENCE_LINE, worst, 0.05,
-                "q has a kink at c, and c lies between two points")  # fmt: skip
+    return judged("q-x-largest-deviation-over-its", worst)
 
 
 def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
@@ -259,16 +222,12 @@ def _title(profile: Profile) -> str:
     return f"q of nu = .3, mu = .25: error {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} % of the largest q"
 
 
-SPENCE_SPHERE = "Spence 1975; REFERENCES.md, 2.2"
 C_OVER_A_SPHERE = {
     (0.0, 0.125): 0.04180, (0.0, 0.25): 0.36896, (0.0, 0.5): 0.81265, (0.0, 1.0): 0.96827,
     (0.3, 0.06): 0.02826, (0.3, 0.125): 0.34734, (0.3, 0.25): 0.82416, (0.3, 0.5): 0.98416, (0.3, 1.0): 0.99948,
 }  # fmt: skip
 INTEGRALS_SPHERE = {0.3: (1.01341, 0.18168, 1.8e-4), 0.0: (1.02718, 0.23809, 3.17e-3)}  # P/P_H(depth), T/P, D/(P depth)
 FULL_STICK_SPHERE = {0.0: 1.052891, 0.3: 1.016213}
-THREE_SPHERE = "first order in the spacing, since c lies between two points; 0.5 % or less measured at 10 points to a"
-ONE_SPHERE = "0.05 % or less measured; coarser meshes must pass too"
-LOST = "first order in the spacing, and the reference's last digit"
 COLUMNS_SPHERE = "body nu mu points_per_a increments P_over_Hertz T_over_P D_over_Pd c_over_a iterations"
 DEPTH = 1.0 / _halfspace.RADIUS  # a = 1
 
@@ -313,15 +272,8 @@ def _sphere(quick: bool) -> Result:
             force = _halfspace.press(ball, 0.0, [(DEPTH, 0.0)])[-1].P
             steps = _halfspace.press(ball, 0.25, [(d, 0.0) for d in depths(40)])
             s = steps[-1]
-            found["tets", nu, 0.25, points, 40] = np.array(
-                [
-                    s.P / force,
-                    s.T / s.P,
-                    s.D / (s.P * DEPTH),
-                    np.sqrt(s.stick_area / s.area),
-                    max(t.iterations for t in steps),
-                ]
-            )
+            stuck, most = np.sqrt(s.stick_area / s.area), max(t.iterations for t in steps)
+            found["tets", nu, 0.25, points, 40] = np.array([s.P / force, s.T / s.P, s.D / (s.P * DEPTH), stuck, most])
         rows += [*_ring_rows(nu, found, rings, many), *_tet_rows(nu, found, rings, meshes)]
     table = [(*k, *v) for k, v in found.items()]
     return Result(tuple(rows), exact_columns(COLUMNS_SPHERE, table), lambda figure: _draw_sphere(figure, found, rings))
@@ -331,49 +283,32 @@ def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -
     force, sum_, lost = INTEGRALS_SPHERE[nu]
     value = found["rings", nu, 0.25, rings, many]
     here = f"rings, nu = {nu:g}, mu = .25"
-    yield Row(f"P/P_Hertz(depth), {here}", SPENCE_SPHERE, force, value[0], 0.01, ONE_SPHERE)
-    yield Row(f"T/P, {here}", SPENCE_SPHERE, sum_, value[1], 0.03, THREE_SPHERE)
-    yield Row(
-        f"P/P_Hertz(depth), full stick, rings, nu = {nu:g}", "Spence 1968, full stick; REFERENCES.md, 2.3",
-        FULL_STICK_SPHERE[nu], found["rings", nu, 1e6, rings, many][0], 0.01, ONE_SPHERE,
-    )  # fmt: skip
+    yield judged("p-p-hertz-depth", value[0], force, here=here)
+    yield judged("t-p", value[1], sum_, here=here)
+    yield judged("p-p-hertz-depth-full-stick", found["rings", nu, 1e6, rings, many][0], FULL_STICK_SPHERE[nu], nu=nu)
     if many == 200:
         in_steps = value[2] + (value[2] - found["rings", nu, 0.25, rings, 50][2]) * 50 / (200 - 50)
         rounding = 0.5 * 10.0 ** np.floor(np.log10(lost) - (1 if nu else 2)) / lost
-        yield Row(
-            f"D/(P depth), {here}, extrapolated in 1/N from 50 and 200",
-            SPENCE_SPHERE,
-            lost,
-            in_steps,
-            0.03 + rounding,
-            LOST,
-        )
+        yield judged("d-p-depth-extrapolated-in-1", in_steps, lost, tolerance=0.03 + rounding, here=here)
     for (case, mu), want in C_OVER_A_SPHERE.items():
         key = ("rings", nu, mu, rings, many)
         if case == nu and key in found:
-            what, near = f"c/a, rings, nu = {nu:g}, mu = {mu:g}", f"one ring, a/{rings}"
-            yield Row(what, SPENCE_SPHERE, want, found[key][3], 1.0 / rings, near, measure="absolute")
+            yield judged("c-a-rings-nu-mu", found[key][3], want, tolerance=1.0 / rings, nu=nu, mu=mu, rings=rings)
 
 
 def _tet_rows(nu: float, found: dict[Any, np.ndarray], rings: int, meshes: tuple[int, ...]) -> Iterator[Row]:
     force, sum_, _ = INTEGRALS_SPHERE[nu]
     value = found["tets", nu, 0.25, meshes[-1], 40]
     here = f"3D, nu = {nu:g}, mu = .25, {meshes[-1]} points to a"
-    yield Row(f"P/P_frictionless(depth), {here}", SPENCE_SPHERE, force, value[0], 0.01, ONE_SPHERE)
-    yield Row(f"T/P, {here}", SPENCE_SPHERE, sum_, value[1], 0.03, THREE_SPHERE)
+    yield judged("p-p-frictionless-depth", value[0], force, here=here)
+    yield judged("t-p", value[1], sum_, here=here)
     exact = found["rings", nu, 0.25, rings, 40][2]
     if len(meshes) > 2:
         first, last = (found["tets", nu, 0.25, n, 40][2] - exact for n in (meshes[0], meshes[-1]))
         rate = np.log(first / last) / np.log(meshes[-1] / meshes[0])
-        yield Row(
-            f"rate at which the excess of D falls with the mesh, 3D, nu = {nu:g}",
-            "first order in the spacing, against rings", 1.0, float(rate), 0.3,
-            "few points lie along the edge of the stick zone", measure="at least",
-        )  # fmt: skip
-        yield Row(
-            f"c/a, {here}", SPENCE_SPHERE, C_OVER_A_SPHERE[nu, 0.25], value[3], 1.0 / meshes[-1],
-            f"one point spacing, a/{meshes[-1]}", measure="absolute",
-        )  # fmt: skip
+        yield judged("rate-at-which-the-excess-of", float(rate), nu=nu)
+        wanted = C_OVER_A_SPHERE[nu, 0.25]
+        yield judged("c-a-of-tets", value[3], wanted, tolerance=1.0 / meshes[-1], here=here, finest=meshes[-1])
 
 
 def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:

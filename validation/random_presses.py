@@ -20,12 +20,11 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tomli_w
@@ -35,7 +34,7 @@ from finger3d.errors import Finger3dError
 from finger3d.scene import parse
 
 from ._effect_scenes import COIN, log_uniform, objects
-from ._rows import Result, Row, at_most
+from ._rows import Result, Row, at_most, exact_columns
 
 SCENES, SCENES_QUICK = 60, 2
 LIMIT_S = 240.0
@@ -54,8 +53,7 @@ _TRIES = 20
 """Draws of a scene until one is not refused."""
 
 
-@dataclass(frozen=True)
-class Pressed:
+class Pressed(NamedTuple):
     """What a press came to.
 
     Attributes
@@ -308,17 +306,12 @@ def run(quick: bool) -> Result:
     here = f"{len(found)} random scenes, seed {seed}"
     rows = (
         at_most(f"{here}: faults", GOAL, 0.0, sum(bool(one.faults) for one in found), "none"),
-        Row(
-            f"{here}: not ended within {LIMIT_S:g} s", GOAL, 0.0, outcomes["not ended"] / len(found), 0.02,
-            "deep folds at large deformation", "statement", "at most",
-        ),
-        Row(
-            f"{here}: share converged", GOAL, 1.0, outcomes["converged"] / len(found), 0.1,
-            "harder than what a user writes", "statement", "at least",
-        ),
+        Row(f"{here}: not ended within {LIMIT_S:g} s", GOAL, 0.0, outcomes["not ended"] / len(found), 0.02,
+            "deep folds at large deformation", "statement", "at most"),
+        Row(f"{here}: share converged", GOAL, 1.0, outcomes["converged"] / len(found), 0.1,
+            "harder than what a user writes", "statement", "at least"),
     )  # fmt: skip
-    names = ("number", "kind", "outcome", "increments", "seconds", "faults", "says")
-    table = {name: [getattr(one, name) for one in found] for name in names}
+    table = exact_columns(" ".join(Pressed._fields), found)
     return Result(rows, table, lambda figure: _draw(figure, table))
 
 

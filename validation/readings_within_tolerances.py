@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings.reading import Taxel
-from finger3d.sensor import Calibration, Estimate, estimate
+from finger3d.sensor import Estimate, estimate
 
 from ._press import changed, converged, fig9_finger
 from ._rows import Result, Row, at_least, at_most, columns
@@ -46,8 +46,7 @@ READ_STEPS: dict[Domain, int] = {"plane-strain": 1, "solid": 120}
 COUNTS: dict[Domain, tuple[int, ...]] = {"plane-strain": (1,), "solid": (10, 20, 40, 80)}
 
 
-@dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """A set of readings, and what was made of it."""
 
     domain: str
@@ -68,15 +67,9 @@ def model(domain: Domain, size: float, steps: int) -> Model:
     gauges = tuple(
         Gauge(name, x, y, angle=math.radians(a)) for name, (x, y, a) in zip("ab", GAUGES[domain], strict=True)
     )
-    return Model(
-        fig9_finger(),
-        Isotropic(1.0, 0.45),
-        MeshOptions(size, 4.0 * size, "swept"),
-        (Leg(DEPTH_MM, steps=steps),),
-        gauges=gauges,
-        taxels=(Taxel("t", 25.0, 0.0, 6.0, 6.0),),
-        domain=domain,
-    )
+    mesh, legs = MeshOptions(size, 4.0 * size, "swept"), (Leg(DEPTH_MM, steps=steps),)
+    taxels = (Taxel("t", 25.0, 0.0, 6.0, 6.0),)
+    return Model(fig9_finger(), Isotropic(1.0, 0.45), mesh, legs, gauges=gauges, taxels=taxels, domain=domain)
 
 
 def run(quick: bool) -> Result:
@@ -86,13 +79,9 @@ def run(quick: bool) -> Result:
     draws: dict[Domain, int] = {"plane-strain": 24} if quick else DRAWS
     for domain, count in draws.items():
         found += _judged(domain, count, COUNTS[domain], (2.0,) if quick else SIZES[domain], random)
-    lines = [tuple(vars(one).values()) for one in found]
+    rows = tuple(_rows(found, "statement" if quick else "verification"))
     names = "domain steps readings mu depth_mm modulus status estimated std z in_90_percent_set"
-    return Result(
-        tuple(_rows(found, "statement" if quick else "verification")),
-        columns(names, lines),
-        lambda figure: _draw(figure, found),
-    )
+    return Result(rows, columns(names, found), lambda figure: _draw(figure, found))
 
 
 def _judged(
@@ -115,12 +104,8 @@ def _judged(
             steps, joint = calibrations[i]
             noisy = {c.name: true[c.name] + c.noise * float(random.normal()) for c in joint.readings}
             for names in (ONE, THREE):
-                answer = _estimate(joint, {name: noisy[name] for name in names})
+                answer = estimate(joint, {name: noisy[name] for name in names})[0]
                 yield _judgement(domain, steps, names, mu, depth, modulus, answer)
-
-
-def _estimate(joint: Calibration, readings: dict[str, float]) -> Estimate:
-    return estimate(joint, readings)[0]
 
 
 def _judgement(

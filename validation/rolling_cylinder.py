@@ -37,13 +37,14 @@ from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
 from ._press import changed, converged
-from ._rows import Result, Row, at_most, exact_columns, zero
+from ._rows import Result, Row, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 R, DEPTH, WAY, MU, E = 10.0, 0.05, 6.0, 1.0, 1.0
 BEGIN = -0.5 * WAY
 CREEPS = (0.0, 0.25, 0.5, 0.75, 1.0)
 CARTER = "Carter 1926; REFERENCES.md, 3.4"
-STATICS = "statics; REFERENCES.md, 3.4"
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,7 @@ def block(nu: float, size: float, height: float, domain: Any = "plane-strain") -
 
 def pressed(problem: Problem) -> State[Any]:
     """The state after the press."""
-    frame = converged(changed(problem, legs=problem.model.legs[:1]))[-1]
-    return frame.meshed_state
+    return converged(changed(problem, legs=problem.model.legs[:1]))[-1].meshed_state
 
 
 def travel(problem: Problem, state: State[Any], way: float, turn: float, steps: int) -> Travel:
@@ -144,14 +144,10 @@ def run(quick: bool) -> Result:
     other = block(0.3, size, height)
     backwards = travel(other, pressed(other), WAY, -WAY / R, steps)
     rows += [
-        at_most("Q/mu P without creep, nu = 0.3", "Johnson 1985, Sec. 8.2", 0.0, backwards.steady / MU,
-            "the surface in the contact is compressed: dragged against the travel"),
-        zero("dissipation of rolling without creep over that of sliding as far, nu = 1/2", "mu P times the way",
-            found[0.0].dissipation[-1] / (MU * force * WAY), 1e-3, "points slip where the contact ends"),
-        at_most("the same, nu = 0.3", "mu P times the way", 0.01,
-            backwards.dissipation[-1] / float(MU * backwards.normal[-1] * WAY),
-            "far below that of sliding"),
-    ]  # fmt: skip
+        judged("q-mu-p-without-creep-nu", backwards.steady / MU),
+        judged("dissipation-of-rolling-without-creep-over", found[0.0].dissipation[-1] / (MU * force * WAY)),
+        judged("the-same-nu-0-3", backwards.dissipation[-1] / float(MU * backwards.normal[-1] * WAY)),
+    ]
     rows += _by_legs(other)
     rows += _exact(other, "plane strain", size, count)
     rows += _exact(block(0.3, thick, 3.0, "solid"), "solid", thick, count)
@@ -162,10 +158,8 @@ def run(quick: bool) -> Result:
     ]
     columns = "creep_R_over_mu_a way_mm way_over_a Q_over_mu_P dissipation_over_mu_P_mm"
     data = exact_columns(columns, table)
-    bent = (backwards.way / a).tolist(), (backwards.ratio / MU).tolist()
-    return Result(
-        tuple(rows), data, lambda figure: _draw(figure, data, bent, [one.steady / MU for one in found.values()])
-    )
+    bent, ends = (backwards.way / a, backwards.ratio / MU), [one.steady / MU for one in found.values()]
+    return Result(tuple(rows), data, lambda figure: _draw(figure, data, bent, ends))
 
 
 def _by_legs(problem: Problem) -> list[Row]:
@@ -177,10 +171,7 @@ def _by_legs(problem: Problem) -> list[Row]:
     one = travel(problem, pressed(problem), way, -way / R, steps)
     legs = sums(problem, frame.meshed_state, BEGIN + way)
     away = max(abs(legs[0] - one.normal[-1]), abs(legs[1] - one.tangential[-1]), abs(legs[-1] - one.torque[-1]) / R)
-    return [
-        zero("difference of forces over P between legs and increments from the lowest point", "kinematics",
-            away / legs[0], 1e-8, "the residual")
-    ]  # fmt: skip
+    return [judged("difference-of-forces-over-p-between", away / legs[0])]
 
 
 def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
@@ -193,43 +184,37 @@ def _exact(problem: Problem, name: str, size: float, steps: int) -> list[Row]:
     rolled = travel(rough, start, way, -way / R, steps)
     free = travel(smooth, pressed(smooth), way, -way / R, steps)
     flat = 0.5 * size**2 / R**2
-    bent = "points are means over hats of an edge length s on an arc: s^2/2 R^2"
     half = steps // 2  # the beginning is no steady state
     work = 0.5 * (slid.along[half + 1 :] + slid.along[half:-1]).sum() * way / steps
     spent = float(slid.dissipation[-1] - slid.dissipation[half]) / float(work)
     solid = problem.dim == 3
     aside, across = (1e-4, "points also slip along z, by Poisson's effect") if solid else (1e-8, "the residual")
     rows = [
-        zero("torque over R P without friction", STATICS, float(np.abs(free.torque / R / free.normal).max()), flat,
-            bent),
+        judged("torque-over-r-p-without-friction", float(np.abs(free.torque / R / free.normal).max()), tolerance=flat),
         Row("Q/mu P, turned without travel", "Coulomb", -1.0, float(turned.ratio[-1] / mu), aside, across),
-        Row("torque/(mu P R), turned without travel", STATICS, -1.0,
-            float(turned.torque[-1] / (R * turned.normal[-1] * mu)), flat, bent),
+        judged("torque-mu-p-r-turned-without", float(turned.torque[-1] / (R * turned.normal[-1] * mu)), tolerance=flat),
         Row("Q/mu P, slid without a turn", "Coulomb", 1.0, float(slid.ratio[-1] / mu), aside, across),
-        Row("sum of friction over mu P, slid without a turn", "Coulomb", 1.0,
-            float((slid.friction / slid.normal)[-1] / mu), 1e-8, "the residual"),
-        zero("largest difference of torque/R and Q over P, rolled", STATICS,
-            float(np.abs((rolled.torque / R - rolled.tangential) / rolled.normal).max()), flat, bent),
-        Row("dissipation of sliding over the work of F_x", "energy, steady state", 1.0, spent, way / steps,
-            "of the first order in the increment, half of it over a, which is 0.5 mm"),
-        at_most("dissipation rolled over slid", "rolling does not slip", 0.1,
-            float(rolled.dissipation[-1] / slid.dissipation[-1]), "creep and beginning included"),
-    ]  # fmt: skip
+        judged("sum-of-friction-over-mu-p", float((slid.friction / slid.normal)[-1] / mu)),
+        judged(
+            "largest-difference-of-torque-r-and",
+            float(np.abs((rolled.torque / R - rolled.tangential) / rolled.normal).max()),
+            tolerance=flat,
+        ),
+        judged("dissipation-of-sliding-over-the-work", spent, tolerance=way / steps),
+        judged("dissipation-rolled-over-slid", float(rolled.dissipation[-1] / slid.dissipation[-1])),
+    ]
     return [replace(row, what=f"{row.what}, {name}") for row in rows]
 
 
-def _draw(figure: Any, data: dict[str, list[float]], bent: tuple[list[float], list[float]], ends: list[float]) -> None:
+def _draw(figure: Any, data: dict[str, list[float]], bent: tuple[Float, Float], ends: list[float]) -> None:
     left, right = figure.subplots(1, 2)
-    creeps = sorted(set(data["creep_R_over_mu_a"]))
-    for creep in creeps:
-        own = [k for k, c in enumerate(data["creep_R_over_mu_a"]) if c == creep]
-        ratio = [data["Q_over_mu_P"][k] for k in own]
-        left.plot([data["way_over_a"][k] for k in own], ratio, lw=1.2, label=f"k R/(mu a) = {creep:g}")
+    for creep, t in grouped(data, "creep_R_over_mu_a"):
+        left.plot(t["way_over_a"], t["Q_over_mu_P"], lw=1.2, label=f"k R/(mu a) = {creep:g}")
     left.plot(*bent, "k--", lw=1.0, label="0, nu = 0.3")
     left.set(xlabel="way / a", ylabel="Q / (mu P)", ylim=(None, 1.05))
     left.legend(ncols=2, loc="upper left", bbox_to_anchor=(0.0, -0.14))
     fine = np.linspace(0.0, 1.2, 61)
     right.plot(fine, [carter(float(c)) for c in fine], "k-", lw=0.8, label="Carter")
-    right.plot(creeps, ends, "o", label="found, last tenth of the way")
+    right.plot(sorted(set(data["creep_R_over_mu_a"])), ends, "o", label="found, last tenth of the way")
     right.set(xlabel="k R / (mu a)", ylabel="Q / (mu P), steady", ylim=(-0.05, 1.1))
     right.legend(loc="lower right")

@@ -20,7 +20,7 @@ import numpy as np
 from finger3d._machine import cores
 
 from ._child import Bench, available_gb, best_of
-from ._rows import Result, Row, at_least, at_most
+from ._rows import Result, Row, at_least, at_most, of_records
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]
@@ -117,19 +117,17 @@ def _one_factorisation(runs: Runs) -> list[Row]:
 
 
 def _table(runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> dict[str, Any]:
-    lines = []
-    for series, sizes in (("unknowns", unknowns), ("contact rows", rows)):
-        for s in sizes:
-            r = runs[s]
-            lines.append(
-                {"series": series, "size_mm": s.size, "base_size_mm": s.base, "dofs": r["dofs"], "rows": r["rows"],
-                 "iterations": r["iterations"], "force_N": r["force"], "load": round(r["load"], 2),
-                 **{f"{k}_s": round(v, 3) for k, v in r["seconds"].items()},
-                 **{f"{k}_processor_s": round(v, 3) for k, v in r["processor_seconds"].items()},
-                 "seconds": round(sum(r["seconds"].values()), 3),
-                 **{f"{k}_peak_MB": round(v, 1) for k, v in r["peaks"].items()}, "peak_MB": round(r["peak_MB"], 1)}
-            )  # fmt: skip
-    return {k: [line[k] for line in lines] for k in lines[0]}
+    return of_records([
+        {"series": series, "size_mm": s.size, "base_size_mm": s.base, "dofs": r["dofs"], "rows": r["rows"],
+         "iterations": r["iterations"], "force_N": r["force"], "load": round(r["load"], 2),
+         **{f"{k}_s": round(v, 3) for k, v in r["seconds"].items()},
+         **{f"{k}_processor_s": round(v, 3) for k, v in r["processor_seconds"].items()},
+         "seconds": round(sum(r["seconds"].values()), 3),
+         **{f"{k}_peak_MB": round(v, 1) for k, v in r["peaks"].items()}, "peak_MB": round(r["peak_MB"], 1)}
+        for series, sizes in (("unknowns", unknowns), ("contact rows", rows))
+        for s in sizes
+        for r in (runs[s],)
+    ])  # fmt: skip
 
 
 def _draw(figure: Any, runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> None:

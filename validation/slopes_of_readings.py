@@ -31,7 +31,9 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
 from ._press import fig9_finger
-from ._rows import Result, Row, at_most, columns
+from ._rows import Result, Row, columns, listed
+
+judged = listed(__file__)
 
 SECTION, SWEPT, WILD = "section", "20 mm wide, swept", "20 mm wide, fTetWild"
 EVEN = "20 mm wide, swept, base edges twice as long"
@@ -125,16 +127,14 @@ def _against_finer(found: Curves) -> list[Row]:
     error = {key: c.error(found[half]) for key, c in found.items() if (half := (*key[:2], key[2] / 2.0)) in found}
     what = "largest error of d strain / d mu, mu = .1 to 1, over the largest slope"
     goal = [
-        at_most(f"{what}, {case}, {size:g} mm, gauge_refinement = {refinement:g}", "half the edges", ALLOWED, value,
-            "the goal", "statement")
+        judged("mm-gauge-refinement", value, ALLOWED, what=what, case=case, size=size, refinement=refinement)
         for (case, refinement, size), value in error.items()
-    ]  # fmt: skip
+    ]
     left = [
-        at_most(f"that error with gauge_refinement = 2, over that without, {case}, {size:g} mm", "no refinement", 0.5,
-            value / error[case, PLAIN, size], "half pays for its cells", "statement")
+        judged("that-error", value / error[case, PLAIN, size], case=case, size=size)
         for (case, refinement, size), value in error.items()
         if refinement == REFINED and case != EVEN
-    ]  # fmt: skip
+    ]
     return goal + left
 
 
@@ -144,12 +144,16 @@ def _between_meshers(found: Curves) -> list[Row]:
         "largest difference of d strain / d mu between swept and fTetWild, over the largest slope, 20 mm wide, 1.4 mm"
     )
     return [
-        at_most(f"{what}, gauge_refinement = {refinement:g}", "the other mesher", 2.0 * ALLOWED,
-            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]), "the goal, of each of them",
-            "statement")
+        judged(
+            "gauge-refinement",
+            found[SWEPT, refinement, 1.4].error(found[WILD, refinement, 1.4]),
+            2.0 * ALLOWED,
+            what=what,
+            refinement=refinement,
+        )
         for refinement in (PLAIN, REFINED)
         if (WILD, refinement, 1.4) in found
-    ]  # fmt: skip
+    ]
 
 
 def _section(found: Curves) -> list[Row]:
@@ -158,10 +162,9 @@ def _section(found: Curves) -> list[Row]:
     error = {refinement: found[SECTION, refinement, 1.0].error(finest) for refinement in (PLAIN, REFINED)}
     what = "largest error of d strain / d mu by the finest refined mesh, over the largest slope, section, 1 mm"
     return [
-        at_most(f"{what}, gauge_refinement = 2", "finest mesh", ALLOWED, error[REFINED], "the goal", "sensitivity"),
-        at_most(f"{what}, gauge_refinement = 2 over 1", "no refinement", 0.5, error[REFINED] / error[PLAIN],
-            "edges half as long at the gauge leave a quarter of its error", "sensitivity"),
-    ]  # fmt: skip
+        judged("section-refined", error[REFINED], ALLOWED, what=what),
+        judged("gauge-refinement-2-over-1", error[REFINED] / error[PLAIN], what=what),
+    ]
 
 
 def _draw(figure: Any, found: Curves) -> None:

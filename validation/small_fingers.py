@@ -77,9 +77,8 @@ def run(quick: bool) -> Result:
 def _rows(found: Spread) -> Iterator[Row]:
     for (radius, measure, name, readings), sd in found.items():
         for mu in JUDGED:
-            what = f"standard deviation of mu = {mu:g}, {readings}, {name}, {measure}, R = {radius:g} mm"
-            at = float(np.interp(mu, MUS, sd))
-            yield said(what, "Sec. V", LIMIT, at, "the paper's 0.1", 0.0, "at most")
+            here = f"{readings}, {name}, {measure}, R = {radius:g} mm"
+            yield said("spread-of-mu", np.interp(mu, MUS, sd), LIMIT, mu=mu, here=here)
     for measure in dict.fromkeys(key[1] for key in found):
         ratios = [
             float(np.mean(found[RADII[0], m, name, readings]) / np.mean(found[RADII[-1], m, name, readings]))

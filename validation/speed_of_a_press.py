@@ -122,10 +122,7 @@ def _rows(case: tuple[str, str, bool, float], reads: dict[float, Read]) -> list[
     name, control, bulk, rate = case
     here = f"{control}, {100.0 * rate:g} % per decade of {'all moduli' if bulk else 'the shear modulus'}, {name}"
     return [
-        said(
-            f"error of mu = .25 read in {time:g} s: {here}", "Sec. IV", 0.1, abs(reads[time].mu_error),
-            "the paper's error", 0.0, "at most",
-        )
+        said("error-by-speed", abs(reads[time].mu_error), time=time, here=here)
         for time in (DURATIONS[0], 100.0)
     ]  # fmt: skip
 

@@ -72,8 +72,7 @@ def measured(count: int) -> Float:
     area = here.surface.area
     found = []
     for depth in DEPTHS:
-        state = here.press(gap - depth)
-        f = state.state.force[:, 0] if state.outcome.ok else np.full(len(gap), np.nan)
+        f = here.normal_force(gap - depth)
         force = 4.0 * f.sum()
         same = (0.75 * force * R / MODULUS) ** (1.0 / 3.0)
         p = f / area
@@ -102,15 +101,13 @@ def run(quick: bool) -> Result:
         Row("peak pressure at 4 mm, from the force (MPa)", _TATARA, float(wanted), from_force, 0.01, _ONE),
     ]
     if not quick:  # the line of p^2 needs 9 points to a
-        rows.append(
-            Row("peak pressure at 4 mm, from p^2 over r^2 (MPa)", _TATARA, float(wanted), float(peak[-1]), 0.01, _ONE)
-        )
-    ratio = float(np.mean(force / force_at(true)))
-    rows.append(Row("force over Tatara's, mean of 12 depths", _TATARA, 1.0, ratio, 0.01, _ONE))
-    ratio = float(np.mean(force / force_at(a)))
-    rows.append(
-        Row("P/P_Hertz(a), mean of 12 depths", "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1", 1.0, ratio, 0.01, _ONE)
-    )
+        what = "peak pressure at 4 mm, from p^2 over r^2 (MPa)"
+        rows.append(Row(what, _TATARA, float(wanted), float(peak[-1]), 0.01, _ONE))
+    for what, source, radius in (
+        ("force over Tatara's, mean of 12 depths", _TATARA, true),
+        ("P/P_Hertz(a), mean of 12 depths", "Johnson 1985, sec. 4.2; REFERENCES.md, 1.1", a),
+    ):
+        rows.append(Row(what, source, 1.0, float(np.mean(force / force_at(radius))), 0.01, _ONE))
     errors = [float(np.sqrt(np.mean(level[:, 3] ** 2))) for level in levels]
     why = "12 depths sample the position of the edge between points; a higher rate passes"
     got = rate(1.0 / np.array(counts), errors)
@@ -125,15 +122,8 @@ def run(quick: bool) -> Result:
 def draw(figure: Any, counts: tuple[int, ...], errors: list[float], levels: list[Float], true: Float) -> None:
     """Errors over the point spacing; force over approach against both theories."""
     left, right = figure.subplots(1, 2)
-    sizes = 1.0 / np.array(counts)
-    convergence(
-        left,
-        sizes,
-        {"pressure": errors},
-        1.0,
-        "point spacing / a",
-        "relative L2 error of the pressure, rms over depths",
-    )
+    label = "relative L2 error of the pressure, rms over depths"
+    convergence(left, 1.0 / np.array(counts), {"pressure": errors}, 1.0, "point spacing / a", label)
     for n, level in zip(counts, levels, strict=True):
         right.plot(2.0 * DEPTHS, level[:, 0] / 1e3, "os^"[counts.index(n)], markersize=4.5, label=f"{n} points to a")
     right.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")

@@ -29,15 +29,15 @@ from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
-from ._rows import Result, Row, at_least, at_most, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 SIDE, LEFT, TOP = 40.0, 150.0, 50.0  # mm, MPa
 PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm
 ASTER = np.array([28.6, 27.2, 22.8, 19.8, 15.0])  # um
 NEWTON_96 = np.array([28.60, 27.22, 22.87, 19.81, 15.41])  # um
 FRICTIONLESS = 40.62  # um, at x = 0
-SOURCE = "Code_Aster SSNV128; REFERENCES.md, 6.1"
-CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 COLUMNS = "cells_per_side increments mu rule ux_0 ux_1.25 ux_5 ux_7.5 ux_11.25 iterations residual settled_increments"
 
 
@@ -101,26 +101,22 @@ def _rows(table: list[tuple[Any, ...]], meshes: tuple[int, ...], states: list[Co
     fine = meshes[-1]
     got = np.array(next(r for r in table if r[:4] == (fine, 5, 1.0, "projection"))[4:9], dtype=float)
     for k, x in enumerate(PLACES):
-        yield Row(f"u_x at {x:g} mm, um", SOURCE, ASTER[k], got[k], 0.05, "a mean over several codes, uncertain")
+        yield judged("u-x-at-mm-um", got[k], ASTER[k], x=x)
     for k, x in enumerate(PLACES):
-        what, why = f"u_x at {x:g} mm, um, {fine} cells a side", "last digit of the reference, and different elements"
-        yield Row(what, "96 x 96 elements, Newton; REFERENCES.md, 6.1", NEWTON_96[k], got[k], 0.005, why)
+        yield judged("u-x-at-mm-um-cells", got[k], NEWTON_96[k], x=x, fine=fine)
     smooth = next(r for r in table if r[:4] == (fine, 1, 0.0, "projection"))[4]
-    yield Row("u_x at 0 mm, um, mu = 0", SOURCE, FRICTIONLESS, smooth, 0.001, "the reference has four digits")
+    yield judged("u-x-at-0-mm-um", smooth, FRICTIONLESS)
     force = max(float(np.abs(s.force).max()) for s in states)
     apart = max(float(np.abs(s.force - states[0].force).max()) for s in states) / force
-    what = "forces after 1, 5 and 20 increments, largest difference over the largest"
-    yield zero(what, "one solution; REFERENCES.md, 6.1", apart, 1e-8, "convergence criterion")
+    yield judged("forces-after-1-5-and-20", apart)
     worst = max(r[10] for r in table if r[3] == "projection")
-    yield at_most("largest residual", CRITERION, 1e-8, worst)
+    yield judged("largest-residual", worst)
     values = [next(r for r in table if r[:4] == (n, 5, 1.0, "projection"))[4] for n in meshes]
     steps = np.abs(np.diff(values))
     rate = float(np.log2(steps[0] / steps[-1]) / (len(steps) - 1))
-    what, why = "rate at which u_x at 0 mm settles with the mesh", "a bound"
-    yield at_least(what, "first order: stress is not smooth where stick ends", 1.0, rate, why)
+    yield judged("rate-at-which-u-x-at", rate)
     literal = next(r for r in table if r[:4] == (fine, 5, 1.0, "paper"))
-    what = f"increments of 5 that the paper's rule settles, {fine} cells a side"
-    yield zero(what, "the rule repeats states here", literal[11], 0.0, "a count", "sensitivity")
+    yield judged("increments-of-5-that-the-paper", literal[11], fine=fine)
 
 
 def _draw(figure: Any, table: list[tuple[Any, ...]], square: Square, state: ContactState) -> None:

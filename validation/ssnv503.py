@@ -15,16 +15,14 @@ Finally, with a fixed base: a plate that slides on a block until all points slip
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
@@ -37,8 +35,10 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 
-from ._common import cube, side_load
-from ._rows import Result, Row, at_most, exact_columns, zero
+from ._common import cube, increment, side_load
+from ._rows import Result, Row, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 MU, PRESSURE, SPRINGS = 0.3, 0.01, 2e-5  # p/E, and the springs' stiffness over E, of a block of side 1
 TURN = np.pi / 6.0
@@ -46,8 +46,6 @@ SHARES = (0.5, 0.9, 0.99, 1.01)
 FREE = 0.99 * MU * PRESSURE / SPRINGS
 """Glide of the block at 99 % of mu N if there were no friction, which takes it back, over the side."""
 SOURCE = "Code_Aster SSNV503; REFERENCES.md, 6.3"
-ROUND_OFF = "round-off: some hundred times 2e-16 by the factorisation, another number on each processor"
-CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 COLUMNS = "dim nu shear_over_muN sticking slipping friction_over_muN mean_slip largest_slip iterations residual"
 """Slips over the block's side."""
 
@@ -82,21 +80,16 @@ def block(dim: int, nu: float, cells: int) -> list[tuple[Any, ...]]:
     state = ContactState.at_rest(np.zeros(c), dim)
     table = []
     for share in (0.0, *SHARES):
-        found = solve_increment(
-            ContactProblem.of(state, press + share * shear, compliance, ContactLaw(Coulomb(MU)), 1.0)
-        )
+        found = increment(state, press + share * shear, compliance, MU, 1.0)
         if not found.outcome.ok:
             raise AssertionError(f"{dim}D, nu = {nu:g}, {share:g} of mu N: {found.outcome}")
         state = found.state
         total = state.force.sum(axis=0)
         slip = np.linalg.norm(state.accumulated_slip, axis=1)
-        table.append(
-            (
-                dim, nu, share, int((state.status == STICK).sum()), int((state.status == SLIP).sum()),
-                float(np.linalg.norm(total[1:]) / (MU * total[0])), float(slip.mean()), float(slip.max()),
-                found.iterations, found.residual,
-            )
-        )  # fmt: skip
+        stick, slips = (int((state.status == one).sum()) for one in (STICK, SLIP))
+        friction = float(np.linalg.norm(total[1:]) / (MU * total[0]))
+        slid = friction, float(slip.mean()), float(slip.max())
+        table.append((dim, nu, share, stick, slips, *slid, found.iterations, found.residual))
     return table
 
 
@@ -138,56 +131,48 @@ def run(quick: bool) -> Result:
     """Blocks of 16 (2D) and 4 (3D) cells a side, and a plate sliding on a block with a fixed base."""
     flat, solid = (6, 2) if quick else (16, 4)
     table = [r for nu in (0.0, 0.3) for dim, cells in ((2, flat), (3, solid)) for r in block(dim, nu, cells)]
-    rows = []
+    curves = {dim: plate(dim, size) for dim, size in ((2, 0.5), (3, 2.5 if quick else 1.25))}
+    rows = (*_block_rows(table), *_plate_rows(curves))
+    columns = exact_columns(COLUMNS, table)
+    return Result(
+        rows, columns, lambda figure: _draw(figure, columns, {dim: curve for dim, (curve, _) in curves.items()})
+    )
+
+
+def _block_rows(table: list[tuple[Any, ...]]) -> Iterator[Row]:
     glide = 0.01 * MU * PRESSURE / SPRINGS
     for dim, nu, share, stick, slip, friction, mean, largest, _, _ in table:
         here = f"{dim}D, nu = {nu:g}, shear {share:g} mu N"
         if share == 0.99:
-            rows.append(
-                Row(f"friction over mu N, {here}", SOURCE, 0.99, friction, 1e-4, "the springs carry up to 1e-4")
-            )
-            own = "a bound: the block's own strain p/E over the glide"
-            what = f"mean slip over the glide (1.01 - 1) mu N/springs, {here}"
-            rows.append(at_most(what, SOURCE, PRESSURE / glide, mean / glide, own))
+            yield judged("friction-over-mu-n", friction, here=here)
+            yield judged("mean-slip-over-the-glide-1", mean / glide, PRESSURE / glide, here=here)
         if share == 0.99 and nu == 0.0:
-            rows.append(zero(f"points that slip, {here}", SOURCE, slip, 0, "must stick"))
-            what = f"largest slip over the glide of {FREE:.0f} sides without friction, {here}"
-            rows.append(zero(what, SOURCE, largest / FREE, 1e-12, ROUND_OFF))
+            yield judged("points-that-slip", slip, here=here)
+            yield judged("largest-slip-over-the-glide-of", largest / FREE, FREE=FREE, here=here)
         if share == 1.01:
-            rows.append(zero(f"points that stick, {here}", SOURCE, stick, 0, "must slip"))
-            rows.append(Row(f"friction over mu N, {here}", SOURCE, 1.0, friction, 1e-6, "limit of Coulomb's law"))
-            what = f"mean slip over the glide, {here}"
-            rows.append(
-                Row(what, "equilibrium", 1.0, mean / glide, PRESSURE / glide, "the block's own strain over the glide")
-            )
-    worst = max(r[9] for r in table)
-    rows.append(at_most("largest residual", CRITERION, 1e-8, worst))
-    curves = {}
-    for dim, size in ((2, 0.5), (3, 2.5 if quick else 1.25)):
-        curves[dim], slipping = plate(dim, size)
-        peak, last = max(q for _, q, _ in curves[dim]), curves[dim][-1][1]
-        rows.append(Row(f"plate, {dim}D: largest Q/(mu P)", SOURCE, 1.0, peak, 1e-9, "round-off", measure="at most"))
-        wide, why = (
-            (1e-3, "round-off") if dim == 2 else (0.01, "some friction points sideways, because the block expands")
-        )
-        rows.append(Row(f"plate, {dim}D: Q/(mu P) when all slips", SOURCE, 1.0, last, wide, why))
-        rows.append(Row(f"plate, {dim}D: share of points that slip at last", SOURCE, 1.0, slipping, 0.0, "all"))
-    what, why = "plate, 3D: direction of Q, degrees from x", "the mesh is not symmetric about this direction"
-    rows.append(
-        Row(what, "isotropic friction; REFERENCES.md, 7.2", 30.0, curves[3][-1][2], 0.1, why, measure="absolute")
-    )
-    columns = exact_columns(COLUMNS, table)
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, curves))
+            yield judged("points-that-stick", stick, here=here)
+            yield judged("friction-when-gliding", friction, here=here)
+            yield judged("mean-slip-over-the-glide", mean / glide, tolerance=PRESSURE / glide, here=here)
+    yield judged("largest-residual", max(line[9] for line in table))
+
+
+def _plate_rows(curves: dict[int, tuple[list[tuple[float, float, float]], float]]) -> Iterator[Row]:
+    sideways = "some friction points sideways, because the block expands"
+    for dim, wide, why in ((2, 1e-3, "round-off"), (3, 0.01, sideways)):
+        curve, slipping = curves[dim]
+        peak, last = max(q for _, q, _ in curve), curve[-1][1]
+        yield judged("plate-d", peak, dim=dim)
+        yield Row(f"plate, {dim}D: Q/(mu P) when all slips", SOURCE, 1.0, last, wide, why)
+        yield judged("plate-d-2", slipping, dim=dim)
+    angle = curves[3][0][-1][2]
+    yield judged("plate-3d", angle)
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]], curves: dict[int, list[tuple[float, float, float]]]) -> None:
     left, right = figure.subplots(1, 2)
-    t = {k: np.array(v) for k, v in columns.items()}
-    for dim in (2, 3):
-        for nu, mark in ((0.0, "o"), (0.3, "s")):
-            of = (t["dim"] == dim) & (t["nu"] == nu)
-            share = t["sticking"][of] / (t["sticking"] + t["slipping"])[of]
-            left.plot(t["shear_over_muN"][of], share, mark + "-", label=f"{dim}D, nu = {nu:g}")
+    for (dim, nu), t in grouped(columns, "dim", "nu"):
+        share = t["sticking"] / (t["sticking"] + t["slipping"])
+        left.plot(t["shear_over_muN"], share, "s-" if nu else "o-", label=f"{dim}D, nu = {nu:g}")
     left.axvline(1.0, color="k", lw=0.8, ls="--")
     left.set(xlabel="shear load / mu N", ylabel="share of points that stick", title="block on soft springs")
     for dim, curve in curves.items():

@@ -34,8 +34,10 @@ from finger3d.sensor.likelihood import CREDIBLE
 
 from ._paper import said
 from ._press import fig9_finger
-from ._rows import Result, Row, at_most, columns
+from ._rows import Result, Row, columns, listed
 from ._strain_maps import StrainMap, resolution_panel, slope_panel
+
+judged = listed(__file__)
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
 TURN = math.radians(30.0)
@@ -111,20 +113,17 @@ def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> li
     hit = np.mean([any(low <= m <= high for low, high in e.intervals) for m, e in zip(mu, answers, strict=True)])
     share = CREDIBLE
     return [
-        Row(
-            f"strain map at (36.5, 40.5) mm, mu = {last:g}, {here}", "gauge there, by its own row", float(row[1]),
-            float(near.along(TURN)[1, i, j]), 1e-9, "the same field, solved for and condensed",
+        judged("strain-map-at-36-5-40", float(near.along(TURN)[1, i, j]), float(row[1]), last=last, here=here),
+        judged("strain-from-the-reduced-model-mu", reduced, float(c.reading[-1]), last=last, here=here),
+        judged(
+            "90-sets-that-contain-the-true",
+            float(hit),
+            share,
+            tolerance=3.0 * math.sqrt(share * (1.0 - share) / count),
+            count=count,
+            here=here,
         ),
-        Row(
-            f"strain from the reduced model, mu = {last:g}, {here}", "press with the mesh", float(c.reading[-1]),
-            reduced,
-            1e-9, "from another start; both end at a residual of 1e-11",
-        ),
-        Row(
-            f"90 % sets that contain the true mu, {count} readings, {here}", "mu drawn evenly", share, float(hit),
-            3.0 * math.sqrt(share * (1.0 - share) / count), "three binomial standard deviations", measure="absolute",
-        ),
-    ]  # fmt: skip
+    ]
 
 
 def _statements(what: str, calibration: Calibration) -> list[Row]:
@@ -133,29 +132,13 @@ def _statements(what: str, calibration: Calibration) -> list[Row]:
     steps = np.diff(c.reading)
     usable = max((high for low, high in calibration.usable if low <= 0.3), default=0.0)
     return [
-        said(
-            f"the strain falls as mu grows: rising steps over all movement, {what}", "Fig. 14", 0.0,
-            steps[steps > 0.0].sum() / np.abs(steps).sum(), "round-off and increments", 0.05, "absolute",
-        ),
-        said(
-            f"error of mu at .5 from a noise of 1.5e-4, second-order fit, over 0.1, log10, {what}", "Sec. IV", 0.0,
-            math.log10(float(_resolution_of_fit(c, np.array(0.5))) / LIMIT), "within a factor 3", 0.48, "absolute",
-        ),
-        said(
-            f"the same by the change of the strain from mu = .4 to .6, {what}", "Sec. IV", 0.0,
-            math.log10(0.2 * c.noise / abs(float(c.at(0.6) - c.at(0.4))) / LIMIT), "within a factor 3", 0.48,
-            "absolute",
-        ),
+        said("strain-falls", steps[steps > 0.0].sum() / np.abs(steps).sum(), what=what),
+        said("error-by-fit", math.log10(float(_resolution_of_fit(c, np.array(0.5))) / LIMIT), what=what),
+        said("error-by-change", math.log10(0.2 * c.noise / abs(float(c.at(0.6) - c.at(0.4))) / LIMIT), what=what),
         *_left(what, c),
-        said(
-            f"mu is measured with 0.1 up to .5: end of the usable range that begins below .3, {what}", "Sec. IV", 0.5,
-            usable, "as the paper states", 0.0, "at least",
-        ),
-        said(
-            f"a second-order equation describes the curve: its residual (rms), {what}", "Fig. 14", NOISE, c.fit.rms,
-            "the noise", 0.0, "at most",
-        ),
-    ]  # fmt: skip
+        said("measured-to-half", usable, what=what),
+        said("second-order-residual", c.fit.rms, wanted=NOISE, what=what),
+    ]
 
 
 def _resolution_of_fit(c: ReadingCurve, mu: Float) -> Float:
@@ -170,27 +153,16 @@ def _left(what: str, c: ReadingCurve) -> list[Row]:
     if "increments" not in names:
         return []
     error = float(c.tolerance_sd(mus)[names.index("increments")].max())
-    text = f"error of that change by the increments, over the change, {what}"
     share = error / abs(float(np.diff(c.at(mus))[0]))
-    return [at_most(text, "presses of fewer", 0.25, share, "that of mu is as much", "statement")]
+    return [judged("error-of-that-change-by-the", share, what=what)]
 
 
 def _widths(found: Found) -> list[Row]:
     """What the plane strain section promises, held against the finger 20 mm wide."""
     moved = {k: float(np.ptp(c.readings[0].reading)) for k, c in found.items()}
     return [
-        Row(
-            f"change of the strain over all mu, 20 mm wide over plane strain, {kind}", "plane strain", 1.0,
-            moved["solid", kind] / moved["plane-strain", kind], 0.5, "half suffices for a design", "statement",
-        )
-        for kind in (FREE, READ)
-    ] + [
-        Row(
-            f"change of the strain over all mu, a foil's over free, {NAMES[domain]}", "a gauge without stiffness", 1.0,
-            moved[domain, READ] / moved[domain, FREE], 0.5, "half suffices for a design", "statement",
-        )
-        for domain in NAMES
-    ]  # fmt: skip
+        judged("change", moved["solid", kind] / moved["plane-strain", kind], kind=kind) for kind in (FREE, READ)
+    ] + [judged("change-by-foil", moved[domain, READ] / moved[domain, FREE], value=NAMES[domain]) for domain in NAMES]
 
 
 def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:

@@ -25,7 +25,9 @@ from finger3d.mechanics.results.history import contact_table, measure
 from finger3d.objects import MeshObject
 
 from ._press import converged
-from ._rows import Result, Row, at_least, at_most, together, zero
+from ._rows import Result, listed, together
+
+judged = listed(__file__)
 
 TEETH, DEPTH = 24, 1.0
 PITCH = 360.0 / TEETH
@@ -84,26 +86,21 @@ def _gear(quick: bool) -> Result:
     further, back = pressed(angles[1] + PITCH, size), pressed(-angles[1], size)
     some, scale = found[1], abs(found[1]["force_y_N"])
     rows = [
-        zero(f"change of {name} by a turn of one pitch, over the force", "periodicity",
-            abs(further[name] - some[name]) / scale, 1e-3,
-            "the STL's corners have 32 bits, and its arcs are chords")
+        judged("change-of-by-a-turn-of", abs(further[name] - some[name]) / scale, name=name)
         for name in ("force_x_N", "force_y_N")
-    ]  # fmt: skip
+    ]
     rows += [
-        zero(f"{name} of opposite turns, their {what} over the force", "mirror image",
-            abs(back[name] + sign * some[name]) / scale, 1e-3,
-            "the STL is its own mirror image to 32 bits")
+        judged("of-opposite-turns-their-over-the", abs(back[name] + sign * some[name]) / scale, name=name, what=what)
         for name, sign, what in (("force_x_N", 1.0, "sum"), ("force_y_N", -1.0, "difference"))
-    ]  # fmt: skip
+    ]
     rows += [
-        zero("sideways over vertical force of a symmetric position", "mirror image",
-            abs(found[0]["force_x_N"]) / abs(found[0]["force_y_N"]), 1e-3, "as before"),
-        at_least(f"the same at {angles[1]:g} deg", "flanks push sideways", 5e-3, abs(some["force_x_N"]) / scale,
-            "no mirror image"),
-        zero("torque reported less that of the points, over force times an edge length", "statics",
-            max(abs(f["torque_Nmm"] - f["of_points_Nmm"]) / abs(f["force_y_N"]) for f in found) / size, 1.0,
-            "forces act at the centroids of hats, the table gives their vertices"),
-    ]  # fmt: skip
+        judged("sideways-over-vertical-force-of-a", abs(found[0]["force_x_N"]) / abs(found[0]["force_y_N"])),
+        judged("the-same-at-deg", abs(some["force_x_N"]) / scale, value=angles[1]),
+        judged(
+            "torque-reported",
+            max(abs(f["torque_Nmm"] - f["of_points_Nmm"]) / abs(f["force_y_N"]) for f in found) / size,
+        ),
+    ]
     table: dict[str, Any] = {"angle_deg": list(angles)} | {key: [f[key] for f in found] for key in found[0]}
     return Result(tuple(rows), table, lambda figure: _draw_gear(figure, table))
 
@@ -205,21 +202,14 @@ def _slot(quick: bool) -> Result:
     end = found[-1]
     at = f"edges of {sizes[-1]:g} mm"
     rows = [
-        Row("pressure on the contact face over M eps", "Hooke", 1.0, top / (stiff * strain), 0.005,
-            "the slot is open over the lowest 0.02 mm"),
-        Row("pressure on a wall over that on the contact face", "nu / (1 - nu)", NU / (1.0 - NU), side / top, 0.005,
-            "as before, in the middle of the wall"),
-        zero("force on the walls before the slide, N", "no contact", end["wall_before_N"], 0.0,
-            "the bulge is below the clearance"),
-        zero(f"lowest touching point above the slot's mouth, mm, {at}", "the lip", end["lowest"], 2.0 * sizes[-1],
-            "hats reach an edge length beyond the lip, and points move"),
-        Row(f"highest touching point above the slot's mouth, mm, {at}", "the lip", LIP, end["highest"],
-            2.0 * sizes[-1], "the same", measure="absolute"),
-        at_least(f"force of the lip on the wall, N, {at}", "it pushes along the slide", 0.1, end["wall_N"],
-            "the sign of the slide"),
-        at_most("penetration on the finest mesh over that on the coarsest", "the points see the lip better", 0.7,
-            end["penetration_mm"] / found[0]["penetration_mm"], "between the points"),
-    ]  # fmt: skip
+        judged("pressure-on-the-contact-face-over", top / (stiff * strain)),
+        judged("pressure-on-a-wall-over-that", side / top, NU / (1.0 - NU)),
+        judged("force-on-the-walls-before-the", end["wall_before_N"]),
+        judged("lowest-touching-point-above-the-slot", end["lowest"], tolerance=2.0 * sizes[-1], at=at),
+        judged("highest-touching-point-above-the-slot", end["highest"], LIP, tolerance=2.0 * sizes[-1], at=at),
+        judged("force", end["wall_N"], at=at),
+        judged("penetration-on-the-finest-mesh-over", end["penetration_mm"] / found[0]["penetration_mm"]),
+    ]
     keys = ("wall_N", "face_N", "lowest", "highest", "penetration_mm")
     table: dict[str, Any] = {"size_mm": list(sizes)} | {key: [f[key] for f in found] for key in keys}
     return Result(tuple(rows), table, lambda figure: _draw_slot(figure, sizes, found))

@@ -31,10 +31,11 @@ from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, Ri
 
 from ._common import convergence, rate
 from ._press import converged
-from ._rows import Result, Row, at_least, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
+
+judged = listed(__file__)
 
 RADIUS = 6.0
-CLOSED = "closed form"
 
 
 def sewn(rings: Float) -> NDArray[np.int64]:
@@ -78,16 +79,12 @@ def box() -> Triangles:
     return Triangles(points, np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]))
 
 
-def pressed(obj: RigidObject, size: float) -> dict[str, Any]:
-    """Numbers of a press off the middle of a block."""
+def pressed(obj: RigidObject, size: float) -> float:
+    """Normal force (N) of a press off the middle of a block."""
     pad = designs()["block"](half_length_mm=5.0, height_mm=4.0, width_mm=8.0)
-    model = Model(
-        pad, Isotropic(1.0, 0.3), MeshOptions(size, 2.0, "swept"), (Leg(0.4, steps=2),), object=obj,
-        friction=Coulomb(0.3),
-    )  # fmt: skip
-    problem = build(model)
-    frame = converged(problem)[-1]
-    return measure(problem.points, frame)
+    mesh, law = MeshOptions(size, 2.0, "swept"), Coulomb(0.3)
+    problem = build(Model(pad, Isotropic(1.0, 0.3), mesh, (Leg(0.4, steps=2),), object=obj, friction=law))
+    return float(measure(problem.points, converged(problem)[-1])["normal_force_N"])
 
 
 def run(quick: bool) -> Result:
@@ -96,46 +93,32 @@ def run(quick: bool) -> Result:
     size = 1.0 if quick else 0.4
     rows, table, curves = [], [], {}
     dome = designs()["clipped_cylinder"](20.0, 12.0, 3.0, 8.0)
+    x, z = 0.7 + np.linspace(-3.0, 3.0, 101), 0.4 + np.linspace(-2.0, 2.0, 101)
+
+    def touch(obj: RigidObject) -> float:  # on the side of the dome
+        return first_touch(ContactPath(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0)).height_mm
+
     for name, make, exact in (
         ("ball", ball, Sphere(0.7, 0.4, radius_mm=RADIUS)),
         ("bar", bar, Cylinder(0.7, radius_mm=RADIUS)),
     ):
         true = pressed(exact, size)
-        touch = first_touch(ContactPath(dome.top, replace(exact, x_mm=4.0), 12.0, 4.0)).height_mm
-        x, z = 0.7 + np.linspace(-3.0, 3.0, 101), 0.4 + np.linspace(-2.0, 2.0, 101)
         errors: dict[str, list[float]] = {"height": [], "first touch": [], "force": []}
         for sectors in levels:
             obj = MeshObject(0.7, 0.4 if name == "ball" else 0.0, surface=make(sectors))
-            got = pressed(obj, size)
-            errors["height"].append(
-                float(
-                    np.sqrt(
-                        np.mean(
-                            (PlacedObject.of(obj, 0.0).height(x, z) - PlacedObject.of(exact, 0.0).height(x, z)) ** 2
-                        )
-                    )
-                )
-            )
-            errors["first touch"].append(
-                abs(first_touch(ContactPath(dome.top, replace(obj, x_mm=4.0), 12.0, 4.0)).height_mm - touch)
-            )
-            errors["force"].append(abs(got["normal_force_N"] / true["normal_force_N"] - 1.0))
+            away = PlacedObject.of(obj, 0.0).height(x, z) - PlacedObject.of(exact, 0.0).height(x, z)
+            errors["height"].append(float(np.sqrt(np.mean(away**2))))
+            errors["first touch"].append(abs(touch(obj) - touch(exact)))
+            errors["force"].append(abs(pressed(obj, size) / true - 1.0))
             table.append((name, sectors, len(obj.surface.faces), *(e[-1] for e in errors.values())))
         edges = [2.0 * np.pi * RADIUS / n for n in levels]
         curves |= {f"{name}: {what}": e for what, e in errors.items()}
         sagitta = edges[-1] ** 2 / (8.0 * RADIUS)
         rows += [
-            Row(
-                f"{name}: rate of the height's error (rms) with the edge length", "sagitta s^2/8R", 2.0,
-                rate(edges, errors["height"]), 0.1, "over two or three halvings", measure="at least",
-            ),
-            Row(
-                f"{name}: force with {levels[-1]} sectors, relative to the exact shape's", CLOSED, 1.0,
-                1.0 + errors["force"][-1], 3.0 * sagitta / 0.4, "three sagittas over the depth; P ~ depth^1.5",
-            ),
-            zero(f"{name}: first touch on the side of a dome, error, mm", CLOSED, errors["first touch"][-1], sagitta,
-                "the sagitta"),
-        ]  # fmt: skip
+            judged("rate-of-height", rate(edges, errors["height"]), name=name),
+            judged("force", 1.0 + errors["force"][-1], tolerance=3.0 * sagitta / 0.4, name=name, finest=levels[-1]),
+            judged("first-touch", errors["first touch"][-1], tolerance=sagitta, name=name),
+        ]
     rows += _distance_rows()
     columns = "shape sectors triangles height_error_mm first_touch_error_mm force_error"
     return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, edges, curves))
@@ -165,23 +148,14 @@ def _distance_rows() -> list[Row]:
     closest, face, _ = needle.closest(near)
     naive = float((np.einsum("ij,ij->i", near - closest, needle.normals[face]) <= 0.0).mean())
     off, turned = float(np.abs(distance - exact).max()), float(np.abs(normal - slope)[smooth].max())
-    paper = "Baerentzen and Aanaes 2005"
-    tip = "share of points around a needle's tip taken for inside"
     return [
-        zero("signed distance from a box, largest error, mm", CLOSED, off, 1e-12, "round-off"),
-        zero("its normal against the distance's slope", "differences", turned, 1e-6, "theirs"),
-        zero(tip, "all lie outside", wrong, 0.0, "none"),
-        at_least("the same by the nearest triangle's normal", paper, 0.1, naive, "the check can fail"),
+        judged("signed-distance-from-a-box-largest", off),
+        judged("its-normal-against-the-distance-s", turned),
+        judged("share-of-points-around-a-needle", wrong),
+        judged("the-same-by-the-nearest-triangle", naive),
     ]
 
 
 def _draw(figure: Any, edges: list[float], curves: dict[str, list[float]]) -> None:
-    axes = figure.subplots(1, 1)
-    convergence(
-        axes,
-        edges,
-        curves,
-        2.0,
-        "edge of the object's triangles, mm",
-        "error: height and first touch in mm, force relative",
-    )
+    labels = "edge of the object's triangles, mm", "error: height and first touch in mm, force relative"
+    convergence(figure.subplots(), edges, curves, 2.0, *labels)

@@ -15,7 +15,9 @@ beads are predicted.
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,33 +26,18 @@ from scipy.optimize import minimize_scalar
 from finger3d._types import Float
 from finger3d.analyses.press import press
 
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, columns, listed
 
-SOURCE = "Kerdok et al. 2003; REFERENCES.md, 9.2"
+judged = listed(__file__)
+
 SIZE, NU, NOMINAL = 80.0, 0.499, np.array([0.05, 0.125, 0.1825])
 HEIGHTS = 10.0 * np.arange(1, 8)
 """Of the beads above the base, mm."""
-AXIAL = np.array([
-    [[12.27, 12.57, 13.16, 13.73], [3.15, 3.90, 5.20, 6.40], [-6.87, -5.38, -3.35, -1.30],
-     [-17.22, -14.84, -12.06, -9.24], [-26.94, -24.12, -20.36, -16.88], [-37.29, -33.92, -29.13, -25.05],
-     [-47.50, -43.20, -37.67, -32.84]],
-    [[12.46, 12.49, 12.95, 13.52], [3.19, 3.87, 4.94, 5.94], [-6.83, -5.55, -3.56, -2.01],
-     [-16.88, -14.89, -11.95, -9.46], [-26.90, -24.27, -20.23, -16.61], [-37.26, -33.58, -28.76, -24.31],
-     [-47.16, -42.86, -36.92, -32.10]],
-    [[12.65, 13.02, 13.73, 14.25], [3.49, 4.31, 5.75, 6.90], [-6.49, -5.01, -2.63, -0.56],
-     [-16.85, -14.32, -11.13, -8.38], [-26.87, -23.75, -19.48, -16.14], [-37.07, -33.21, -28.11, -23.95],
-     [-46.94, -42.52, -36.59, -31.76]],
-])  # fmt: skip
-"""(3, 7, 4) mm towards the base: beads on the left, at the centre, on the right; from the base up; at rest, pressed."""
-ACROSS = np.array([
-    [[-30.05, -30.75, -31.66, -32.61], [-29.50, -30.62, -31.91, -33.39], [-29.50, -30.62, -32.28, -33.97],
-     [-29.10, -30.25, -31.73, -33.54], [-29.10, -30.06, -31.53, -33.21], [-29.13, -30.22, -31.36, -32.84],
-     [-28.87, -29.85, -30.62, -31.73]],
-    [[32.88, 33.62, 34.70, 35.96], [31.32, 32.44, 33.96, 35.47], [32.10, 33.21, 35.40, 37.29],
-     [31.33, 32.50, 34.58, 36.52], [31.34, 32.66, 34.70, 36.55], [31.69, 32.84, 34.88, 36.50],
-     [30.99, 32.44, 33.98, 35.07]],
-])  # fmt: skip
-"""(2, 7, 4) mm: the outer beads across the slice."""
+BEADS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+AXIAL, ACROSS = (np.array([*BEADS[way].values()]) for way in ("axial", "across"))
+"""(3, 7, 4) mm towards the base, beads on the left, at the centre, on the right, from the base up, at rest and pressed;
+and (2, 7, 4) mm across the slice, of the outer beads."""
+
 DEEPEST, INCREMENTS = 20.0, 20
 MUS = (0.0, 0.05, 0.1, 0.125, 0.15, 0.175, 0.2, 0.25, 0.3, 0.5, 1.0)
 FITS = 0.25
@@ -137,10 +124,9 @@ def run(quick: bool) -> Result:
     other = {"0.7 of the edge length": computed(best.mu, 0.7 * size), "nu = 0.49": computed(best.mu, size, 0.49)}
     rows = [*_rows(models, best, data), *_predicted(models, data)]
     rows += [
-        Row(f"root mean square of all differences with {what}, mm", f"edges of {size:g} mm, nu = {NU:g}",
-            best.misfit(data), model.misfit(data), 0.1, "a small part of it", "sensitivity")
+        judged("root-mean-square-of-all-differences", model.misfit(data), best.misfit(data), what=what, size=size)
         for what, model in other.items()
-    ]  # fmt: skip
+    ]
     lines = [
         (m.mu, 100.0 * NOMINAL[level], t, name, h, data[level, kind, j], d[kind, j])
         for m in models
@@ -159,19 +145,13 @@ def _rows(models: list[Compression], best: Compression, data: Float) -> list[Row
     over = np.array([best.fitted(x)[0] for x in data]) / (SIZE * NOMINAL)
     worst = max(misfits.values())
     return [
-        at_most(
-            f"root mean square of {data.size} differences, mm, best of {len(models)} coefficients: mu = {best.mu:g}",
-            SOURCE, FITS, misfits[best.mu], "steps of 0.19 mm, up to 0.5 mm between the sides",
-            "validation"),
-        at_least("the same of the worst coefficient over that of the best", SOURCE, 1.5, worst / misfits[best.mu],
-            "if beads tell friction", "statement"),
-        at_most(
-            f"mu is told within 0.1: half its range, {near[0]:.2f} to {near[-1]:.2f}, of at most {NEAR:g} times that",
-            SOURCE, 0.1, 0.5 * float(near[-1] - near[0]), "the resolution of a gauge", "statement"),
-        Row("fitted travel of the plate over the published one, of three that furthest from 1", SOURCE, 1.0,
-            float(over[np.argmax(np.abs(over - 1.0))]), 0.05, "if the published compression is that of the cube",
-            "statement"),
-    ]  # fmt: skip
+        judged(
+            "root-mean-square-of-differences-mm", misfits[best.mu], FITS, size=data.size, count=len(models), mu=best.mu
+        ),
+        judged("the-same", worst / misfits[best.mu]),
+        judged("mu-is-told-within-0-1", 0.5 * float(near[-1] - near[0]), coarsest=near[0], finest=near[-1]),
+        judged("fitted-travel", float(over[np.argmax(np.abs(over - 1.0))])),
+    ]
 
 
 def _predicted(models: list[Compression], data: Float) -> list[Row]:
@@ -180,10 +160,14 @@ def _predicted(models: list[Compression], data: Float) -> list[Row]:
     travel, _ = first.fitted(data[2], slice(0, 1))
     change = first.at(travel)[2]
     return [
-        Row(f"changes of distance at 18.25 %, {data[2, 2].min():.1f} to {data[2, 2].max():.1f} mm, predicted with mu = "
-            f"{first.mu:g}: largest difference, mm", SOURCE, 0.0, float(np.abs(change - data[2, 2]).max()), 1.0,
-            "the beads of a pair differ by 1 mm in their movement", "validation", "absolute")
-    ]  # fmt: skip
+        judged(
+            "changes-of-distance-at-18-25",
+            float(np.abs(change - data[2, 2]).max()),
+            value=data[2, 2].min(),
+            other_value=data[2, 2].max(),
+            mu=first.mu,
+        )
+    ]
 
 
 def _draw(figure: Any, models: list[Compression], best: Compression, data: Float) -> None:

@@ -20,10 +20,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Elasticity, Isotropic
@@ -47,10 +44,12 @@ from finger3d.objects import (
     first_touch,
 )
 
-from ._common import Body, body
+from ._common import Body, body, increment
 from ._press import converged
-from ._rows import Result, at_least, together, zero
+from ._rows import Result, exact_columns, listed, together
 from .triangulated_objects import ball
+
+judged = listed(__file__)
 
 POSE = {"turn_x": 0.06, "turn_y": 0.4, "turn_z": 0.1}
 WRENCH = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
@@ -105,20 +104,16 @@ def _objects(quick: bool) -> Result:
     """Every object in a solid and a section; a sphere at large deformation."""
     cases = [(name, obj, domain, False) for name, obj in objects().items() for domain in ("solid", "plane-strain")]
     cases.append(("sphere", objects()["sphere"], "solid", True))
-    table: dict[str, list[Any]] = {"object": [], "domain": [], "change": [], "sideways": []}
-    rows = []
+    rows, lines = [], []
     for name, obj, domain, large in cases if not quick else cases[4:8]:
         model = pressed(obj, domain)
         model = Effect().apply(model) if large else model
         first, second = wrench(model), wrench(rotated(model))
         change = float(np.abs(second - ROTATED * first).max() / np.linalg.norm(first[:3]))
         where = f"{domain}, large deformation" if large else domain
-        rows.append(
-            zero(f"largest change of force and moment, rotated back, {name}, {where}", "symmetry", change, 1e-6,
-                "the residual of 1e-8, times arms of some mm and the iteration over normals")
-        )  # fmt: skip
-        for key, value in zip(table, (name, where, change, float(np.hypot(first[0], first[2]))), strict=True):
-            table[key].append(value)
+        rows.append(judged("largest-change-of-force-and-moment", change, name=name, where=where))
+        lines.append((name, where, change, float(np.hypot(first[0], first[2]))))
+    table = exact_columns("object domain change sideways", lines)
     return Result(tuple(rows), table, lambda figure: _draw_objects(figure, table))
 
 
@@ -181,7 +176,7 @@ def dragged(soft: Body, degrees: float, steps: int, obj: MeshObject, touch: floa
         free[:, 0] = soft.surface.average @ gap
         free[:, 1:] = -moved[[0, 2]]
         state = state or ContactState.at_rest(np.maximum(free[:, 0], 0.0), 3)
-        found = solve_increment(ContactProblem.of(state, free, soft.compliance, ContactLaw(Coulomb(MU)), DEPTH))
+        found = increment(state, free, soft.compliance, MU, DEPTH)
         assert found.outcome.ok, found.outcome
         state = found.state
         total = state.force.sum(axis=0)
@@ -208,15 +203,12 @@ def _angles(quick: bool) -> Result:
     meshed = max(float(np.abs(f - alone[0]).max()) / scale for f in alone)
     sideways = abs(with_mesh[0][-1, 0]) / abs(with_mesh[0][-1, 1])
     allowed = 0.03 if quick else 0.01
-    one = f"the same on one mesh of size {size:g} mm"
     rows = [
-        zero("largest change of the force, turned back, mesh turned too", "symmetry", exact, 1e-9,
-            "the solver's residual of 1e-8 at worst, 1e-15 as a rule"),
-        zero("largest change of the height of first touch, mm", "symmetry", float(np.ptp(touched)), 1e-4 * DEPTH,
-            "1e-4 of the depth, or 1.5e-4 of the force; it is searched on finer and finer grids"),
-        zero(one, "symmetry", meshed, allowed, "the mesh is not invariant under the rotation"),
-        at_least("friction over force at the end", "mu = 0.3", 0.05, sideways, "friction acts"),
-    ]  # fmt: skip
+        judged("largest-change", exact),
+        judged("change-of-first-touch", float(np.ptp(touched)), tolerance=1e-4 * DEPTH),
+        judged("the-same-on-one-mesh-of", meshed, tolerance=allowed, size=size),
+        judged("friction-over-force-at-the-end", sideways),
+    ]
     world = np.array([turn(a) @ f[-1] for a, f in zip(angles, alone, strict=True)])
     table: dict[str, Any] = {"angle_deg": list(angles)}
     for name, forces in (("turned", with_mesh), ("one", alone)):

@@ -35,7 +35,9 @@ from finger3d.mechanics.results.history import measure
 from finger3d.objects import Move, ObjectPose, Sphere
 
 from ._press import changed
-from ._rows import Result, Row, exact_columns, zero
+from ._rows import Result, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 RADIUS, E, NU = 100.0, 1.0, 0.3
 SHEAR, EFFECTIVE = E / (2.0 * (1.0 + NU)), E / (1.0 - NU**2)
@@ -43,7 +45,6 @@ DEPTH = 1.0 / RADIUS  # a = 1 mm on a half-space
 MU = 0.1
 TURNED = math.radians(4.0)
 STUCK = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)  # c/a
-LUBKIN = "Lubkin 1951; REFERENCES.md, 3.5"
 
 
 def block(size: float) -> Problem:
@@ -131,37 +132,33 @@ def run(quick: bool) -> Result:
         table += [(count, c, t, m, torque_of(c), stuck, math.degrees(angle)) for c, t, m, stuck, angle in steps]
     at = f"{edges[-1]} edges to a"
     rows = [
-        Row(f"torque that sticks over 16/3 G a^3 t, {at}", "Johnson 1985, Sec. 7.6", 1.0, held[-1], 1.2 / edges[-1],
-            "the circle is an edge length smaller, its torque 3/n, less at the mean"),
-        Row(f"stuck share of the contact, mu = 1000, {at}", "it holds", 1.0, share, 1e-12, "every point"),
-        Row(f"torque of full slip over 3 pi/16 mu P a, friction while pressed, {at}", "Johnson 1985, Sec. 3.9", 1.0,
-            slips[-1][1] / full, 0.25 / edges[-1], "the pressure vanishes where the points end"),
-        zero(f"stuck share in full slip, friction while pressed, {at}", "none but the middle", slips[-1][3],
-            1.0 / edges[-1] ** 2, "the middle point cannot slip"),
-        Row("closed form of partial slip, c = 0, over 3 pi/16 mu P a", "Johnson 1985, Sec. 3.9", 1.0, torque_of(0.0),
-            1e-10, "quadrature"),
-        Row("closed form of partial slip, c = 0.999 a, over 16/3 G a^3 t", "Johnson 1985, Sec. 7.6", 1.0,
-            torque_of(0.999) * 3.0 * math.pi / 16.0 * 2.0 * math.pi / 3.0 / (16.0 / 3.0 * turn_of(0.999)), 2e-3,
-            "of the order 1 - c/a"),
-        Row(f"torque at c = 0.5 a in one increment over that in six, {at}", "it grows in one direction", 1.0,
-            once / steps[5][2], 1e-3, "slip of a coarse mesh is not exactly along circles"),
-    ]  # fmt: skip
+        judged("torque-that-sticks-over-16-3", held[-1], tolerance=1.2 / edges[-1], at=at),
+        judged("stuck-share", share, at=at),
+        judged("torque-of-full-slip-over-3", slips[-1][1] / full, tolerance=0.25 / edges[-1], at=at),
+        judged("stuck-share-in-full-slip-friction", slips[-1][3], tolerance=1.0 / edges[-1] ** 2, at=at),
+        judged("closed-form-of-full-slip", torque_of(0.0)),
+        judged(
+            "closed-form-of-full-stick",
+            torque_of(0.999) * 3.0 * math.pi / 16.0 * 2.0 * math.pi / 3.0 / (16.0 / 3.0 * turn_of(0.999)),
+        ),
+        judged("torque-at-c-0-5-a", once / steps[5][2], at=at),
+    ]
     for c, _, torque, stuck, angle in steps[1:8:2]:
         what = f"at {math.degrees(angle):.3f} deg, c = {c:g} a, {at}"
         rows += [
-            Row(f"torque over that of full slip, {what}", LUBKIN, torque_of(c), torque, 0.25 / edges[-1],
-                "as in full slip", measure="absolute"),
-            Row(f"the same over the torque found in full slip, {what}", LUBKIN, torque_of(c), torque / steps[-1][2],
-                0.15 / edges[-1], "rings of points slip one by one: 0.033 and 0.015 with 3 and 4 edges to a",
-                measure="absolute"),
-            Row(f"stuck radius over that of the contact, {what}", LUBKIN, c, stuck, 1.0 / edges[-1], "an edge length",
-                measure="absolute"),
-        ]  # fmt: skip
+            judged("torque-over-that-of-full-slip", torque, torque_of(c), tolerance=0.25 / edges[-1], what=what),
+            judged(
+                "the-same-over-the-torque-found",
+                torque / steps[-1][2],
+                torque_of(c),
+                tolerance=0.15 / edges[-1],
+                what=what,
+            ),
+            judged("stuck-radius-over-that", stuck, c, tolerance=1.0 / edges[-1], what=what),
+        ]
     if not quick:
-        rows.append(
-            Row("torque that sticks, extrapolated to points without number", "Johnson 1985, Sec. 7.6", 1.0,
-                held[-1] + (held[-1] - held[-3]) * edges[-3] / (edges[-1] - edges[-3]), 0.1, "of first order in 1/n")
-        )  # fmt: skip
+        limit = held[-1] + (held[-1] - held[-3]) * edges[-3] / (edges[-1] - edges[-3])
+        rows.append(judged("torque-that-sticks-extrapolated-to-points", limit))
     columns = "edges_per_a c_over_a turn_G_over_mu_p0 torque_over_full theory stuck_radius turn_deg"
     data = exact_columns(columns, table)
     return Result(tuple(rows), data, lambda figure: _draw(figure, data))
@@ -173,11 +170,9 @@ def _draw(figure: Any, data: dict[str, list[float]]) -> None:
     turns = [0.0, *(turn_of(c) for c in shares)]
     left.plot(turns, [0.0, *(torque_of(c) for c in shares)], "k-", lw=0.8, label="Lubkin 1951")
     right.plot(turns, [1.0, *shares], "k-", lw=0.8, label="Lubkin 1951")
-    for count in sorted(set(data["edges_per_a"])):
-        own = [k for k, c in enumerate(data["edges_per_a"]) if c == count]
-        turn = [data["turn_G_over_mu_p0"][k] for k in own]
+    for count, t in grouped(data, "edges_per_a"):
         for axes, name in ((left, "torque_over_full"), (right, "stuck_radius")):
-            axes.plot(turn, [data[name][k] for k in own], "o", mfc="none", ms=5, label=f"{count:g} edges to a")
+            axes.plot(t["turn_G_over_mu_p0"], t[name], "o", mfc="none", ms=5, label=f"{count:g} edges to a")
     left.set(ylabel="torque over that of full slip", ylim=(0.0, 1.05))
     right.set(ylabel="stuck radius over that of the contact", ylim=(0.0, 1.05))
     for axes in (left, right):

@@ -37,15 +37,14 @@ from finger3d.progress import QUIET
 from ._common import held_at, solve
 from ._halfplane import Profile, under
 from ._press import converged
-from ._rows import Result, Row, exact_columns, zero
+from ._rows import Result, Row, exact_columns, listed
+from .press_with_friction import CURVE
 
-SPENCE = "Spence 1975 with Dundurs' beta; REFERENCES.md, 1.3 and 2.1"
-STEPPED = "Spence 1975 with 200 increments; REFERENCES.md, 2.4"
-HERTZ = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.3"
+judged = listed(__file__)
+
 NAFEMS = "NAFEMS CGS-1; REFERENCES.md, 6.4"
 ONE = "0.4 % or less measured at 25 and 30 points to a; coarser meshes must pass too"
 P_OVER_HERTZ, Q_OVER_P, C_OVER_A, D_OVER_AP2 = 1.04269, 0.09348, 0.54321, 4.3e-4  # nu' = .3, mu = .25, N = 200
-SPENCE_Q = (0.0, 0.0955, 0.1500, 0.1872, 0.2103, 0.2184, 0.2031, 0.1788, 0.1480, 0.1054, 0.0)  # at x/a = 0, .1, ...
 RATIO = 11.0 / 3.0
 PAIRS = {"unlike": ((1.0, 0.3), (2.0, 0.2)), "beta of nu = .3": ((1.0, 0.0), (RATIO, 0.0)), "alike": ((1.0, 0.3),) * 2}
 
@@ -96,24 +95,15 @@ def run(quick: bool) -> Result:
         curves[name] = profiles[-1]
     pair = found["beta of nu = .3"]
     rows += [
-        Row("P/P_Hertz(a), E = 1 and 2, nu = .3 and .2, mu = 0", HERTZ, 1.0, found["unlike"][0], 0.01, ONE),
-        Row("P/P_Hertz(a), nu = 0 on nu = 0, r = 11/3, mu = .25", SPENCE, P_OVER_HERTZ, pair[0], 0.01, ONE),
-        Row("int_0^a q/P, the same pair", SPENCE, Q_OVER_P, pair[1], 0.03, "c lies between two points; 0.1 % measured"),
-        Row(
-            "c/a, the same pair", SPENCE, C_OVER_A, pair[2], 0.5 / points + 0.3 / steps,
-            "half a point spacing, and 0.3/N for N increments", measure="absolute",
-        ),
-        zero("int_0^a q/P, bodies alike, mu = .25", "beta = 0; Johnson 1985, sec. 5.1", found["alike"][1], 1e-3,
-            "bodies of finite size have friction of the order of a/h"),
-    ]  # fmt: skip
+        judged("p-p-hertz-a-e-1", found["unlike"][0]),
+        judged("p-p-hertz-a-nu-0", pair[0], P_OVER_HERTZ),
+        judged("int-0-a-q-p-the", pair[1], Q_OVER_P),
+        judged("c-a-the-same-pair", pair[2], C_OVER_A, tolerance=0.5 / points + 0.3 / steps),
+        judged("int-0-a-q-p-bodies", found["alike"][1]),
+    ]
     if not quick:
-        rows.append(
-            Row("D/(A P^2), the same pair, N = 200", STEPPED, D_OVER_AP2, pair[3], 0.03, "two digits there; 0.2 % here")
-        )
-    rows += _mirror_rows()
-    rows += _third_law_rows()
-    rows += _swapped_rows(quick)
-    rows += _nafems_rows(quick)
+        rows.append(judged("d-a-p-2-the-same", pair[3], D_OVER_AP2))
+    rows += [*_mirror_rows(), *_third_law_rows(), *_swapped_rows(quick), *_nafems_rows(quick)]
     columns = "pair mu thickness_mm P_over_Hertz q_over_P c_over_a D_over_AP2"
     return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, curves))
 
@@ -129,8 +119,7 @@ def _half(modulus: float, nu: float, size: float, obj: Any, depth: float, mu: fl
 
 def _last(model: Model) -> dict[str, Any]:
     problem = build(model)
-    frame = converged(problem)[-1]
-    return measure(problem.points, frame)
+    return measure(problem.points, converged(problem)[-1])
 
 
 def _mirror_rows() -> list[Row]:
@@ -141,15 +130,11 @@ def _mirror_rows() -> list[Row]:
     rigid = _last(_half(1.0, 0.3, 0.15, Cylinder(radius_mm=5.0), 0.5))
     share = alike["friction_sum_N"] / alike["normal_force_N"]
     plane, limit = (a["normal_force_N"] / b["normal_force_N"] for a, b in ((alike, smooth), (hard, rigid)))
-    what = "friction over force of two equal half cylinders"
+    stiff = "force with E2 = 1e12 E1"
     return [
-        zero(what, "symmetry", share, 1e-4, "an arc on quadratic facets"),
-        Row(
-            "their force over that on a smooth plane at half the depth", "symmetry", 1.0, plane, 1e-5, "chords for arcs"
-        ),
-        Row(
-            "force with E2 = 1e12 E1 over that of a rigid object", "a rigid object", 1.0, limit, 1e-9, "stiffness ratio"
-        ),
+        judged("friction-over-force-of-two-equal", share),
+        judged("their-force-over-that-on-a", plane),
+        judged("over-that-of-a-rigid-object", limit, stiff=stiff),
     ]
 
 
@@ -161,10 +146,9 @@ def _swapped_rows(quick: bool) -> list[Row]:
     over_block = Effect(1.0, 0.3, 5.0).apply(_half(2.0, 0.45, size, Plane(), 0.2))
     one, other = (_last(replace(model, legs=(Leg(0.2, steps=20),))) for model in (under_bar, over_block))
     force, friction = (other[key] / one[key] for key in ("normal_force_N", "friction_sum_N"))
-    third = "Newton's third law"
     return [
-        Row("force with finger and object in each other's place", third, 1.0, force, 0.005, "the meshes differ"),
-        Row("friction, likewise", third, 1.0, friction, 0.05, "friction is small, and lies at the contact's edge"),
+        judged("force", force),
+        judged("friction-likewise", friction),
     ]
 
 
@@ -192,14 +176,10 @@ def _third_law_rows() -> list[Row]:
     total = np.abs(ends[0]).max()
     c = len(problem.surface.nodes)
     condensed = np.einsum("idje,je->id", problem.delassus, forces).ravel()
-    third = "Newton's third law"
-    what = f"bases' forces, finger's less object's over finger's, {c} points, dragged"
     return [
-        zero(what, third, np.abs(ends[0] - ends[1]).max() / total, 1e-10, "round-off"),
-        zero("the surfaces' approach by two whole solutions, over the condensed one, less 1",
-            "the sum of both compliances", np.abs(moved - condensed).max() / np.abs(condensed).max(), 1e-10,
-            "round-off of two factorisations"),
-    ]  # fmt: skip
+        judged("bases-forces-finger-s", np.abs(ends[0] - ends[1]).max() / total, c=c),
+        judged("the-surfaces-approach-by-two-whole", np.abs(moved - condensed).max() / np.abs(condensed).max()),
+    ]
 
 
 def _nafems_rows(quick: bool) -> list[Row]:
@@ -239,7 +219,7 @@ def _draw(figure: Any, curves: dict[str, Profile]) -> None:
         right.plot(profile.x[here] / profile.a, profile.q[here] / peak, style, label=names[name])
     x = np.linspace(-1.0, 1.0, 201)
     left.plot(x, np.sqrt(1.0 - x**2), "k--", lw=1.0, label="Hertz")
-    tenths, friction = np.linspace(0.0, 1.0, 11), np.array(SPENCE_Q)
+    tenths, friction = np.linspace(0.0, 1.0, 11), CURVE
     right.plot([*-tenths, *tenths], [*-friction, *friction], "k+", ms=5, label="Spence, nu' = .3 on rigid")
     left.set(ylabel="pressure / Hertz's peak", ylim=(0.0, 1.4))
     right.set(ylabel="friction on the finger / Hertz's peak", ylim=(-0.25, 0.42))

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,8 +44,7 @@ DIFFERENT = 1e-6
 """Largest difference of a force over the largest force, from which a state is another one."""
 
 
-@dataclass(frozen=True)
-class Searched:
+class Searched(NamedTuple):
     """Outcome of the search in one case.
 
     Attributes
@@ -80,9 +78,8 @@ def run(quick: bool) -> Result:
                 start = Searched(model, nu, mu, path, case.coupling())
                 found.append(_search(case, start, 5 if quick else STARTS[model], random))
     rows = [*_rows(found), *_one_point(random, 10 if quick else 100)]
-    lines = [(s.model, s.nu, s.mu, s.path, s.limit, s.solved, s.others, s.unsettled, s.apart) for s in found]
     names = "model nu mu path limit_of_points starts_to_the_same starts_to_others unsettled largest_difference"
-    return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, found))
+    return Result(tuple(rows), columns(names, found), lambda figure: _draw(figure, found))
 
 
 def _search(problem: Problem, found: Searched, starts: int, random: np.random.Generator) -> Searched:
@@ -92,17 +89,17 @@ def _search(problem: Problem, found: Searched, starts: int, random: np.random.Ge
         before = copy(press)
         frame = press.advance(station)
         if press.has_failed:
-            return replace(found, unsettled=found.unsettled + starts)
+            return found._replace(unsettled=found.unsettled + starts)
         force = frame.meshed_state.contact.force
         scale = np.abs(force).max()
         for _ in range(starts if scale else 0):
             other = copy(before).advance(station, _start(force, problem.model.friction.mu, random))
             if not other.outcome.ok:
-                found = replace(found, unsettled=found.unsettled + 1)
+                found = found._replace(unsettled=found.unsettled + 1)
                 continue
             apart = float(np.abs(other.meshed_state.contact.force - force).max() / scale)
             same = apart <= DIFFERENT
-            found = replace(found, solved=found.solved + same, others=found.others + (not same),
+            found = found._replace(solved=found.solved + same, others=found.others + (not same),
                             apart=max(found.apart, apart))  # fmt: skip
     return found
 
@@ -123,9 +120,7 @@ def _rows(found: Sequence[Searched]) -> Iterator[Row]:
         own = [s for s in found if s.model == model]
         for text, some in (("up to 1", [s for s in own if s.mu <= 1.0]), ("above 1", [s for s in own if s.mu > 1.0])):
             tried = sum(s.solved + s.others + s.unsettled for s in some)
-            what = f"other solutions of an increment, {tried} random starts, mu {text}, {model}"
-            others = sum(s.others for s in some)
-            yield said(what, "Sec. II-A", 0.0, others, "unique", 0.0, "at most")
+            yield said("unique", sum(s.others for s in some), tried=tried, range=text, model=model)
             what = f"random starts that end in no solution, of {tried}, mu {text}, {model}"
             unsettled = sum(s.unsettled for s in some)
             yield at_most(what, "no reference", 0.0, unsettled, "the fallbacks start from any forces", "statement")

@@ -12,7 +12,7 @@ relaxes and K does not (correspondence principle).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -31,19 +31,22 @@ from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.fem.solids.bars import AddedStiffness
-from finger3d.fem.solvers.condense import Condensation, condense
+from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.discretise.problem import scatter_to_points
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.small_strain.elastic import SmallStrain
 from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
-from . import _rings
-from ._common import box, graded, held_at
-from ._rows import Result, Row, exact_columns, zero
+from . import _halfspace, _rings
+from ._common import held_at
+from ._rows import Result, Row, exact_columns, grouped, listed
+
+judged = listed(__file__)
 
 RADIUS = 100.0
 HEIGHT_MM = 50.0
@@ -52,7 +55,6 @@ PRONY = ((0.5, 1.0),)
 TABLE = {0.1: 0.0310080, 0.25: 0.1191727, 0.5: 0.3227350, 1.0: 0.8464404, 1.5: 0.7101267, 4.0: 0.5172483}
 HELD, RELEASED = 1.5, 0.8  # s; the ball is drawn back for so long
 LEE = "Lee and Radok 1960; REFERENCES.md, 4.1"
-TING = "Ting 1966; REFERENCES.md, 4.2"
 HALF = "0.01 % or less measured on rings of a/100, 0.2 % or less on tetrahedra of a/10"
 COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a"
 
@@ -140,10 +142,7 @@ def on_rings(nu: float, count: int) -> StandIn:
 
 def on_tets(nu: float, points: int) -> StandIn:
     """A quarter of a block 100 x 50 x 100 mm, `points` to a."""
-    zone, growth, height = 1.15, 2.0, HEIGHT_MM
-    far = zone + graded(height - zone, growth / points, growth)
-    side = np.concatenate([np.linspace(0.0, zone, round(zone * points) + 1), far[1:]])
-    mesh = quadratic(box([side, -graded(height, 1.0 / points, growth)[::-1], side]))
+    mesh = _halfspace.graded_block(points, HEIGHT_MM)
     held = held_at(mesh, {"x-": (0,), "y-": (0, 1, 2), "z-": (2,)})
     face = surface(mesh, "y+")
     face = restrict(face, np.hypot(face.points[:, 0], face.points[:, 2]) < 1.2)
@@ -151,21 +150,9 @@ def on_tets(nu: float, points: int) -> StandIn:
     matrix = stiffness(mesh, elastic)
     kept = np.flatnonzero(~held[face.nodes][:, [1, 0, 2]].ravel())
     small = condense(matrix, np.flatnonzero(held.ravel()), local_rows(face, vertical_frame(3))[kept])
-    delassus = _widened(small, kept, len(face.nodes))
-    return StandIn(
-        _rest(face), face.area, delassus, small, kept, parts=4, nu=nu, mesh=mesh, elastic=elastic, stiffness=matrix
-    )
-
-
-def _rest(face: BoundarySurface) -> Float:
-    at = face.samples
-    return np.asarray(face.average @ Sphere(radius_mm=RADIUS).profile(at[:, 0], at[:, 2]))
-
-
-def _widened(small: Condensation, kept: NDArray[np.int64], count: int) -> Float:
-    from finger3d.mechanics.discretise.problem import scatter_to_points
-
-    return scatter_to_points(small.compliance, kept, count, 3)
+    delassus = scatter_to_points(small.compliance, kept, len(face.nodes), 3)
+    rest = np.asarray(face.average @ Sphere(radius_mm=RADIUS).profile(face.samples[:, 0], face.samples[:, 2]))
+    return StandIn(rest, face.area, delassus, small, kept, parts=4, nu=nu, mesh=mesh, elastic=elastic, stiffness=matrix)
 
 
 def march(body: StandIn, kinematics: Formulation[Any, Any], path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
@@ -222,13 +209,11 @@ def ting(t: float) -> tuple[float, float]:
 
 def time_of_parting() -> float:
     """When the ball that is drawn back leaves the body (s)."""
-    return float(
-        brentq(
-            lambda t: quad(lambda s: modulus(t - s), 0.0, 1.0)[0] - quad(lambda s: modulus(t - s), HELD, t)[0],
-            1.51,
-            2.5,
-        )
-    )
+
+    def ahead(t: float) -> float:
+        return float(quad(lambda s: modulus(t - s), 0.0, 1.0)[0] - quad(lambda s: modulus(t - s), HELD, t)[0])
+
+    return float(brentq(ahead, 1.51, 2.5))
 
 
 def contact_modulus(nu: float) -> Any:
@@ -274,8 +259,7 @@ def run(quick: bool) -> Result:
     rows += _ring_rows(curves, count, quick)
     orders = {n: _at(march(body, viscous, long_hold(n)[:n])[0] / k, np.arange(1, n + 1) / n, 1.0) for n in (5, 10, 20)}
     rate = float(np.log2((orders[5] - orders[10]) / (orders[10] - orders[20])))
-    rows.append(Row("rate at which the force settles with the step, 5, 10, 20 a second", "second order",
-                    2.0, rate, 0.25, "points come into contact one by one", measure="absolute"))  # fmt: skip
+    rows.append(judged("rate-at-which-the-force-settles", rate))
     rows += _tet_rows(meshes, table, quick)
     columns = exact_columns(COLUMNS, table)
     return Result(tuple(rows), columns, lambda figure: _draw(figure, curves, columns))
@@ -285,34 +269,26 @@ def _at(values: Float, t: Float, when: float) -> float:
     return float(values[int(np.argmin(np.abs(t - when)))])
 
 
-def _ring_rows(curves: dict[str, Any], count: int, quick: bool) -> list[Row]:
+def _ring_rows(curves: dict[str, Any], count: int, quick: bool) -> Iterator[Row]:
     t, force, radius = curves["hold"]
     worst = 0.01 if quick else 0.005
     why = "coarse rings and increments of the quick version" if quick else HALF
-    rows = [
-        Row(f"P/k at t = {when:g} s, rings", LEE, want, _at(force, t, when), worst, why)
-        for when, want in TABLE.items()
-        if not (quick and when == 0.25)  # lies between two increments
-    ]
-    rows.append(
-        Row("a/sqrt(R d) at t = 1 s, rings", LEE, 1.0, _at(radius, t, 1.0), 1.0 / count, f"one ring, a/{count}")
-    )
+    for when, want in TABLE.items():
+        if not (quick and when == 0.25):  # lies between two increments
+            yield Row(f"P/k at t = {when:g} s, rings", LEE, want, _at(force, t, when), worst, why)
+    yield judged("a-sqrt-r-d-at-t", _at(radius, t, 1.0), tolerance=1.0 / count, count=count)
     t, force, radius = curves["release"]
     for when in (1.6, 1.75):
-        want, a = ting(when)
-        rows.append(Row(f"P/k at t = {when:g} s, drawn back, rings", TING, want, _at(force, t, when), 2 * worst,
-                        "relative to a force that has fallen; smaller relative to its maximum"))  # fmt: skip
-        rows.append(Row(f"a at t = {when:g} s, drawn back (mm), rings", TING, a, _at(radius, t, when), 1.0 / count,
-                        f"one ring, a/{count}", measure="absolute"))  # fmt: skip
+        (want, a), here = ting(when), f"at t = {when:g} s, drawn back"
+        yield judged("p-k-rings", _at(force, t, when), want, tolerance=2 * worst, here=here)
+        yield judged("a-mm-rings", _at(radius, t, when), a, tolerance=1.0 / count, here=here, count=count)
     gone = float(t[(t > HELD) & (force <= 0.0)][0])
     step = float(t[-1] - t[-2])
-    rows.append(Row("time at which the ball leaves the body (s), rings", TING, time_of_parting(), gone, 2 * step,
-                    "two increments", measure="absolute"))  # fmt: skip
-    return rows
+    yield judged("time-at-which-the-ball-leaves", gone, time_of_parting(), tolerance=2 * step)
 
 
-def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool) -> list[Row]:
-    rows, found = [], {}
+def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool) -> Iterator[Row]:
+    found = {}
     per_second = 5 if quick else 20
     path = long_hold(per_second)[: 6 if quick else None]
     times = np.array([p[0] for p in path])
@@ -326,22 +302,16 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
             for t, p, a in zip(times, force / elastic * np.minimum(times, 1.0) ** 1.5, radius, strict=True):
                 table.append(("tets", 0.3, bulk, points, per_second, t, p, lee_radok(t, relax), a))
         away = float(np.abs(found[points, True] - convolved(elastic, times) / elastic).max())
-        rows.append(
-            zero(f"distance from the convolution of the elastic force, over it, tets a/{points}", LEE, away, 1e-10,
-                "round-off: both are linear within an increment")
-        )  # fmt: skip
-    for bulk in (True, False):
+        yield judged("distance-from-the-convolution", away, points=points)
+    limit, why = (0.02, "three points to a in the quick version") if quick else (0.005, HALF)
+    for bulk, relax, source, kind in (
+        (True, modulus, LEE, ""),
+        (False, contact_modulus(0.3), "Lee and Radok 1960 with E*(s); REFERENCES.md, 4.1", ", K constant"),
+    ):
         for when in (0.4, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 1.5, 4.0):
-            source, kind = (LEE, "") if bulk else ("Lee and Radok 1960 with E*(s); REFERENCES.md, 4.1", ", K constant")
-            rows.append(
-                Row(
-                    f"P/P_elastic(depth) at t = {when:g} s{kind}, tets a/{meshes[-1]}", source,
-                    lee_radok(when, modulus if bulk else contact_modulus(0.3)) / min(when, 1.0) ** 1.5,
-                    _at(found[meshes[-1], bulk], times, when), 0.02 if quick else 0.005,
-                    "three points to a in the quick version" if quick else HALF,
-                )
-            )  # fmt: skip
-    return rows
+            wanted, got = lee_radok(when, relax) / min(when, 1.0) ** 1.5, _at(found[meshes[-1], bulk], times, when)
+            what = f"P/P_elastic(depth) at t = {when:g} s{kind}, tets a/{meshes[-1]}"
+            yield Row(what, source, wanted, got, limit, why)
 
 
 def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) -> None:
@@ -357,14 +327,9 @@ def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) ->
         middle.plot(t[shown], size, "k--", lw=0.9)
     left.set(xlabel="t, s", ylabel="P/k", title="rings (dashed: Lee and Radok, Ting)")
     middle.set(xlabel="t, s", ylabel="a, mm", title="contact radius")
-    data = {k: np.array(v) for k, v in columns.items()}
-    tets = data["body"] == "tets"
-    for bulk, colour in ((True, "C0"), (False, "C2")):
-        for points in sorted(set(data["resolution"][tets])):
-            here = tets & (data["bulk"] == bulk) & (data["resolution"] == points)
-            error = 100.0 * (data["P_over_k"][here] / data["theory"][here] - 1.0)
-            kind = "nu constant" if bulk else "K constant"
-            right.plot(data["t"][here], error, colour, alpha=0.3 + 0.06 * points, label=f"{kind}, a/{points}")
+    for (bulk, points), t in grouped(columns, "bulk", "resolution", body="tets"):
+        error, kind = 100.0 * (t["P_over_k"] / t["theory"] - 1.0), "nu constant" if bulk else "K constant"
+        right.plot(t["t"], error, "C0" if bulk else "C2", alpha=0.3 + 0.06 * points, label=f"{kind}, a/{points}")
     right.set(xlabel="t, s", ylabel="error of the force, %", title="tets (dotted: tolerance)", ylim=(-0.8, 0.8))
     for bound in (-0.5, 0.5):
         right.axhline(bound, color="k", ls=":", lw=0.8)

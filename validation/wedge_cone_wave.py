@@ -61,8 +61,7 @@ def wedge(count: int) -> Errors:
     at, area = block.surface.points[order, 0], block.surface.area[order]
     found = []
     for depth in WEDGE_DEPTHS:
-        state = block.press(gap - depth)
-        f = state.state.force[order, 0] if state.outcome.ok else np.full(len(order), np.nan)
+        f = block.normal_force(gap - depth)[order]
         found.append(wedge_errors(at, f / area, 2.0 * f.sum()))
     return np.array(found)
 
@@ -86,10 +85,8 @@ def own_path(count: int) -> float:
     right = np.flatnonzero(problem.points.points[:, 0] >= 0.0)
     right = right[np.argsort(problem.points.points[right, 0])]
     at, area = problem.points.points[right, 0], problem.points.area[right]
-    frames = list(march(problem))
-    return 1.0 + float(
-        np.mean([wedge_errors(at, f.state.force[right, 0] / area, f.state.force[:, 0].sum())[0] for f in frames])
-    )
+    forces = [frame.state.force[:, 0] for frame in march(problem)]
+    return 1.0 + float(np.mean([wedge_errors(at, f[right] / area, f.sum())[0] for f in forces]))
 
 
 def cone(count: int, growth: float = 1.6, height: float = 10.0) -> Errors:
@@ -100,8 +97,7 @@ def cone(count: int, growth: float = 1.6, height: float = 10.0) -> Errors:
     square = block.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
     found = []
     for v in np.linspace(0.7, 1.0, 12):
-        state = block.press(SLOPE * (radius - 0.5 * np.pi * 0.96 * v))
-        f = state.state.force[:, 0] if state.outcome.ok else np.full(len(square), np.nan)
+        f = block.normal_force(SLOPE * (radius - 0.5 * np.pi * 0.96 * v))
         a = np.sqrt(3.0 * (f @ square) / f.sum())
         found.append((4.0 * f.sum() / (0.5 * np.pi * MODULUS * SLOPE * a**2) - 1.0, np.nan))
     return np.array(found)
@@ -119,15 +115,10 @@ def wavy(count: int, dim: int) -> tuple[Body, Float, Float]:
     return half, gap, half.gap(lambda p: np.sin(np.pi * p[:, 0]) ** 2)
 
 
-def _forces(half: Body, gap: Float, depth: float) -> Float:
-    state = half.press(gap - depth)
-    return state.state.force[:, 0] if state.outcome.ok else np.full(len(gap), np.nan)
-
-
 def depth_for(half: Body, gap: Float, share: float) -> float:
     """Depth (mm) that gives the mean pressure `share` p*."""
     total = share * PEAK * half.surface.area.sum()
-    return float(brentq(lambda d: _forces(half, gap, d).sum() - total, 1e-6, 0.05, xtol=1e-12))
+    return float(brentq(lambda d: half.normal_force(gap - d).sum() - total, 1e-6, 0.05, xtol=1e-12))
 
 
 def wave(count: int, dim: int) -> Errors:
@@ -138,7 +129,7 @@ def wave(count: int, dim: int) -> Errors:
     x = np.linspace(0.0, 0.5, 8001)
     found = []
     for depth in np.linspace(depth_for(half, gap, 0.25), depth_for(half, gap, 0.75), 30):
-        f = _forces(half, gap, depth)
+        f = half.normal_force(gap - depth)
         share = f.sum() / (PEAK * half.surface.area.sum())
         s = 4.0 * (f @ square) / f.sum()
         exact = 2.0 * PEAK * np.cos(np.pi * x) * np.sqrt(np.maximum(0.0, share - np.sin(np.pi * x) ** 2))
@@ -150,20 +141,16 @@ def wave(count: int, dim: int) -> Errors:
 def full_contact(count: int) -> float:
     """Amplitude of the pressure over p* when all touches, by its part along cos(2 pi x)."""
     half, gap, square = wavy(count, 2)
-    f = _forces(half, gap, depth_for(half, gap, 1.2))
+    f = half.normal_force(gap - depth_for(half, gap, 1.2))
     return float(2.0 * (f @ (1.0 - 2.0 * square)) / half.surface.area.sum() / PEAK)
 
 
 def run(quick: bool) -> Result:
     """Three sizes of each."""
+    growth, radii = (2.2, (3, 4, 5)) if quick else (1.6, (4, 6, 8))
     studies: dict[str, tuple[Any, tuple[int, ...], str, str]] = {
         "wedge, plane strain": (wedge, (5, 10, 20) if quick else (5, 10, 20, 40), _JOHNSON, _ONE),
-        "cone, 3D": (
-            lambda n: cone(n, 2.2 if quick else 1.6),
-            (3, 4, 5) if quick else (4, 6, 8),
-            "Sneddon 1965; REFERENCES.md, 1.4",
-            _ONE,
-        ),
+        "cone, 3D": (lambda n: cone(n, growth), radii, "Sneddon 1965; REFERENCES.md, 1.4", _ONE),
         "wave, plane strain": (lambda n: wave(n, 2), (10, 20, 40) if quick else (20, 40, 80), _WESTERGAARD, _WAVE),
         "wave, 3D with held faces": (lambda n: wave(n, 3), (6, 10, 14) if quick else (10, 20, 40), _WESTERGAARD, _WAVE),
     }
@@ -173,23 +160,18 @@ def run(quick: bool) -> Result:
         levels = [measure(n) for n in counts]
         sizes = 1.0 / np.array(counts)
         got = 1.0 + float(levels[-1][:, 0].mean())
-        rows.append(
-            Row(f"force over the closed form at equal a, {name}, mean of depths", source, 1.0, got, 0.01, reason)
-        )
+        what = f"force over the closed form at equal a, {name}, mean of depths"
+        rows.append(Row(what, source, 1.0, got, 0.01, reason))
         errors = np.sqrt([np.mean(e**2, axis=0) for e in levels])
         curves[name] = sizes, errors
         table += [(name, n, *e) for n, e in zip(counts, errors, strict=True)]
         why = "the depths sample the position of the edge between two points; a higher rate passes"
-        slope = rate(sizes, errors[:, 0])
-        rows.append(
-            Row(f"rate of the force at equal a, {name}", "h^2, as the force", 2.0, slope, 0.2, why, measure="at least")
-        )
+        what, slope = f"rate of the force at equal a, {name}", rate(sizes, errors[:, 0])
+        rows.append(Row(what, "h^2, as the force", 2.0, slope, 0.2, why, measure="at least"))
         if name in edges:
-            slope = rate(sizes, errors[:, 1])
+            what, slope = f"rate of the pressure in L2, {name}", rate(sizes, errors[:, 1])
             kind = "logarithm at the tip" if edges[name] < 1.0 else "square-root edge"
-            rows.append(
-                Row(f"rate of the pressure in L2, {name}", kind, edges[name], slope, 0.1, why, measure="at least")
-            )
+            rows.append(Row(what, kind, edges[name], slope, 0.1, why, measure="at least"))
     count = 10 if quick else 40
     what = f"force over the closed form at equal a, wedge, the product's own path, {count} points to a, mean of depths"
     rows.append(Row(what, _JOHNSON, 1.0, own_path(count), 0.01, _ONE))

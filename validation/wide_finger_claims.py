@@ -106,42 +106,21 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
     mirrored = np.concatenate([found.strain[:, :, :0:-1] * [[1.0], [1.0], [-1.0]], found.strain], axis=2)
     ten = measure(found.problem.points, found.ten)
     return [
-        said(
-            f"nu need not be told: force at nu = .49 is that at .3, mu = .25, {here}", "gives no nu", found.soft_N,
-            force[MUS.index(0.25)], "10 % would be read off a figure", 0.1,
-        ),
-        said(
-            f"ten increments are enough for the sum of |f_t|: change by more of them, mu = .25, {here}", "Sec. II-A",
-            0.02, abs(ten["friction_sum_N"] / friction[MUS.index(0.25)] - 1.0), '"sufficiently small"', 0.0, "at most",
-        ),
+        said("nu-not-told", force[MUS.index(0.25)], wanted=found.soft_N, here=here),
+        said("ten-increments", abs(ten["friction_sum_N"] / friction[MUS.index(0.25)] - 1.0), here=here),
         # small contacts have few points; the mirror symmetry that is used makes the sum of f_t zero
         *(row for row in half_cylinder_forces.statements_depths(here, depths[-1:]) if "sum of f_t" not in row.what),
         *half_cylinder_forces.statements_zones(here, depths[0], depths[-1]),
         *half_cylinder_strains.statements_depths(here, found.early, found.strain[MUS.index(0.25)]),
         *half_cylinder_forces.statements_mus(here, mus, force, friction),
         *half_cylinder_strains.statements_mus(here, whole, mirrored, middle.a),
-        said(
-            f"ratio .5 changes little: change of gamma_xy over the largest gamma_xy, {here}", "Fig. 8", 0.05,
-            kinetic / np.abs(shear[MUS.index(0.25)]).max(), "5 % would be seen in a figure", 0.0, "at most",
-        ),
-        said(
-            f"mu can be told at ratio .5: change of gamma_xy over that by mu = .06 to 1, {here}", "Sec. II-B", 0.1,
-            kinetic / signal, "a tenth of the signal", 0.0, "at most",
-        ),
-        said(
-            f"contact about 79 mm wide: as deformed, mm, mu = .25, {here}", "Sec. III-B", 79.0,
-            2.0 * middle.deformed, '"approximately", and the points', 1.0 + 2.0 * middle.edge_error(), "absolute",
-        ),
-        said(
-            f"gamma_xy at x = 36 changes at large mu: .5 to 1 over .06 to 1, {here}", "Fig. 11", 0.1,
-            abs(at_36[-1] - at_36[-2]) / np.ptp(at_36), "a tenth of the signal", 0.0, "at least",
-        ),
-        said(
-            f"the edge slips at large mu: slip zone at mu = 1 over a, {here}", "Sec. III-B", 0.02,
-            (mus[-1].a - mus[-1].c) / mus[-1].a, "one of 50 points", 0.0, "at least",
-        ),
+        said("kinetic-little", kinetic / np.abs(shear[MUS.index(0.25)]).max(), here=here),
+        said("kinetic-told", kinetic / signal, here=here),
+        said("width-79", 2.0 * middle.deformed, tolerance=1.0 + 2.0 * middle.edge_error(), here=here),
+        said("shear-at-36", abs(at_36[-1] - at_36[-2]) / np.ptp(at_36), here=here),
+        said("edge-slips", (mus[-1].a - mus[-1].c) / mus[-1].a, here=here),
         *fig9_strains.statements(here, NU, np.array(MUS), read),
-    ]  # fmt: skip
+    ]
 
 
 def _draw(figure: Any, x: Float, found: dict[str, Pressed]) -> None:
