@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from finger3d._cost import PressSize, mesh_gb, tet_unknowns, tets_made
+from finger3d._cost import mesh_gb
 from finger3d.accuracy.cost import forecast
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
@@ -19,11 +19,8 @@ from finger3d.errors import OUT_OF_MEMORY, Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.small_strain.linear_contact import Increment
-from finger3d.meshing.limits import is_possible
-from finger3d.objects import Plane, RigidObject, Sphere, Wave
+from finger3d.objects import Plane, Sphere
 from finger3d.scene import load
 from tests.scenes import FIG9
 
@@ -58,11 +55,6 @@ def test_every_effect_says_what_it_costs(name: str, domain: Domain) -> None:
             assert with_it[key] >= without[key]
 
 
-def test_bulk_viscosity_costs_nothing_more() -> None:
-    model = baseline("solid")
-    assert "factorisation" in forecast(effect_type("viscosity")(((0.3, 0.5),), bulk=True).apply(model))["viscosity"]
-
-
 def test_gauges_and_increments_are_counted() -> None:
     plain = baseline("plane-strain")
     many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
@@ -78,24 +70,6 @@ def test_gauges_and_increments_are_counted() -> None:
     assert long["total_s"] > without["total_s"] + 20.0
 
 
-@pytest.mark.parametrize("obj", [Sphere(radius_mm=100.0), Wave(wavelength_mm=20.0, amplitude_mm=0.5)])
-def test_contact_under_a_curved_object_is_solved_as_often_as_foretold(
-    obj: RigidObject, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model, solutions = replace(baseline("solid"), object=obj), [0]
-    solve = Increment.solve_linearised
-
-    def counted(*arguments: Any) -> Any:
-        solutions[0] += 1
-        return solve(*arguments)
-
-    monkeypatch.setattr(Increment, "solve_linearised", counted)
-    increments = len(list(march(build(model))))
-    told = forecast(model)
-    once = PressSize(3, told["dofs"], told["contact_points"]).contact_s
-    assert told["contact_s"] / (increments * once) == pytest.approx(solutions[0] / increments, rel=0.6)
-
-
 @pytest.mark.parametrize("many", [{"gauges": tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))},
                                   {"legs": (Leg(10.0, steps=10_000, duration_s=1.0),)}])  # fmt: skip
 def test_what_memory_cannot_hold_is_refused(many: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,23 +83,6 @@ def test_what_memory_cannot_hold_is_refused(many: dict[str, Any], monkeypatch: p
     assert forecast(plain)["memory_MB"] > 0
     with pytest.raises(Finger3dError, match="forecast"):
         forecast(replace(plain, **many))
-
-
-def test_a_condensation_that_memory_cannot_hold_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from finger3d.meshing import limits
-
-    model = replace(baseline("plane-strain"), gauges=())
-    build(model)
-    many = tuple(Gauge(f"g{i}", 30.0, 38.0) for i in range(10_000))
-    monkeypatch.setattr(limits, "memory_bytes", lambda: (300_000_000, 300_000_000))
-    with pytest.raises(Finger3dError, match="gauges"):
-        build(replace(model, gauges=many))
-
-
-def test_step_lengths_are_counted() -> None:
-    legs = (Leg(5.0, steps=5, duration_s=1.0), Leg(10.0, steps=5, duration_s=2.0))
-    model = effect_type("viscosity")(((0.3, 0.5),), bulk=False).apply(replace(baseline("solid"), legs=legs))
-    assert "2" in forecast(model)["viscosity"]
 
 
 @pytest.mark.slow
@@ -187,12 +144,9 @@ def test_points_at_the_border_of_stick_are_foretold() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sphere", [True, False])
-def test_an_unstructured_solid_has_the_size_that_was_foretold(sphere: bool) -> None:
-    thing = Sphere(radius_mm=20.0) if sphere else Plane()
-    depth = 3.0 if sphere else 6.0
-    plain = replace(baseline("solid"), legs=(Leg(depth, steps=2),), object=thing)
-    model = replace(plain, mesh=MeshOptions(1.5 if sphere else 2.0, 8.0, "ftetwild"))
+def test_an_unstructured_solid_has_the_size_that_was_foretold() -> None:
+    plain = replace(baseline("solid"), legs=(Leg(3.0, steps=2),), object=Sphere(radius_mm=20.0))
+    model = replace(plain, mesh=MeshOptions(1.5, 8.0, "ftetwild"))
     expected, problem = forecast(model), build(model)
     assert 0.8 < problem.body.stiffness.upper.shape[0] / expected["dofs"] < 1.25
     assert 0.6 < len(problem.surface.nodes) / expected["contact_points"] < 1.25
@@ -219,42 +173,10 @@ def test_unknowns_of_thin_layers_and_of_coarse_solids_are_those_that_ftetwild_ma
     assert 0.7 < unknowns / forecast(model)["dofs"] < 1.4
 
 
-@pytest.mark.parametrize(
-    ("dofs", "measured"), [(860, 0.044), (5276, 0.14), (17_895, 0.197), (47_312, 0.837), (102_596, 2.01)]
-)
-def test_increments_of_sections_at_finite_strain_take_what_was_measured(dofs: int, measured: float) -> None:
-    # processor seconds an increment of the sections at large deformation of validation/cost_forecast.py
-    assert 0.5 < PressSize(2, dofs, 50.0).finite_strain_s / measured < 2.0
-
-
 def test_large_meshes_take_the_memory_that_was_measured() -> None:
     # of condensations of the Fig. 9 finger with 482 640, 776 577 and 1 009 778 unknowns, by validation/scaling.py
     for tets, measured in ((107_613, 8.0), (174_372, 14.4), (228_024, 19.8)):
         assert mesh_gb(tets, 3) == pytest.approx(measured, rel=0.1)
-
-
-def test_the_unknowns_of_mixed_solids_follow_from_their_tets() -> None:
-    # the same meshes, and medians of 35 and 13 meshes of fTetWild
-    for tets, unknowns in ((107_613, 482_640), (174_372, 776_577), (228_024, 1_009_778)):
-        assert tet_unknowns(tets, mixed=True) == pytest.approx(unknowns, rel=0.01)
-    for tets, nodes, vertices in ((1_635, 1.732, 0.275), (16_146, 1.481, 0.207)):
-        assert tet_unknowns(tets, mixed=True) == pytest.approx((3.0 * nodes + vertices) * tets, rel=0.03)
-
-
-def test_a_million_unknowns_may_be_pressed_in_24_gib(monkeypatch: pytest.MonkeyPatch) -> None:
-    total = 25_276_510_208  # what a machine of 24 GiB reports, on which that press took 20.8 GB
-    monkeypatch.setattr("finger3d.meshing.limits.memory_bytes", lambda: (total, total))
-    assert is_possible(236_000, 3)  # cells of that swept mesh as they are counted before it is made
-    assert not is_possible(260_000, 3)
-
-
-@pytest.mark.parametrize(
-    ("ratio", "wanted", "made"),
-    [(5.0, 9_930, 7_277), (10.0, 51_867, 26_841), (10.0, 9_841, 5_731), (20.0, 318_534, 112_008), (4.6, 14_780, 9_230)],
-)
-def test_fewer_tets_are_made_where_sizes_differ_much(ratio: float, wanted: int, made: int) -> None:
-    # by fTetWild, of the Fig. 9 finger, whole and a quarter, and of a pad under a ball, below the largest size
-    assert tets_made(ratio) * wanted == pytest.approx(made, rel=0.15)
 
 
 SCENE = (
@@ -281,15 +203,14 @@ sys.exit(finger3d.cli.main(sys.argv[1:]))
 """
 
 
-# bytes of address space that are left to 19 000 unknowns: too few for MKL's libraries, and for its factor.  With fewer,
+# bytes of address space that are left to 19 000 unknowns: too few for MKL's libraries.  With fewer,
 # OpenBLAS may wait for ever for a buffer that it cannot map.
-@pytest.mark.parametrize("limit", [300_000_000, 450_000_000])
-def test_one_line_and_exit_3(limit: int, tmp_path: Path) -> None:
+def test_one_line_and_exit_3(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE, encoding="utf-8")
     command = ["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures", "--no-error"]
     run = subprocess.run(
-        [sys.executable, "-c", LIMITED.format(limit=limit), *command], capture_output=True, text=True, timeout=100
+        [sys.executable, "-c", LIMITED.format(limit=300_000_000), *command], capture_output=True, text=True, timeout=100
     )
     assert run.returncode == 3, run.stderr
     assert run.stderr == f"finger3d: {OUT_OF_MEMORY}\n"

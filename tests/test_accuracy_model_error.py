@@ -18,7 +18,6 @@ from finger3d.accuracy.model_error import Judged, Judgement, at_large_deformatio
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
-from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
@@ -90,36 +89,6 @@ def test_the_strain_decides_where_a_press_at_large_deformation_fails(monkeypatch
     assert not large_deformation(shallow).used
     for name, change in large_deformation(deep).estimate.changes.items():
         assert change.low <= truth[name] - own[name] <= change.high
-
-
-def test_what_cannot_be_judged_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    model, effects = half_cylinder(COARSE), {"kinetic_friction": KineticFriction(ratio=0.999).apply}
-    assert not Judgement(model, effects).found()["kinetic_friction"].used
-    failing(monkeypatch, lambda model: True)
-    found = Judgement(model, effects | {LARGE_DEFORMATION: at_large_deformation}).found()
-    assert all(one.used for one in found.values())
-
-
-def test_large_strains_need_no_press_at_large_deformation(monkeypatch: pytest.MonkeyPatch) -> None:
-    deep = replace(half_cylinder(COARSE), legs=(Leg(1.5, steps=4),))
-    failing(monkeypatch, lambda model: model.finite_strain)
-    found = large_deformation(deep, shortcut=True)
-    assert found.used
-    assert "strains" in found.why
-
-
-def test_a_body_of_many_unknowns_is_judged_on_a_small_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hundredth of a millimetre at the contact of a solid would take hours."""
-    pressed = list[float]()
-
-    def build(model: Model) -> None:
-        pressed.append(model.mesh.size_mm)
-        raise Finger3dError("enough")
-
-    monkeypatch.setattr(module, "build", build)
-    block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=11.2)
-    large_deformation(Model(block, Isotropic(1.0, 0.4), MeshOptions(0.25, 0.25, "swept"), (Leg(0.5, steps=10),)))
-    assert pressed[0] >= 1.0
 
 
 def test_a_change_is_significant_if_its_interval_is_narrow_and_the_change_large() -> None:

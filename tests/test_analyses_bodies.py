@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from finger3d.analyses import pressed_body as pressing
-from finger3d.analyses.calibrate import run as runs
-from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest, shared_legs
-from finger3d.contact import acceleration
-from finger3d.contact.conditions import ContactProblem
+from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import UnresolvedError
 from finger3d.fem.recovery.recover import displacement
@@ -27,32 +23,6 @@ from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, parse, tree
 from tests.logs import Log
 from tests.sensor_cases import scene as fig9_scene
-
-
-def test_presses_started_from_their_neighbours_end_where_cold_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    sizes = {"size_mm": 6.0, "base_size_mm": 14.0, "mesher": "swept"}
-    problem = build(fig9_scene(model={"domain": "solid"}, mesh=sizes).model())
-    replaced: list[bool] = []  # for every increment, whether its initial guess differs from the expected forces
-    warm_start = acceleration.warm_start
-
-    def counted(problem: ContactProblem, expected: Any) -> Any:
-        guess = warm_start(problem, expected)
-        replaced.append(guess is not expected)
-        return guess
-
-    monkeypatch.setattr(acceleration, "warm_start", counted)
-    cold = {mu: pressing.press(problem, mu) for mu in runs.MUS}
-    alone = sum(replaced)
-    assert alone == len(replaced) == 6 * len(runs.MUS)  # each of four increments, the first in three parts
-    chain = list(pressing.presses(problem, runs.MUS))
-    unguided = 2 * len(runs.MUS)  # the first parts, at whose ends the neighbours have no forces
-    assert sum(replaced) - alone - unguided < 0.5 * alone  # forces of a neighbour touch where they should
-    for found in chain:
-        assert found.frame.outcome.ok
-        assert found.frame.gauges["g36"] == pytest.approx(cold[found.mu].frame.gauges["g36"], rel=1e-9)
-    far = list(pressing.presses(problem, (0.06, 0.5, 1.0)))  # forces at half the friction would be no help
-    assert [p.frame.iterations for p in far] == [pressing.press(problem, p.mu).frame.iterations for p in far]
-
 
 NARROW = -0.8
 """Margin with which only points deep inside the object are candidates."""
@@ -187,18 +157,6 @@ def test_a_shallower_press_on_the_mesh_of_the_deepest() -> None:
     assert shared.numbers["normal_force_N"] == pytest.approx(alone["normal_force_N"], rel=0.02)
 
 
-def test_candidates_are_widened_when_contact_reaches_beyond_them(monkeypatch) -> None:
-    model = scene("friction.mu=0.0").model()
-    wide = press(SharedBody(model, [Variant.of(model)]), Variant.of(model))
-    said = Log()
-    first = [lambda m, report, margin=-0.98: build(m, report, margin)]
-    monkeypatch.setattr("finger3d.analyses.pressed_body.build", lambda m, report, *margin: first[0](m, report, *margin))
-    narrow = SharedBody(model, [Variant.of(model)], said)
-    again = press(narrow, Variant.of(model))
-    assert any("beyond" in text for text in said.lines)
-    assert again.numbers["normal_force_N"] == pytest.approx(wide.numbers["normal_force_N"], rel=1e-9)
-
-
 def test_gauges_alone_cost_no_press() -> None:
     models = [scene().model(), scene("gauge.0.x_mm=0.5").model()]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
@@ -247,17 +205,6 @@ def test_a_step_that_fails_is_named() -> None:
     assert pressed.readings == {}
 
 
-def variant(*legs: Leg) -> Variant:
-    return replace(Variant.of(scene().model()), legs=legs)
-
-
-def test_the_shared_path_goes_everywhere_and_nowhere_else() -> None:
-    a, b = (Leg(1.0), Leg(1.0, 2.0)), (Leg(2.0),)
-    assert shared_legs([variant(*a)]) == a
-    assert shared_legs([variant(*b), variant(Leg(1.0))]) == b
-    assert shared_legs([variant(*a), variant(*b)]) == (*a, Leg(1.0), Leg(0.0), *b)
-
-
 @pytest.mark.parametrize(
     "effect",
     [
@@ -298,14 +245,6 @@ def test_several_presses_are_proved_as_each_on_its_own(effect) -> None:
     assert all(check_surface(problem, [end])[0].within_candidates for end in ends)
 
 
-def test_a_face_that_is_touched_nearly_everywhere_is_all_candidates() -> None:
-    """Then nothing that a plane could touch is beyond them, and no press pays a proof."""
-    level = ["object={shape='plane'}", "finger={geometry='block', half_length_mm=4.0, height_mm=3.0, width_mm=4.0}"]
-    whole, part = build(scene(*level).model()), build(scene().model())
-    assert set(beyond_candidates(whole).face) == {1}
-    assert 0 in beyond_candidates(part).face
-
-
 NARROWEST = -0.98
 """Margin of a body at first: its candidates reach to a fifth of the depth, where a shallow press ends."""
 
@@ -316,12 +255,8 @@ def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
-def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
+def test_presses_together_are_the_presses_alone(monkeypatch) -> None:
     """Two reach beyond the candidates, one does not, two differ in their gauges only; in the order asked."""
-    if threads:  # a narrow body with enough contact rows for it takes too long
-        monkeypatch.setattr("finger3d.mechanics.march.parallel._ROWS_FOR_THREADS", 1)
-    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
     shallow = "press.depth_mm=0.03"
     changes = [[shallow], ["friction.mu=0.1"], ["friction.mu=1.0"], ["friction.mu=0.1", "gauge.0.x_mm=0.5"]]
     models = [scene(*change).model() for change in changes]
@@ -345,13 +280,9 @@ def test_presses_together_are_the_presses_alone(threads, monkeypatch) -> None:
     assert [p.seconds > 0.0 for p in together] == [True, True, True, False]
 
 
-@pytest.mark.parametrize("threads", [False, True], ids=["in turn", "at once"])
-def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
-    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
-    size_mm = 0.003 if threads else 0.4  # with 1000 contact rows presses run at once
-    models = [scene(f"friction.mu={mu}", f"mesh.size_mm={size_mm}").model() for mu in (0.1, 0.5, 1.0)]
+def test_a_press_that_fails_takes_no_other_along(monkeypatch) -> None:
+    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5, 1.0)]
     body = SharedBody(models[0], [Variant.of(m) for m in models])
-    assert (len(body.problem.system.active_dofs) >= 1000) == threads
 
     def failing(problem, **arguments):
         if problem.model.friction.mu == 0.5:
@@ -364,24 +295,6 @@ def test_a_press_that_fails_takes_no_other_along(threads, monkeypatch) -> None:
     assert first.outcome == third.outcome == "converged"
     (again,) = body.presses([Variant.of(models[1])])
     assert str(again) == "none left"
-
-
-def test_presses_that_cannot_be_proved_fail_and_what_failed_before_keeps_its_reason(monkeypatch) -> None:
-    models = [scene(f"friction.mu={mu}").model() for mu in (0.1, 0.5)]
-    variants = [Variant.of(m) for m in models]
-    body = SharedBody(models[0], variants)
-
-    def failing(problem, **arguments):
-        if problem.model.friction.mu == 0.5:
-            raise ArithmeticError("its own")
-        return march(problem, **arguments)
-
-    def unproved(problem, steps):
-        raise MemoryError("no proof")
-
-    monkeypatch.setattr("finger3d.mechanics.march.step_halving.march", failing)
-    monkeypatch.setattr("finger3d.analyses.shared_body.check_surface", unproved)
-    assert [str(p) for p in body.presses(variants)] == ["no proof", "its own"]
 
 
 def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import re
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,24 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d._cost import CALIBRATION_S
-from finger3d.analyses.calibrate.curve_points import CurvePoints
-from finger3d.analyses.calibrate.increments import Increments
 from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_share
 from finger3d.analyses.calibrate.run import calibrate, calibrated
-from finger3d.analyses.calibrate.settings import parsed_mus
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.pressed_body import press
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
-from finger3d.errors import Finger3dError, Outcome
+from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings.quantities import ORDER
-from finger3d.meshing import limits
 from finger3d.objects import Move
 from finger3d.progress import QUIET
 from finger3d.scene import load as load_scene
@@ -40,25 +32,6 @@ from finger3d.sensor import Calibration, ReadingCurve, Tolerance, estimate, load
 from tests.logs import Log
 from tests.models import fig9
 from tests.sensor_cases import FEW, NONE, SCENE, curve, scene, straight
-
-
-def test_values_of_mu_are_spread_evenly() -> None:
-    assert parsed_mus("0.02:1.2:25")[0::24] == (0.02, 1.2)
-    assert len(parsed_mus("0.02:1.2:25")) == 25
-    assert parsed_mus("0.1, 0.5") == (0.1, 0.5)
-
-
-def test_a_press_that_fails_gives_a_reason_and_no_reading() -> None:
-    problem = build(scene(model={"domain": "plane-strain"}, mesh={"size_mm": 4.0, "base_size_mm": 16.0}).model())
-    good, bad = press(problem, 0.1), press(problem, 0.5)
-    bad = replace(bad, frame=replace(bad.frame, outcome=Outcome.NO_CONVERGENCE))
-    legs = problem.model.legs
-    curve = CurvePoints(problem, (0.1, 0.5), Increments(legs, False, 0.0), (good, bad), {}, 3)
-    assert list(curve.frames) == [0.1]
-    assert list(curve.failed) == [0.5]
-    assert curve.failed[0.5].startswith("at a depth of 10 mm: ")
-    assert curve.reading("g36").tolist() == [good.frame.gauges["g36"]]
-    assert curve.factorizations == 3 + 1  # small strain: only the build factors
 
 
 def test_the_curve_is_what_presses_of_the_scene_give() -> None:
@@ -130,14 +103,6 @@ def test_large_deformation_goes_the_long_way_and_says_so(tmp_path: Path) -> None
     assert not (tmp_path / "reduced.npz").exists()
 
 
-@pytest.mark.slow
-def test_steps_that_are_chosen_automatically() -> None:
-    auto = scene(press={"depth_mm": 10.0, "steps": "auto"})
-    found = calibrate(auto, "g36", mus=FEW[:4], tolerances=NONE)
-    fine = calibrate(scene(press={"depth_mm": 10.0, "steps": 80}), "g36", mus=FEW[:4], tolerances=NONE)
-    assert found.readings[0].reading == pytest.approx(fine.readings[0].reading, rel=0.03)
-
-
 def test_coverage_with_a_depth_that_is_off_by_presses_of_the_real_body() -> None:
     """Depth errors are pressed, not linearised; noise is drawn; the interval comes from the calibration's slopes."""
     model = scene().model()
@@ -193,10 +158,6 @@ def test_the_modulus_changes_pressures_alone(joint: Calibration) -> None:
     assert tolerance(taxel, "E_percent").slope == pytest.approx(0.01 * taxel.reading, rel=0.05)
 
 
-def test_a_place_is_a_tolerance_of_gauges_alone(joint: Calibration) -> None:
-    assert [any(t.name == "gauge_y_mm" for t in c.tolerances) for c in joint.readings] == [True, False, False]
-
-
 def test_a_tilt_is_that_of_tilted_presses(joint: Calibration) -> None:
     """By sqrt(3) deviations to both sides."""
     model, tilt = scene(**SENSORS).model(), 0.5 * 3.0**0.5
@@ -231,11 +192,6 @@ def test_files_of_a_joint_calibration(tmp_path: Path) -> None:
     assert [float(r["t1"]) for r in rows] == pytest.approx(list(found.readings[1].reading))
     assert {"calibration.png", "reduced.npz", "report.html", "scene.toml"} <= {p.name for p in out.iterdir()}
     assert set(json.loads((out / "calibration.json").read_text())["variance_reductions"]) == {"noise", "depth_mm"}
-
-
-def test_a_single_marker_is_calibrated_as_a_gauge_is() -> None:
-    found = calibrate(scene(**SENSORS), "m1.x", mus=FEW, tolerances=NONE, marker_noise_mm=0.05)
-    assert found.noise == pytest.approx([0.05])
 
 
 @pytest.mark.parametrize(
@@ -308,23 +264,6 @@ def test_a_finer_mesh_that_is_not_made_is_named_with_its_time(automatic: bool, l
     assert found.note.endswith(" s")
 
 
-@pytest.mark.parametrize("speed", [1e-6, 1e6])
-def test_the_mesh_does_not_depend_on_the_clock(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An error that no affordable mesh makes small is followed to the last mesh below the forecast limit."""
-    clock = time.perf_counter
-    monkeypatch.setattr(time, "perf_counter", lambda: speed * clock())
-    fake = Fake(error=1.0)
-    found = choose_mesh(SECTION, True, fake, QUIET)
-    assert fake.sizes == pytest.approx([2.0, 0.6, 0.18])  # the next edges are 0.054 mm
-    assert float(re.findall(r"about (\S+) s", found.note)[0]) > CALIBRATION_S
-
-
-def test_a_mesh_too_large_for_the_memory_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "_machine_gb", lambda: 0.1)
-    found = choose_mesh(SECTION, True, Fake(), pytest.fail)
-    assert re.search(r"mesh.size_mm = 0.6.*this press: forecast .* GB", found.note)
-
-
 def test_a_mesh_that_cannot_be_made_leaves_the_calibration_before() -> None:
     fake = Fake(fails_below=1.0)
     found = choose_mesh(SECTION, True, fake, QUIET)
@@ -351,8 +290,3 @@ def test_the_mesh_that_was_chosen_is_that_of_the_results(tmp_path: Path) -> None
 def test_a_folder_takes_one_calibration_at_a_time(tmp_path: Path) -> None:
     with claimed(tmp_path), pytest.raises(Finger3dError, match="writing"):
         calibrate(scene(), "g36", tmp_path)
-
-
-def test_the_scene_kept_beside_a_calibration_is_the_scene(tmp_path: Path) -> None:
-    calibrate(scene(), "g36", tmp_path, FEW[:4], tolerances=NONE)
-    assert load_scene(tmp_path / "scene.toml") == scene()

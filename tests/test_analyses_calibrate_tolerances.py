@@ -5,19 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
 from finger3d.analyses.calibrate.reference import read
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import _mesh_errors, displaced_gauges, tolerance_of, with_defaults
-from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
+from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of, with_defaults
+from finger3d.analyses.calibrate.variations import poisson_steps, with_modulus
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.optimise.run import find_best
 from finger3d.analyses.optimise.task import OptimisationProblem as Search
@@ -33,21 +31,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
 from finger3d.sensor import estimate, load
-from tests.models import block, half_cylinder
+from tests.models import block
 from tests.sensor_cases import FEW, NONE, SCENE, scene
-
-
-def test_the_error_of_the_mesh_follows_from_the_companion_and_is_nowhere_below_its_mean() -> None:
-    problem = build(half_cylinder(0.4))
-    beside = companion(problem)
-    own = SimpleNamespace(problem=problem, readings=np.array([[0.03, 0.01]]))
-    coarse = SimpleNamespace(problem=beside, readings=np.array([[0.02, 0.01]]))
-    (found,) = _mesh_errors(own, coarse, [SimpleNamespace(kind="gauge")])
-    # from the change, the ratio of edges and the order of strains, 1.5; the second reading agrees by chance
-    ratio = (problem.mesh.points.size / beside.mesh.points.size) ** 0.5
-    error = abs(0.01 / (ratio**1.5 - 1.0))
-    assert found == pytest.approx([error, error / 2.0**0.5], rel=1e-12)
-
 
 # --- calibration of a scene ------------------------------------------------------------------------------------------
 
@@ -135,25 +120,6 @@ def test_the_spread_of_a_silicone_is_the_tolerance_of_its_modulus() -> None:
 
 
 @pytest.mark.slow
-def test_slopes_between_the_few_mu_that_are_tried() -> None:
-    """Within a fifth of the largest, about what a tolerance is known to; where all of the contact begins to stick,
-    the effect of nu jumps between two of them, which leaves a quarter.
-    """
-    fine, mus = scene(mesh={"size_mm": 0.6, "base_size_mm": 4.0}), runs.MUS[::2]
-    told = {**NONE, "depth_mm": 0.1, "nu": 0.003, "tilt_deg": 0.5}
-    assert len(mus) == 13
-    few = calibrate(fine, "g36", mus=mus, tolerances=told)
-    # so few mu are all tried
-    tried, between = (calibrate(fine, "g36", mus=mus[first::2], tolerances=told) for first in (0, 1))
-    for a, b, c in zip(*(one.readings[0].tolerances for one in (few, tried, between)), strict=True):
-        assert a.name == b.name == c.name
-        share = 0.25 if a.name == "nu" else 0.2
-        assert a.slope[::2] == pytest.approx(b.slope, rel=1e-6)
-        assert 0.0 < np.abs(a.slope[1::2] - c.slope).max() <= share * np.abs(b.slope).max(), a.name
-        assert np.abs(a.spread[1::2] - c.spread).max() <= share * b.spread.max(), a.name
-
-
-@pytest.mark.slow
 def test_a_fine_body_leaves_its_differences_to_the_coarser_one_beside_it() -> None:
     """Which is what a calibration of that coarser body finds itself, and within a fifth of the largest slope."""
     told = {**NONE, "depth_mm": 0.1, "nu": 0.003}
@@ -201,12 +167,6 @@ def test_the_moduli_of_all_parts_are_multiplied(large: bool) -> None:
     assert stiff.state.force == pytest.approx(1.25 * soft.state.force, rel=1e-6, abs=1e-9)
 
 
-def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:
-    legs = (Leg(0.3), Leg(0.3, 1.0), Leg(0.0))
-    assert [leg.depth_mm for leg in deeper(legs, 0.1)] == pytest.approx([0.4, 0.4, 0.0])
-    assert deeper(legs, 0.1)[1].slide_x_mm == 1.0
-
-
 @pytest.mark.parametrize(
     ("nu", "steps"),
     [
@@ -216,14 +176,6 @@ def test_a_deeper_path_leaves_first_touch_where_it_is() -> None:
 )  # fmt: skip
 def test_poissons_ratio_keeps_its_range_and_its_element(nu: float, steps: tuple[float, float]) -> None:
     assert poisson_steps(nu, 0.008) == pytest.approx(steps, rel=1e-6)
-
-
-def test_a_tilted_body_has_a_coarser_swept_mesh() -> None:
-    fine = build(replace(COARSE, mesh=MeshOptions(0.01, 1.0, "swept"), domain="plane-strain"))
-    options = tilted_mesh(fine)
-    assert options == MeshOptions(0.02, 2.0, "swept")
-    coarse = build(replace(COARSE, domain="plane-strain"))
-    assert tilted_mesh(coarse) == MeshOptions(1.5, 1.5, "swept")
 
 
 NOISE = 1.5e-4
@@ -304,25 +256,6 @@ def test_what_increments_leave_is_a_tolerance_and_widens_mu(tmp_path: Path) -> N
     (sure,), (honest,) = (estimate(load(tmp_path / "calibration.json"), strain, tolerances=t) for t in (False, True))
     assert abs(sure.mu - 0.5) > 2.0 * sure.std
     assert honest.low <= 0.5 <= honest.high  # which two increments do not tell any nearer
-
-
-@pytest.mark.slow
-def test_chosen_increments_press_the_curve() -> None:
-    """Where the strain hardly depends on them, 20 do, and the error left is told from presses of ten."""
-    mus = (0.02, 0.03, 0.04, 0.05)
-    found, curve = calibrated(
-        steps("auto").model(), "g36", mus, tolerances={**NONE, "depth_mm": 0.1, "increments": 1.0}
-    )
-    assert curve.increments.chosen
-    assert curve.problem.model.legs[0].steps == 20
-    same = calibrate(steps(20), "g36", mus=mus, tolerances={**NONE, "depth_mm": 0.1})
-    assert found.readings[0].reading == pytest.approx(same.readings[0].reading, rel=1e-9)
-    assert found.readings[0].tolerances[0].slope == pytest.approx(same.readings[0].tolerances[0].slope, rel=1e-6)
-    assert found.readings[0].tolerances[1].name == "increments"
-    ten = calibrate(steps(10), "g36", mus=mus, tolerances=NONE).readings[0].reading
-    told = found.readings[0].tolerances[1].spread
-    assert told == pytest.approx(np.abs(found.readings[0].reading - ten), rel=1e-6, abs=1e-12)
-    assert told.max() <= 0.1 * found.noise[0]
 
 
 @pytest.mark.parametrize("count", [4, "auto"])

@@ -17,10 +17,8 @@ from finger3d.analyses.compare.run import compare
 from finger3d.analyses.compare.verdict import (
     Deviation,
     crossing_width,
-    deviation,
     force_deviation,
     numbers_table,
-    rounded,
     verdict,
 )
 from finger3d.errors import Finger3dError, Outcome
@@ -40,9 +38,8 @@ def scene(tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "plane-stress"])
-@pytest.mark.parametrize("nu", [0.3, 0.49])
-def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain, nu) -> None:
-    model = load(scene, [f"model.domain={domain}", f"material.nu={nu}"]).model()
+def test_error_bars_hold_the_answer_of_a_fine_mesh(scene, domain) -> None:
+    model = load(scene, [f"model.domain={domain}"]).model()
     fine = press_with_errors("fine", resized(model, 0.4))
     within = []
     for size in (5.0, 3.0, 2.0):
@@ -66,7 +63,7 @@ def test_a_case_has_the_bars_of_a_press_beside_its_companion_meshes(scene, domai
     assert set(case.errors) == set(case.numbers)
 
 
-@pytest.mark.parametrize("width", [1.0, 20.0, 2000.0])
+@pytest.mark.parametrize("width", [1.0, 2000.0])
 def test_other_widths_are_structured_and_have_room_for_the_companion(scene, width) -> None:
     wide = widened(load(scene, ["mesh.mesher=ftetwild"]).model(), width)
     assert (wide.design.width_mm, wide.mesh.mesher) == (width, "swept")
@@ -115,11 +112,6 @@ def test_within_everywhere_is_said_so() -> None:
     assert re.search(r" within 5 % .*, 20 to 200 mm\.", " ".join(verdict(found, 20.0, 50.0)))
 
 
-def test_a_deviation_carries_both_error_bars() -> None:
-    d = deviation(case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.2))
-    assert (d.value, d.error) == (pytest.approx(0.5), pytest.approx(1.5 * (0.01**2 + 0.02**2) ** 0.5))
-
-
 def test_on_swept_meshes_a_common_error_cancels() -> None:
     plane, solid = case("plane strain", 20.0, 15.0, 0.15), case("solid", 20.0, 10.0, 0.1)
     plane, solid = replace(plane, companion={FORCE: 15.3}), replace(solid, companion={FORCE: 10.2})
@@ -127,11 +119,6 @@ def test_on_swept_meshes_a_common_error_cancels() -> None:
     apart = force_deviation(plane, replace(solid, mesher="ftetwild")).error
     assert force_deviation(plane, solid).error == pytest.approx(0.25 * apart, rel=1e-12)
     assert apart > 0.01
-
-
-def test_a_deviation_within_its_error_bar_of_the_limit_is_not_significant() -> None:
-    told = verdict([case("plane strain", 20.0, 10.52, 0.1), case("solid", 20.0, 10.0, 0.1)], 20.0, 50.0)[-1]
-    assert "(+5.2 %)" in told
 
 
 def test_an_object_that_twists_has_a_moment_that_no_section_has() -> None:
@@ -161,11 +148,6 @@ def test_without_a_solid_there_is_no_verdict() -> None:
     assert str(Outcome.NO_CONVERGENCE) in text[0]
     assert len(text) == 2
     assert "%" not in text[-1]
-
-
-@pytest.mark.parametrize(("value", "text"), [(123.4, "120"), (8.16e2, "820"), (0.0567, "0.057")])
-def test_rounded_numbers_have_no_exponent(value, text) -> None:
-    assert rounded(value) == text
 
 
 @pytest.fixture(scope="module")
@@ -213,18 +195,12 @@ def test_what_is_written_agrees_with_what_is_returned(compared) -> None:
     assert load(compared.out / "scene.toml").domain == "solid"
 
 
-def test_models_of_one_width_share_their_in_plane_mesh(compared) -> None:
-    for width in (5.0, 20.0, 200.0, 1200.0):
-        assert len({c.size_mm for c in compared.cases if c.width_mm == width}) == 1
-
-
 @pytest.mark.parametrize(
     ("overrides", "widths", "words"),
     [
         (["press.slide_z_mm=1.0"], [], "slide"),
         (["gauge.0.z_mm=9.0"], [10.0], 'gauge "g36" at z_mm = 9'),
         ([], [0.0], "--widths 0"),
-        ([], [float("nan")], "--widths nan"),
     ],
 )
 def test_what_a_section_cannot_stand_for_is_refused(scene, tmp_path, overrides, widths, words) -> None:
@@ -244,21 +220,3 @@ def test_a_ball_has_no_section(scene, tmp_path) -> None:
 def test_an_object_that_varies_along_the_width_is_pointed_out(scene, tmp_path) -> None:
     told = compare(load(scene, ["object.shape=sphere", "object.radius_mm=200.0"]), tmp_path / "out", ()).verdict
     assert any("width" in line for line in told)
-
-
-def test_the_scenes_own_domain_does_not_matter(scene, tmp_path) -> None:
-    as_strain = compare(load(scene, ["model.domain=plane-strain"]), tmp_path / "a", ())
-    as_solid = compare(load(scene), tmp_path / "b", ())
-    assert [c.numbers for c in as_strain.cases] == [c.numbers for c in as_solid.cases]
-
-
-def test_a_scene_that_leaves_the_mesh_to_a_tolerance_is_refused(scene: Path, tmp_path: Path) -> None:
-    with pytest.raises(Finger3dError, match=r"scene.toml: mesh.tolerance = 0.01: compare needs fixed edge lengths"):
-        compare(scene, tmp_path / "out", overrides=["mesh={tolerance=0.01}"])
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_case_that_failed_says_why() -> None:
-    case = Case("solid", 20.0, 1.5, "swept", Outcome.NO_CONVERGENCE)
-    assert not case.ok
-    assert case.as_dict()["outcome"] == str(Outcome.NO_CONVERGENCE)

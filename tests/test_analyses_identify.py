@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import csv
-import errno
 import json
 import math
-import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +18,8 @@ from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
-from finger3d.analyses.identify.simulated import Simulation, names_of
-from finger3d.analyses.pressed_body import PressedBody, under
+from finger3d.analyses.identify.simulated import Simulation
+from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.mechanics.discretise.build import build
@@ -46,17 +44,13 @@ def scene_file(tmp_path: Path) -> Path:
     ("text", "told"),
     [
         ("normal_force_N\n1\n", "depth_mm"),
-        ("depth_mm\n1\n2\n", "measured"),
         ("depth_mm,normal_force\n1,2\n2,3\n", 'column "normal_force": .*"normal_force_N"'),
         ("depth_mm,force_N\n1,2\n2,3\n", 'column "force_N": did you mean "normal_force_N"[?]'),
         ("depth_mm,stick_ratio_area\n1,2\n2,3\n", 'column "stick_ratio_area": it is none of'),
         ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,1e-160\n", "line 3: gauge_a_std = 1e-160: must be from 1e-12"),
         ("depth_mm,force_z_N,gauge_a_std\n1,2,3\n2,3,4\n", 'column "gauge_a_std" .*"gauge_a"'),
-        ("depth_mm,gauge_a\n1,nan\n2,3\n", "line 2: gauge_a = 'nan'"),
         ("depth_mm,gauge_a\n1,2\n3,3\n2,4\n", "line 4: depth_mm = 2: "),
-        ("depth_mm,gauge_a\n1,2\n", "1 .*2"),
         ("depth_mm,gauge_a,gauge_a_std\n1,2,0.1\n2,3,0\n", "line 3: gauge_a_std = 0: "),
-        ("", "depth_mm"),
         ("0.1,2\n0.2,3\n", "it has no line of names"),
         ("slide_x_mm,gauge_a\n0,2\n3,3\n2,4\n", "line 4: slide_x_mm = 2: .*time_s or step"),
     ],
@@ -128,12 +122,6 @@ def test_a_press_that_failed_is_not_tried_again(tmp_path: Path) -> None:
         known.curve([0.7, 0.1])
 
 
-def test_names_and_magnitudes() -> None:
-    names = names_of(scene().model())
-    assert {"depth_mm", "normal_force_N", "time_s", "gauge_g36", "gauge_long"} <= set(names)
-    assert "method" not in names
-
-
 def test_increments_end_at_the_measured_rows(tmp_path: Path) -> None:
     """Between its four increments of 2.5 mm the press of the scene has no numbers at these depths."""
     rows, free = measured([1.3, 6.1]), (FreeKey("friction.mu", 0.1, 0.7),)
@@ -175,14 +163,6 @@ def emulator(tmp_path: Path, free: tuple[FreeKey, ...] = SPACE, fails: Callable[
             return {"values": list(point), "outcome": "converged", "curve": found}
 
     return Emulator(Known(SCENE, None, free, Journal(tmp_path / "presses.jsonl", [])), data)
-
-
-def test_the_design_has_corners_faces_and_the_middle_and_no_press_for_modulus_and_offset(tmp_path: Path) -> None:
-    found = emulator(tmp_path)
-    for shares in found.design():
-        found.press(shares)
-    assert found.pressed == [0, 1]
-    assert found.simulation.solved == 2**2 + 2 * 2 + 1
 
 
 def test_numbers_between_presses_converge_to_those_of_presses(tmp_path: Path) -> None:
@@ -249,11 +229,6 @@ def test_a_straight_response_has_a_normal_distribution() -> None:
     assert found.untold == ()
 
 
-def test_samples_find_a_peak_a_thousandth_of_the_range_wide() -> None:
-    found = fitted(linear(np.eye(3)), [0.31, 0.77, 0.5], 1e-3, [FreeKey(name, 0.0, 1.0) for name in "abc"])
-    assert found.stds == pytest.approx([1e-3] * 3, rel=0.06)
-
-
 def test_an_interval_is_one_deviation_of_the_share_to_both_sides() -> None:
     """On a logarithmic scale it is longer above the value than below, and it ends at the bounds."""
     scales = [FreeKey("a", 1.0, 100.0), FreeKey("b", 0.0, 1.0)]
@@ -277,12 +252,6 @@ def test_the_part_of_the_errors_of_the_simulation() -> None:
     assert found.stds == pytest.approx([math.hypot(1e-3, 3e-3), 2e-3], rel=0.05)
 
 
-def test_values_that_only_their_sum_is_told_of() -> None:
-    scales = [FreeKey("a", 0.0, 1.0), FreeKey("b", 1.0, 100.0)]
-    told = fitted(linear([[1.0, 1.0], [0.5, 0.5]]), [0.5, 0.5], scales=scales)
-    assert any("apart: they may change against each other" in note for note in told.untold)
-
-
 def test_where_friction_ceases_to_change_a_reading_the_interval_reaches_the_bound() -> None:
     """Beyond mu = 0.3 all sticks: a fit that ends there has an equal likelihood up to the bound."""
     found = fitted(lambda at: np.stack([np.minimum(at[:, 0], 0.3), at[:, 1], 0.0 * at[:, 0]], axis=1), [0.35, 0.5])
@@ -291,11 +260,6 @@ def test_where_friction_ceases_to_change_a_reading_the_interval_reaches_the_boun
     assert found.high[0] == pytest.approx(0.89, abs=0.02)
     assert found.stds[0] == pytest.approx(0.36, abs=0.02)
     assert "the data do not bound friction.mu from above" in found.untold
-
-
-def test_a_flat_likelihood_is_told() -> None:
-    found = fitted(lambda at: at[:, 1:], [0.5, 0.5])
-    assert "the data cannot tell friction.mu within its bounds" in found.untold
 
 
 def test_two_maxima_are_told_and_the_deviation_of_all_values_spans_them() -> None:
@@ -347,40 +311,6 @@ def test_intervals_hold_over_many_benches(tmp_path: Path, scene_file: Path) -> N
         inside += list(errors <= noise_sds(fitted))  # the benches have the mesh of the scene
     # a share of 60 has a standard deviation of 0.06
     assert np.mean(inside) == pytest.approx(0.683, abs=0.15)
-
-
-def test_the_modulus_alone_needs_one_press(tmp_path: Path, scene_file: Path) -> None:
-    measured = bench(tmp_path / "bench.csv")
-    found = finger3d.identify(
-        scene_file, measured, {"material.E_MPa": (0.05, 5.0)}, tmp_path / "out", ["friction.mu=0.2"]
-    )
-    assert found.presses == 1
-    assert found.fitted.values[0] == pytest.approx(0.37, abs=4.0 * found.fitted.stds[0])
-
-
-def test_presses_are_few_and_share_bodies(tmp_path: Path, scene_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four points with noise, three unknowns: nine presses of the design, and those that the emulator asks for."""
-    counted = {"bodies": 0, "presses": 0}
-    built, pressed = PressedBody._built, PressedBody.steps
-
-    def count(name: str, function: Any) -> Any:
-        def counting(*args: Any, **kwargs: Any) -> Any:
-            counted[name] += 1
-            return function(*args, **kwargs)
-
-        return counting
-
-    monkeypatch.setattr(PressedBody, "_built", count("bodies", built))
-    monkeypatch.setattr(PressedBody, "steps", count("presses", pressed))
-    measured = bench(tmp_path / "bench.csv", stds=True)
-    lines = measured.read_text().splitlines()
-    measured.write_text("\n".join([lines[0], *lines[2::2]]) + "\n")
-    found = finger3d.identify(scene_file, measured, FREE | {"material.nu": (0.3, 0.495)}, tmp_path / "out")
-    assert found.measured.count == 2 * 4
-    assert found.presses == counted["presses"] <= 25
-    assert counted["bodies"] <= 16  # of one body all friction that is tried at first
-    for value, std, true in zip(found.fitted.values, found.fitted.stds, [*TRUE.values(), 0.45], strict=True):
-        assert value == pytest.approx(true, abs=4.0 * std)
 
 
 def test_a_hardness_is_fitted_by_the_modulus_that_it_gives(tmp_path: Path, scene_file: Path) -> None:
@@ -457,20 +387,6 @@ def test_a_scene_that_does_not_fit_is_said(tmp_path: Path, scene_file: Path) -> 
     )
     assert found.reduced_chi_square > 10.0
     assert any(f" {found.reduced_chi_square**0.5:.2g} " in note for note in found.notes)
-
-
-def test_a_full_disk_keeps_the_values_that_were_found(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:
-    def full(source: Any, target: Any) -> None:
-        if str(target).endswith(".png"):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        replace(source, target)
-
-    replace, out = os.replace, tmp_path / "out"
-    monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(MissingError, match=r"identify.png: No space left on device; make room"):
-        finger3d.identify(scene_file, bench(tmp_path / "bench.csv"), FREE, out)
-    assert (out / "identify.json").stat().st_size > 100
-    assert (out / "identify.csv").stat().st_size > 100
 
 
 def test_an_interrupted_identification_continues(tmp_path: Path, scene_file: Path, monkeypatch: Any) -> None:

@@ -37,15 +37,6 @@ def test_a_modulus_starts_at_that_of_the_silicone_and_replaces_it() -> None:
     assert given["material"] == {"silicone": "Dragon Skin 20"}
 
 
-def test_a_scene_takes_the_values_and_leaves_the_tables_it_was_given() -> None:
-    scene = scene_with(SCENE, ["material.E_MPa", "gauge.1.x_mm"], [0.1 + 0.2, 12.5], None)
-    assert scene.tables.material.E_MPa == 0.1 + 0.2
-    assert scene.tables.gauge[1].x_mm == 12.5
-    assert SCENE["material"]["E_MPa"] == 1.0
-    with pytest.raises(Finger3dError, match=r"--free material\.nu.* 0\.5"):
-        scene_with(SCENE, ["material.nu"], [0.7], None)
-
-
 def test_a_key_is_free_once() -> None:
     check_distinct(["a", "b"])
     with pytest.raises(Finger3dError, match="--free b: "):

@@ -15,12 +15,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import finger3d
-from finger3d._cost import duration
 from finger3d.analyses.sweep.points import Vary, checked_points, drawn, rows_of, varied
-from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
+from finger3d.analyses.sweep.store import ResultStore
 from finger3d.cli import main
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.progress import Progress
 from finger3d.results.journal import Journal, Row
 from tests.scenes import HALF_CYLINDER, written
 from tests.sweep_cases import COARSE, SETS, lines, points_of, pressed_here, table
@@ -85,14 +83,10 @@ def test_random_samples_lie_within_their_ranges_and_depend_on_the_seed() -> None
     [
         ("lhs", RANGES, 0, "--sample"),
         ("lhs:0", RANGES, 0, "--sample"),
-        ("lhs:-3", RANGES, 0, "--sample"),
-        ("lhs:1000000", RANGES, 0, "--sample"),
         ("sobol:8", RANGES, 0, "lhs:NUMBER"),
         ("lhs:8", (), 0, "--range"),
         ("lhs:8", ("friction.mu=1:0.1",), 0, "--range"),
-        ("lhs:8", ("friction.mu=0.1",), 0, "--range"),
         ("lhs:8", ("friction.mu=0:inf",), 0, "--range"),
-        ("lhs:8", ("friction.mu=0:1", "friction.mu=0:2"), 0, "friction.mu: given twice"),
         ("lhs:8", RANGES, -1, "--seed -1"),
     ],
 )
@@ -119,14 +113,10 @@ def test_the_rows_of_a_table_are_points_in_their_order(paper_scene: Path, tmp_pa
     ("text", "expected"),
     [
         ("", "line of names"),
-        ("friction.mu,,material.nu\n0.1,2,3\n", "line of names"),
         ("friction.mu,\n0.1,2\n", "line 2: has 2 cells"),
         ("friction.mu\n", "no row"),
-        ("friction.mu,friction.mu\n0.1,0.2\n", 'two columns are called "friction.mu"'),
-        ("friction.mu,material.nu\n0.1,\n", "line 2"),
         ("friction.mu\n0.1\n-2\n", "friction.mu = -2"),
         ("frictoin.mu\n0.1\n", "friction"),
-        ("gauge.g36.x_mm,gauge.0.x_mm\n1,2\n", "given twice"),
         (None, "there is no such file"),
     ],
 )
@@ -233,13 +223,6 @@ def test_rows_become_a_table_in_the_scenes_own_names(paper_scene, tmp_path) -> N
     assert float(table(tmp_path)[0]["normal_force_N"]) == rows[0]["normal_force_N"]
 
 
-def test_a_folder_in_use_is_refused(paper_scene, tmp_path) -> None:
-    sweep = points_of(paper_scene, "friction.mu=0.06")
-    with ResultStore(sweep, tmp_path).open(), pytest.raises(Finger3dError, match="writing"):
-        with ResultStore(sweep, tmp_path).open():
-            pass
-
-
 def test_a_sweep_of_one_body_needs_neither_dask_nor_matplotlib(paper_scene, tmp_path) -> None:
     code = "import sys; from finger3d.cli import main; main(sys.argv[1:]); "
     code += "sys.exit(repr({'matplotlib', 'distributed'} & set(sys.modules)))"
@@ -317,8 +300,8 @@ def test_a_damaged_sweep_json_is_one_line(paper_scene, tmp_path, capsys) -> None
         pass
     path = tmp_path / "sweep.json"
     whole = json.loads(path.read_text())
-    vary = [None, 5, [], "a", {"friction.mu": 5}, {"friction.mu": [5]}, {"friction.mu": None}]
-    texts = ["", "{", "null", "5", "[]", '"a"', "{}", "[" * 100_000, *(json.dumps({**whole, "vary": v}) for v in vary)]
+    vary = [5, {"friction.mu": 5}]
+    texts = ["", "[]", "{}", "[" * 100_000, *(json.dumps({**whole, "vary": v}) for v in vary)]
     for data in [*(text.encode() for text in texts), b'{"vary": "\xe9"}']:
         path.write_bytes(data)
         for command in (
@@ -332,10 +315,9 @@ def test_a_damaged_sweep_json_is_one_line(paper_scene, tmp_path, capsys) -> None
         assert path.read_bytes() == data
 
 
-@pytest.mark.parametrize("data", [b"point\n\xe9", b'point\n"' + b"a" * 200_000])
-def test_a_damaged_table_is_one_line(data, tmp_path, capsys) -> None:
+def test_a_damaged_table_is_one_line(tmp_path, capsys) -> None:
     (tmp_path / "sweep.json").write_text('{"vary": {"friction.mu": ["0.1", "0.2"]}}')
-    (tmp_path / "results.csv").write_bytes(data)
+    (tmp_path / "results.csv").write_bytes(b"point\n\xe9")
     assert main(["show", str(tmp_path), "--png", str(tmp_path / "a.png")]) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
@@ -350,23 +332,6 @@ def test_a_folder_of_another_sweep_is_refused(paper_scene, tmp_path, capsys) -> 
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 1
     assert 'friction.mu is ["0.06", "1"]' in err
-
-
-@pytest.mark.parametrize(
-    ("vary", "expected"),
-    [
-        (["friction.mu=0.06,1", "material.nu=0.4"], "material.nu"),
-        (["material.nu=0.4"], "friction.mu"),
-    ],
-)
-def test_what_makes_it_another_sweep_is_named(vary, expected, paper_scene, tmp_path) -> None:
-    with ResultStore(points_of(paper_scene, "friction.mu=0.06,1"), tmp_path).open():
-        pass
-    with pytest.raises(Finger3dError, match=expected), ResultStore(points_of(paper_scene, *vary), tmp_path).open():
-        pass
-    other = checked_points(paper_scene, [*SETS, "press.steps=3"], varied(["friction.mu=0.06,1"]))
-    with pytest.raises(Finger3dError, match="another scene"), ResultStore(other, tmp_path).open():
-        pass
 
 
 @pytest.mark.parametrize("name", ["points.jsonl", "results.parquet"])
@@ -398,27 +363,3 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, paper_scene, tmp_p
     assert name in str(told.value)
     with ResultStore(sweep, tmp_path).open() as again:
         assert again.left() == [sweep.points[1]]
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(0.2, "0.2 s"), (89.0, "89 s"), (180.0, "3 min"), (5400.0, "1.5 h")])
-def test_durations_are_short_texts(seconds: float, text: str) -> None:
-    assert duration(seconds) == text
-
-
-def test_a_batch_takes_about_two_seconds_and_failed_points_do_not_change_it(paper_scene) -> None:
-    sweep = points_of(paper_scene, "friction.mu=0.1,0.2,0.3")
-    (spec,) = sweep.bodies.values()
-    body = BodyPoints(spec, list(sweep.points))
-    body.advance([{"point": 0, "seconds": 0.1}])
-    assert (body.size, [point.number for point in body.left]) == (20, [1, 2])
-    body.advance([{"point": 1, "outcome": "no mesh"}])
-    assert (body.size, [point.number for point in body.left]) == (20, [2])
-
-
-def test_points_that_are_given_up_are_lost_with_the_reason(paper_scene, tmp_path) -> None:
-    sweep = points_of(paper_scene, "friction.mu=0.1,0.2")
-    (spec,) = sweep.bodies.values()
-    with ResultStore(sweep, tmp_path).open() as store:
-        SweepProgress(store, Progress()).give_up(BodyPoints(spec, list(sweep.points)), "its worker died")
-        assert [row["outcome"] for row in store.lost.values()] == ["its worker died"] * 2
-        assert len(store.left()) == 2

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -19,15 +18,12 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-import finger3d
 from finger3d.analyses.sweep import local, worker
-from finger3d.analyses.sweep.cluster import Cluster
 from finger3d.analyses.sweep.points import Sweep, checked_points, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
-from finger3d.errors import Finger3dError, MissingError
+from finger3d.errors import Finger3dError
 from finger3d.progress import Progress
-from tests.scenes import HALF_CYLINDER, written
-from tests.sweep_cases import SETS, points_of, pressed_here, table
+from tests.sweep_cases import points_of, pressed_here, table
 
 
 def pressed(sweep: Sweep, folder: Path, workers: int) -> ResultStore:
@@ -78,98 +74,6 @@ def test_what_a_worker_raises_is_told_with_the_points_that_are_lost(
     store = pressed(points_of(paper_scene, "material.nu=0.3,0.4"), tmp_path, 1)
     assert not store.rows
     assert all(row["outcome"] == "LookupError: no such body" for row in store.lost.values())
-
-
-def test_a_scheduler_that_does_not_answer_is_left_after_the_time_limit(paper_scene, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("finger3d.analyses.sweep.cluster.CONNECT_S", 1.0)
-    with socket.socket() as deaf:
-        deaf.bind(("127.0.0.1", 0))
-        deaf.listen()
-        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
-        start = time.monotonic()
-        with pytest.raises(MissingError, match="scheduler"):
-            finger3d.sweep(paper_scene, ["friction.mu=0.1"], tmp_path, SETS, scheduler=address)
-        assert time.monotonic() - start < 60.0
-
-
-@pytest.mark.parametrize("threads", [1, None], ids=["a worker", "here"])
-@pytest.mark.slow
-def test_workers_gain_no_threads(threads, tmp_path, monkeypatch) -> None:
-    """Two workers on two cores are as many as there is room for; a body pressed by this process takes them all."""
-    pools = []
-
-    class Pool(ThreadPoolExecutor):
-        def __init__(self, most: int, **settings: object) -> None:
-            pools.append(most)
-            super().__init__(most, **settings)
-
-    monkeypatch.setattr("finger3d.mechanics.march.parallel.ThreadPoolExecutor", Pool)
-    monkeypatch.setattr("finger3d.mechanics.march.parallel.cores", lambda: 2)
-    # from 1000 contact rows on presses run at once
-    scene, vary = written(tmp_path, HALF_CYLINDER), varied(["friction.mu=0.06,0.3,1"])
-    sweep = checked_points(scene, ["mesh.size_mm=0.0045"], vary)
-    (body,) = sweep.bodies.values()
-    rows = worker.batch(body, sweep.points, 3) if threads else list(worker.rows(body, sweep.points))
-    assert [row["point"] for row in rows] == [0, 1, 2]
-    assert {row["outcome"] for row in rows} == {"converged"}
-    assert pools == ([] if threads else [2])
-
-
-class Restarted:
-    """A cluster whose worker has been started again at another address after the first batch of a body."""
-
-    status = "running"
-
-    def __init__(self) -> None:
-        self.workers, self.sent = {"tcp://old:1": 1}, []
-
-    def nthreads(self) -> dict[str, int]:
-        return self.workers
-
-    def who_has(self, futures):
-        return {f.key: ("tcp://old:1",) for f in futures}
-
-    def cancel(self, futures, force: bool) -> None:
-        for future in futures:
-            future.cancelled = True
-
-    def submit(self, task, spec, left, size, *, pure, workers, allow_other_workers):
-        stranded = bool(self.sent)
-        self.sent.append(workers)
-        if len(self.sent) == 2:  # the worker dies while it presses this one
-            self.workers = {"tcp://new:2": 1}
-        reached = workers is None or not stranded
-        return Batch(
-            f"batch {len(self.sent)}", [{"point": p.number, "outcome": "converged"} for p in left[:1]], reached
-        )
-
-
-class Batch:
-    """A future of Dask, which is there at once, or never if its worker is gone."""
-
-    status = "finished"
-
-    def __init__(self, key, rows, reached: bool) -> None:
-        self.key, self.rows, self.reached, self.cancelled = key, rows, reached, False
-
-    def add_done_callback(self, told) -> None:
-        if self.reached:
-            told(self)
-
-    def result(self):
-        return self.rows
-
-
-def test_a_batch_whose_worker_is_gone_is_sent_to_any(paper_scene, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("finger3d.analyses.sweep.cluster._POLL_S", 0.01)
-    sweep = points_of(paper_scene, "friction.mu=0.1,0.2,0.3")
-    client = Restarted()
-    with ResultStore(sweep, tmp_path).open() as store:
-        (spec,) = sweep.bodies.values()
-        kept = Cluster(client, SweepProgress(store, Progress()))
-        monkeypatch.setattr(kept.progress, "add", lambda row: None)
-        kept.press([BodyPoints(spec, list(sweep.points))])
-    assert client.sent[:3] == [None, ["tcp://old:1"], None]
 
 
 SETTINGS = (
@@ -275,14 +179,6 @@ def test_a_sweep_survives_kill_9_of_a_worker_and_of_the_parent(root, paper_scene
     assert_nothing_repeated_or_lost(out, 120)
 
 
-@pytest.mark.slow
-def test_a_thousand_points_survive_kill_9(root, paper_scene, tmp_path) -> None:
-    out = tmp_path / "out"
-    env = environment(root, str(tmp_path))
-    killed_and_resumed(sweeping(paper_scene, out, 50, 20, "--workers", "2"), out, 1000, env, tmp_path)
-    assert_nothing_repeated_or_lost(out, 1000)
-
-
 @contextmanager
 def dask(
     workers: int, env: dict[str, str], where: Path, *options: str
@@ -310,21 +206,6 @@ def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -
         assert done.stderr == ""
     assert_nothing_repeated_or_lost(out, 12)
     assert {row["body"] for row in lines(out)} == {p.body for p in load_points(paper_scene)}
-
-
-@pytest.mark.slow
-def test_a_sweep_on_a_scheduler_survives_kill_9_of_a_worker(root, paper_scene, tmp_path) -> None:
-    env, out = environment(root, str(tmp_path)), tmp_path / "out"
-    with dask(2, env, tmp_path) as (address, _, workers):
-        command = sweeping(paper_scene, out, 30, 4, "--scheduler", address, *SLOW)
-        with started(command, env, tmp_path, tmp_path / "log") as parent:
-            until(lambda: len(lines(out)) >= 12, "a tenth of the points")
-            workers[0].kill()
-            before = len(lines(out))
-            assert before < 120
-            assert parent.wait(timeout=280) == 0, (tmp_path / "log").read_text()
-        assert workers[1].poll() is None
-    assert_nothing_repeated_or_lost(out, 120)
 
 
 @pytest.mark.slow
@@ -362,14 +243,13 @@ def test_a_worker_without_finger3d_is_named(root, paper_scene, tmp_path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])
-def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(sent, root, paper_scene, tmp_path) -> None:
+def test_a_scheduler_that_dies_ends_a_sweep_with_3_and_one_line(root, paper_scene, tmp_path) -> None:
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(1, env, tmp_path) as (address, scheduler, _):
         command = sweeping(paper_scene, out, 60, 2, "--scheduler", address, *SLOW)
         with started(command, env, tmp_path, tmp_path / "log") as parent:
             until(lambda: len(lines(out)) >= 5, "five points")
-            scheduler.send_signal(sent)
+            scheduler.send_signal(signal.SIGKILL)
             assert parent.wait(timeout=60) == 3, (tmp_path / "log").read_text()
     said = (tmp_path / "log").read_text()
     assert not [line for line in said.splitlines()[:-1] if not line.startswith("[")]
@@ -384,20 +264,10 @@ def load_points(paper_scene: Path) -> list:
     return list(checked_points(paper_scene, SETTINGS, varied(["friction.mu=0.02", f"material.nu={nu}"])).points)
 
 
-AT_ONCE = "import finger3d.mechanics.march.parallel as s; s._ROWS_FOR_THREADS = 1; s.cores = lambda: 2; "
-AT_ONCE += "from finger3d.cli import main; import sys; sys.exit(main())"
-
-
-@pytest.mark.parametrize(
-    "bodies",
-    [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(0, marks=pytest.mark.slow)],
-    ids=["here", "workers", "threads"],
-)
+@pytest.mark.parametrize("bodies", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["here", "workers"])
 def test_ctrl_c_ends_with_130_and_one_line(bodies, root, paper_scene, tmp_path) -> None:
-    out, threads, bodies = tmp_path / "out", bodies == 0, bodies or 1
+    out = tmp_path / "out"
     command = sweeping(paper_scene, out, 120 // bodies, bodies, "--workers", str(bodies), *SLOW)
-    if threads:
-        command[1:3] = ["-c", AT_ONCE]
     with started(command, environment(root, str(tmp_path)), tmp_path, tmp_path / "log") as parent:
         until(lambda: len(lines(out)) >= 5, "five points")
         # a terminal sends it to the workers, too

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -16,8 +15,6 @@ import pytest
 import finger3d
 import finger3d.analyses.press
 from finger3d.cli import app, main
-from finger3d.cli.streams import SafeStream, safe_streams
-from finger3d.cli.terminal import least_width
 from finger3d.effects import effect_names
 from finger3d.errors import Outcome
 from finger3d.mechanics.model import MeshOptions
@@ -42,12 +39,7 @@ COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)
         (["press"], "SCENE"),
         (["press", "scene.toml"], "give --out FOLDER"),
         (["press", "scene.toml", "--ouut", "out"], "--out instead of --ouut"),
-        (["press", "scene.toml", "--out"], "--out"),
-        (["press", "scene.toml", "--out", "out", "--fast"], "--fast"),
-        (["press", "scene.toml", "more.toml", "--out", "out"], "more.toml"),
         (["plan", "scene.toml", "--set"], "--set"),
-        (["new", "a.toml", "b.toml"], "b.toml"),
-        (["info", "--loud"], "--loud"),
         (["completion", "bash"], "completion is gone: use finger3d --completion SHELL"),
         (["schema"], "schema is gone: use finger3d new --schema"),
         (["validate"], "validate is gone: use python -m validation"),
@@ -156,12 +148,6 @@ def test_what_a_job_prints_does_not_spoil_the_json(scene, tmp_path, monkeypatch,
     assert "warning: Wärme" in err
 
 
-@pytest.mark.parametrize("command", ["press", "compare", "plan"])
-def test_a_mistake_with_json_leaves_standard_output_empty(command, tmp_path, capsys) -> None:
-    out = [] if command == "plan" else ["--out", tmp_path / "out"]
-    assert "nothing.toml" in refused(capsys, command, tmp_path / "nothing.toml", *out, "--json")
-
-
 # --- A command does its work whatever becomes of the terminal, and however narrow that is ----------------------------
 
 
@@ -169,12 +155,9 @@ SECTION = [
     "--set", "model.domain=plane-strain", "--set", "mesh.size_mm=8", "--set", "mesh.base_size_mm=16", "--set",
     "press.steps=3", "--set", "press.depth_mm=1", "--no-figures", "--no-error",
 ]  # fmt: skip
-TITLE = "Fingerkuppe \u2028 \u00fc"
 
 
-@pytest.mark.parametrize(
-    "redirection", ["| head -1", "> /dev/full", ">&-", ">&- 2>&- <&-", "2>/dev/full >&-", "> ascii"]
-)
+@pytest.mark.parametrize("redirection", ["| head -1", "2>/dev/full >&- <&-", "> ascii"])
 def test_results_are_written_whatever_becomes_of_the_terminal(root: Path, tmp_path: Path, redirection: str) -> None:
     scene = root / "geometries" / "fig9.toml"
     command = [
@@ -215,56 +198,13 @@ def test_a_closed_descriptor_is_not_given_to_a_file(root: Path, tmp_path: Path) 
     assert int((tmp_path / "data").read_text()) > 2
 
 
-class Broken(io.StringIO):
-    def write(self, text: str) -> int:
-        raise BrokenPipeError(32, "Broken pipe")
-
-
-def test_a_stream_that_breaks_takes_no_more_output() -> None:
-    stream = SafeStream(Broken())
-    assert stream.write("text") == 4
-    assert isinstance(stream.lost, BrokenPipeError)
-    stream.flush()
-    stream.writelines(["a", "b"])
-    closed = io.StringIO()
-    closed.close()
-    stream = SafeStream(closed)
-    print("text", file=stream, flush=True)
-    assert isinstance(stream.lost, ValueError)
-
-
-def test_what_an_encoding_lacks_is_escaped() -> None:
-    raw = io.BytesIO()
-    stream = SafeStream(io.TextIOWrapper(raw, encoding="ascii"))
-    print(TITLE, "\udc80", file=stream, flush=True)
-    assert raw.getvalue().decode("ascii") == "Fingerkuppe \\u2028 \\xfc \\udc80\n"
-    assert stream.lost is None
-
-
-def test_streams_are_put_back(capsys: pytest.CaptureFixture[str]) -> None:
-    before = sys.stdout, sys.stderr
-    with safe_streams():
-        print("out")
-        print("err", file=sys.stderr)
-    assert (sys.stdout, sys.stderr) == before
-    assert tuple(capsys.readouterr()) == ("out\n", "err\n")
-
-
-@pytest.mark.parametrize("columns", ["0", "1", "2", "19"])
-def test_help_ends_on_a_terminal_of_any_width(root: Path, columns: str) -> None:
-    env = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": columns}
+def test_help_ends_on_a_terminal_of_any_width(root: Path) -> None:
+    env = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": "1"}
     command = [sys.executable, "-m", "finger3d", "press", "--help"]
     done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= 20
     assert "--out" in done.stdout
-
-
-@pytest.mark.parametrize(("said", "used"), [("3", "20"), ("77", "77")])
-def test_only_a_narrow_terminal_is_taken_for_wider(said: str, used: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", said)
-    least_width()
-    assert os.environ["COLUMNS"] == used
 
 
 # --- A refused command says one line that helps, and leaves nothing behind; --json prints JSON alone -----------------
@@ -281,12 +221,8 @@ def block(tmp_path: Path) -> Path:
         ["press", "--set", "friction.mu=-1"],
         ["compare", "--widths", "3,-1"],
         ["calibrate", "--gauge", "no such"],
-        ["calibrate", "--gauge", "g", "--mu", "3:1:2"],
-        ["calibrate", "--gauge", "g", "--tolerance", "luck=1"],
         ["sweep", "--vary", "friction.mu=-1,2"],
-        ["optimise", "--free", "gauge.g9.x_mm=1:2"],
         ["export", "--mold", "--pour-mm", "-3"],
-        ["export", "--tolerance-mm", "-1"],
     ],
     ids=" ".join,
 )
@@ -299,12 +235,11 @@ def test_a_refused_command_leaves_no_folder(
     assert [p.name for p in tmp_path.iterdir()] == ["scene.toml"]
 
 
-@pytest.mark.parametrize("name", ["nosuch.step", "sub/nosuch.stl"])
 def test_a_finger_from_a_file_that_is_not_there_is_told_before_the_keys_of_the_old_design(
-    name: str, block: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    block: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    err = refused(capsys, "plan", block, "--set", f"finger.geometry={name}")
-    assert f"--set finger.geometry: finger.geometry: {tmp_path / name}: " in err
+    err = refused(capsys, "plan", block, "--set", "finger.geometry=nosuch.step")
+    assert f"--set finger.geometry: finger.geometry: {tmp_path / 'nosuch.step'}: " in err
     assert "half_length_mm" not in err
 
 
@@ -319,21 +254,7 @@ def test_beside_a_file_that_is_there_the_keys_of_a_design_are_told(
         assert text in err
 
 
-def test_an_object_from_a_file_that_is_not_there(
-    block: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["plan", str(block), "--set", 'object={shape="mesh", path="nosuch.stl"}']) == 2
-    told = f"object.path: {tmp_path / 'nosuch.stl'}: there is no such file; give its path from the scene's folder"
-    assert told in capsys.readouterr().err
-
-
 # --- commands that help to write: a new scene, its schema, and completion --------------------------------------------
-
-
-def test_new_says_what_to_do_next(tmp_path, capsys) -> None:
-    path = tmp_path / "mine.toml"
-    assert run("new", path) == 0
-    assert f"finger3d press {path} --out out" in capsys.readouterr().out
 
 
 def test_new_writes_a_scene_that_loads_and_is_the_papers_finger(scene) -> None:
@@ -365,17 +286,6 @@ def test_new_leaves_a_file_alone_that_is_there(scene, capsys) -> None:
     assert run("new", scene) == 2
     assert f"{scene}: " in capsys.readouterr().err
     assert scene.read_text(encoding="utf-8") == "mine"
-
-
-def test_new_without_a_name_writes_scene_toml(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run("new") == 0
-    assert load("scene.toml").title == "Fig. 9 finger, 20 mm wide"
-
-
-def test_new_in_a_folder_that_is_not_there(tmp_path, capsys) -> None:
-    assert run("new", tmp_path / "no" / "scene.toml") == 2
-    assert str(tmp_path / "no") in capsys.readouterr().err
 
 
 def test_a_core_install_gets_a_scene_that_it_can_press(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -432,11 +342,3 @@ def test_info_names_versions_and_machine(capsys) -> None:
     for text in ("finger3d", "numpy", "build123d", "pytetwild", "vtk", "python", "cores", "memory", "cache", "PARDISO"):
         assert text in out
     assert finger3d.__version__ in out
-
-
-def test_the_table_prints_where_only_ascii_can_be_written() -> None:
-    command = [sys.executable, "-m", "finger3d", "info"]
-    environment = {"PYTHONIOENCODING": "ascii", "PATH": ""}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0
-    assert "PARDISO" in done.stdout

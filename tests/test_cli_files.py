@@ -59,14 +59,9 @@ def test_the_command_writes_a_mold(scene, tmp_path, capsys, monkeypatch) -> None
     ("arguments", "told"),
     [
         (["--shrinkage", "0.01"], "--mold"),
-        (["--mold", "--mesh"], "--mold, --mesh"),
         (["--mold", "--riser", "0.04"], "--riser is gone: .*--pour-mm"),
         (["--mold", "--carrier"], "--carrier is gone: .*rigid = true"),
         (["--mold", "--no-plugs"], "--no-plugs is gone: .*tape"),
-        (["--tolerance-mm", "0"], "--tolerance-mm 0.0"),
-        (["--tolerance-mm", "nan"], "--tolerance-mm nan"),
-        (["--mold", "--split", "y"], "y"),
-        (["--mold", "--pour-mm", "-4"], "--pour-mm"),
         (["--mold", "--wall-mm", "4"], "--wall-mm is gone: .*8 mm"),
         (["--ascii"], "--ascii is gone"),
         (["--mold", "--set", "gauge=[]", "--split-mm", "11"], "split"),
@@ -78,11 +73,6 @@ def test_the_command_refuses_in_one_line(arguments, told, scene, tmp_path, capsy
     assert len(err.splitlines()) == 1
     assert re.search(told, err)
     assert not list((tmp_path / "out").glob("*"))
-
-
-def test_a_folder_that_cannot_be_written(scene, capsys) -> None:
-    assert main(["export", str(scene), "--out", str(scene)]) == 2
-    assert "is a file" in capsys.readouterr().err
 
 
 def test_export_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -134,27 +124,10 @@ def inward(surface: Triangles) -> Triangles:
 
 SURFACES: dict[str, tuple[Triangles, str]] = {
     "a hole": (replace(CUBE, faces=CUBE.faces[1:]), "is not closed"),
-    "a face missing": (replace(CUBE, faces=CUBE.faces[2:]), "is not closed"),
-    "no top and no bottom": (
-        replace(CUBE, faces=CUBE.faces[np.abs(CUBE.normals[:, 1]) < 0.5]),
-        "is not closed",
-    ),
-    "a flipped face": (replace(CUBE, faces=np.vstack([CUBE.faces[:1, ::-1], CUBE.faces[1:]])), "flipped triangles"),
     "inside out": (inward(CUBE), "inside out"),
-    "flat": (moved(lambda p: p * [1.0, 0.0, 1.0]), "no volume"),
-    "a point": (moved(lambda p: 0.0 * p), "STL|no volume|enclose nothing"),
     "nan": (moved(lambda p: np.where(np.arange(8)[:, None] == 3, np.nan, p)), "not a number"),
-    "inf": (moved(lambda p: np.where(np.arange(8)[:, None] == 3, np.inf, p)), "not a number"),
     "two pieces": (joined(CUBE, moved(lambda p: p + [20.0, 0.0, 0.0])), "in 2 pieces"),
-    "two that overlap": (joined(CUBE, moved(lambda p: p + [3.0, 0.3, 0.2])), "in 2 pieces"),
-    "hollow": (joined(CUBE, inward(moved(lambda p: 0.5 * p))), "in 2 pieces .or hollow"),
-    "two that share an edge": (joined(CUBE, moved(lambda p: p + [8.0, 6.0, 0.0])), "more than two triangles meet"),
-    "faces twice": (replace(CUBE, faces=np.vstack([CUBE.faces, CUBE.faces[:2]])), "more than two triangles meet"),
-    "one triangle": (replace(CUBE, faces=CUBE.faces[:1]), "enclose nothing|STL"),
     "metres": (moved(lambda p: 1e-3 * p), "unit"),
-    "micrometres": (moved(lambda p: 1e3 * p), "unit"),
-    "1e-9": (moved(lambda p: 1e-9 * p), "unit|no volume|STL|enclose nothing"),
-    "1e9": (moved(lambda p: 1e9 * p), "unit"),
 }  # fmt: skip
 
 
@@ -185,14 +158,13 @@ def test_meshes_that_are_no_body(name: str, role: str, tmp_path: Path, capsys: A
     ("surface", "table", "text"),
     [
         (CUBE, "x_mm = 60.0", "never"),
-        (CUBE, "z_mm = -30.0", "never"),
         (channel(12.0, 4.9), "", "base"),
         (channel(10.0, 3.0), "[effects.elastic_object]\nE_MPa = 1.0\nnu = 0.3\n", "wall"),
         (box(4.0, 5.0, 9.0), "x_mm = 7.0", "area"),
         (moved(lambda p: 300.0 * p), "", "unit"),
         (moved(lambda p: 0.003 * p), "", "1000 "),
     ],
-    ids=["beside", "beside along z", "base", "wall", "rim", "large", "small"],
+    ids=["beside", "base", "wall", "rim", "large", "small"],
 )
 def test_objects_that_meet_something_else_first(
     surface: Triangles, table: str, text: str, tmp_path: Path, capsys: Any
@@ -206,7 +178,6 @@ def test_objects_that_meet_something_else_first(
     ("table", "text"),
     [
         ('shape = "sphere"\nradius_mm = 3.0\nx_mm = 40.0', "never"),
-        ('shape = "cylinder"\nradius_mm = 2.0\nx_mm = 30.0', "base|never"),
     ],
 )
 def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys: Any) -> None:
@@ -216,7 +187,7 @@ def test_shapes_beside_the_finger(table: str, text: str, tmp_path: Path, capsys:
 # what crashes or hangs pytetwild, as far as a scene can ask for it; the rest, as arrays, is in test_meshing_tetwild.py
 @pytest.mark.parametrize(
     ("size", "text"),
-    [(100.0, "mesh.size_mm = 100.0"), (0.02, "tetrahedra"), (0.0, "from 0.0001"), (-1.0, "from 0.0001")],
+    [(100.0, "mesh.size_mm = 100.0"), (0.02, "tetrahedra")],
 )
 def test_sizes_that_hang_the_mesher(size: float, text: str, tmp_path: Path, capsys: Any) -> None:
     assert text in refused(capsys, tmp_path, PAD, 'shape = "plane"', size)
@@ -301,7 +272,7 @@ def interrupted(command: list[str], seconds: float, cwd: Path) -> subprocess.Com
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     ("domain", "shares"),
-    [("plane-strain", (0.15, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)), ("solid", (0.2, 0.5, 0.8, 0.95))],
+    [("plane-strain", (0.3, 0.5, 0.7, 0.9)), ("solid", (0.5, 0.8))],
 )
 def test_ctrl_c_at_any_moment(root: Path, tmp_path: Path, domain: str, shares: tuple[float, ...]) -> None:
     out = tmp_path / "ein Ordner mit Umläuten"
@@ -387,21 +358,11 @@ def test_an_import_that_ctrl_c_broke_off_is_an_interruption(root: Path, tmp_path
     assert capsys.readouterr().err.startswith("finger3d: interrupted")
 
 
-def test_an_import_that_fails_otherwise_is_not_hidden(root: Path, tmp_path, monkeypatch) -> None:
-    def broken(*args: object, **kwargs: object) -> None:
-        raise ImportError("no module")
-
-    monkeypatch.setattr(finger3d.analyses.press, "press", broken)
-    with pytest.raises(ImportError, match="no module"):
-        main(press(root, tmp_path / "out")[3:])
-
-
 def test_two_runs_into_one_folder(root: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out"
     with claimed(out):
         assert main(press(root, out, *SECTION)[3:]) == 2
     assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"finger3d: {out}: ")
-    assert main(press(root, out, *SECTION, "--no-figures")[3:]) == 0
 
 
 def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path, capsys) -> None:
@@ -413,14 +374,10 @@ def test_results_of_another_command_are_not_replaced(root: Path, tmp_path: Path,
     assert [p.name for p in tmp_path.iterdir()] == ["calibration.json"]
 
 
-@pytest.mark.parametrize(
-    "words", ["sweep --vary friction.mu=0.1,0.2", "optimise --free gauge.g36.angle_deg=0:90"], ids=["sweep", "optimise"]
-)
-def test_a_sweep_and_a_design_take_no_other_results_folder(root: Path, tmp_path: Path, capsys, words: str) -> None:
+def test_a_sweep_takes_no_other_results_folder(root: Path, tmp_path: Path, capsys) -> None:
     (tmp_path / "summary.json").write_text("{}")
-    command, *options = words.split()
     scene = root / "geometries" / "fig9.toml"
-    assert main([command, str(scene), "--out", str(tmp_path), *options, *SECTION]) == 2
+    assert main(["sweep", str(scene), "--out", str(tmp_path), "--vary", "friction.mu=0.1,0.2", *SECTION]) == 2
     said = capsys.readouterr().err.strip().splitlines()[-1]
     assert said.startswith(f"finger3d: --out {tmp_path}: ")
     assert "press" in said

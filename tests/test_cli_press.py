@@ -9,19 +9,16 @@ import subprocess
 import sys
 import urllib.request
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import finger3d
 import finger3d.analyses.compare.run as compare_module
-import finger3d.analyses.press
 from finger3d.analyses.compare.cases import press_with_errors
 from finger3d.analyses.cost import ERRORS
 from finger3d.cli import main
 from finger3d.errors import MissingError, Outcome
-from finger3d.plotting import renderer as opengl
+from finger3d.plotting.renderer import running_child
 from finger3d.results.comparison import Case
 from tests.commands import refused, run
 from tests.pictures import marked, orange, rgb
@@ -55,11 +52,6 @@ def test_press_prints_the_closing_table(scene, tmp_path, fake_press, capsys) -> 
         assert text in out
 
 
-def test_press_without_figures(scene, tmp_path, fake_press) -> None:
-    assert run("press", scene, "--out", tmp_path / "out", "--no-figures") == 0
-    assert fake_press.figures is False
-
-
 def test_press_that_does_not_converge_ends_with_3(scene, tmp_path, fake_press, capsys) -> None:
     fake_press.end = Outcome.NO_CONVERGENCE
     assert run("press", scene, "--out", tmp_path / "out") == 3
@@ -83,18 +75,6 @@ def test_an_interrupted_press_ends_with_130_and_says_what_is_kept(scene, tmp_pat
     assert len(err.splitlines()) == 1
     assert "2 of 2 increments" in err
     assert str(tmp_path / "out") in err
-
-
-def test_an_interruption_before_the_first_step(scene, tmp_path, monkeypatch, capsys) -> None:
-    def press(scene, out, report, figures=True, error=True, least_grip=False):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(finger3d.analyses.press, "press", press)
-    assert run("press", scene, "--out", tmp_path / "out") == 130
-    err = capsys.readouterr().err
-    assert len(err.splitlines()) == 1
-    assert err.startswith("finger3d: interrupted")
-    assert str(tmp_path / "out") not in err  # nothing is kept there
 
 
 @pytest.mark.parametrize(
@@ -123,14 +103,6 @@ def test_press_as_json_prints_the_summary_alone(scene, tmp_path, fake_press, cap
     assert "2 of 2: remark 1" in err
 
 
-def test_press_as_json_that_does_not_converge(scene, tmp_path, fake_press, capsys) -> None:
-    fake_press.end = Outcome.NO_CONVERGENCE
-    assert run("press", scene, "--out", tmp_path / "out", "--json") == 3
-    out, err = capsys.readouterr()
-    assert json.loads(out)["outcome"] == str(Outcome.NO_CONVERGENCE)
-    assert "1 of 2 increments" in err
-
-
 # --- command ``plan``: effects, size and cost, without a solution ----------------------------------------------------
 
 
@@ -143,36 +115,12 @@ def test_plan_tells_effects_and_forecast_and_solves_nothing(scene, fake_press, c
     assert fake_press.scene is None
 
 
-def test_plan_says_where_the_modulus_comes_from(scene, capsys) -> None:
-    assert run("plan", scene, "--set", "material.silicone=dragon skin 20") == 0
-    out = capsys.readouterr().out
-    assert "0.423 MPa +- 25 %, Dragon Skin 20, 100 %" in out
-    assert run("plan", scene) == 0
-    assert "1 MPa, given" in capsys.readouterr().out
-
-
 # --- command ``compare``: the verdict and its JSON -------------------------------------------------------------------
 
 
 @pytest.fixture
 def swept_scene(tmp_path) -> Path:
     return written(tmp_path, SWEPT_FINGER)
-
-
-def test_compare_as_json_prints_its_file(swept_scene, tmp_path, monkeypatch, capsys) -> None:
-    import finger3d.analyses.compare.run
-
-    def compare(scene, out, widths, report):
-        report.stage("plane strain")
-        out.mkdir()
-        (out / "compare.json").write_text(json.dumps({"verdict": ["2D would do"], "outcome": "converged"}))
-        return SimpleNamespace(verdict=("2D would do",), outcome=Outcome.CONVERGED, cases=())
-
-    monkeypatch.setattr(finger3d.analyses.compare.run, "compare", compare)
-    assert run("compare", swept_scene, "--out", tmp_path / "out", "--json") == 0
-    out, err = capsys.readouterr()
-    assert json.loads(out) == {"verdict": ["2D would do"], "outcome": "converged"}
-    assert "plane strain" in err
 
 
 def test_the_command_prints_the_verdict(swept_scene, tmp_path, capsys) -> None:
@@ -182,7 +130,7 @@ def test_the_command_prints_the_verdict(swept_scene, tmp_path, capsys) -> None:
     assert all(line in out for line in json.loads((tmp_path / "out" / "compare.json").read_text())["verdict"])
 
 
-@pytest.mark.parametrize("widths", ["5,abc", "5,,20", "-5", "inf"])
+@pytest.mark.parametrize("widths", ["5,abc", "inf"])
 def test_widths_that_are_none_are_refused_in_one_line(swept_scene, tmp_path, capsys, widths) -> None:
     err = refused(capsys, "compare", swept_scene, "--out", tmp_path / "out", f"--widths={widths}")
     assert err.startswith("finger3d: --widths")
@@ -290,19 +238,11 @@ def test_bad_input_is_one_line(of: str, key: str, text: str, tmp_path: Path, cap
     ("vary", "expected"),
     [
         (["friction.mu"], "KEY=VALUE"),
-        (["friction.mu="], "friction.mu"),
         (["friction.mu=0.1,,2"], "friction.mu"),
         (["friction.mu=0.1,0.1"], '"0.1"'),
         (["friction.mu=0.1", "friction.mu=2"], "--vary friction.mu: "),
         (["gauge.g36.x_mm=1", "gauge.0.x_mm=2"], "gauge.0.x_mm"),
-        (["material.n=0.1"], "--vary material.n: material.n = 0.1: "),
-        (["finger.radus_mm=90"], '"radius_mm"'),
-        (["frictoin.mu=0.1"], '"friction"'),
         (["friction.mu=0.1,-2"], "friction.mu = -2: "),
-        (["material.nu=0.3,0.6"], "material.nu = 0.6: "),
-        (["material.nu=0.3", "friction.mu=nan"], "friction.mu = nan: "),
-        (["gauge.g37.x_mm=1"], '"g36"'),
-        (["gauge.7.x_mm=1"], "--vary gauge.7.x_mm: "),
         (["mesh={tolerance=0.05}"], "mesh.size_mm"),
         (["gauge.g36.x_mm=1,70"], "x_mm = 70"),
         ([f"friction.mu={','.join(map(str, range(400)))}", f"material.nu={','.join(map(str, range(400)))}"], "160000"),
@@ -383,12 +323,8 @@ def test_a_section_as_a_picture(section: Path, tmp_path: Path, capsys: pytest.Ca
     assert marked(rgb(png)) > 30
 
 
-@pytest.mark.parametrize("renderer", [pytest.param("", marks=pytest.mark.slow), "matplotlib"])
-def test_a_solid_with_and_without_opengl(
-    renderer: str, solid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FINGER3D_RENDERER", renderer)
-    monkeypatch.setattr(opengl, "FAILURES", [])
+def test_a_solid_without_opengl(solid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FINGER3D_RENDERER", "matplotlib")
     assert main(["show", str(solid), "--png", str(tmp_path / "a.png"), "--step", "2"]) == 0
     image = rgb(tmp_path / "a.png")
     assert orange(image) > 1e-3
@@ -410,8 +346,6 @@ def test_a_solid_with_and_without_opengl(
         (["whole", "--gif", "a.gif"], 2, "--gif is gone"),
         (["whole", "--png", "a.png", "--step", "9"], 2, "increment 9 "),
         (["swept"], 2, "not finished"),
-        (["swept", "--png", "a.png", "--step", "1"], 2, "--png"),
-        (["swept", "--png", "a.jpg"], 2, ".png"),
         (["swept", "--png", "a.png"], 2, "swept"),
         (["respelt", "--png", "a.png"], 2, "respelt"),
     ],
@@ -474,3 +408,24 @@ def test_an_effect_that_takes_seconds_is_refused_by_name(tmp_path: Path, capsys:
     assert main(["app", str(scene), "--set", "effects.large_deformation={}", "--no-browser"]) == 2
     said = capsys.readouterr().err.splitlines()
     assert "large_deformation" in said[-1]
+
+
+@pytest.mark.slow
+def test_the_window_off_screen_answers_its_controls(solid: Path, section: Path, tmp_path: Path) -> None:
+    for folder in (solid, section):
+        picture = tmp_path / f"{folder.parent.name}.png"
+        with running_child(
+            [sys.executable, "-P", "-m", "finger3d.plotting.window", str(folder), str(picture)]
+        ) as ended:
+            assert ended() is None
+        assert rgb(picture).std() > 10.0
+        assert marked(rgb(picture)) > 30
+
+
+def test_without_a_display_the_page_opens(section: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert main(["show", str(section)]) == 0
+    assert opened == [(section / "report.html").resolve().as_uri()]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 import subprocess
 import sys
 import time
@@ -135,18 +134,12 @@ def test_from_a_scene_to_mu_with_two_commands(tmp_path: Path, scene_file: Path, 
     [
         (["--gauge", "g63"], "--gauge g63"),
         (["--gauge", "g36", "--mu", "0.1,-0.2,0.3,0.4"], "--mu: -0.2"),
-        (["--gauge", "g36", "--mu", "0.1,nan,0.3,0.4"], "--mu: nan"),
         (["--gauge", "g36", "--mu", "0,0,0,0"], "1 different"),
         (["--gauge", "g36", "--mu", "a:b"], "first:last:count"),
-        (["--gauge", "g36", "--mu", "0:1:100000000"], "first:last:count"),
         (["--gauge", "g36", "--noise", "0"], "--noise 0"),
-        (["--gauge", "g36", "--noise", "1e300"], "--noise 1e+300"),
         (["--gauge", "g36", "--mu", "0.1,0.2,0.3,1e300"], "--mu: 1e+300"),
-        (["--gauge", "g36", "--tolerance", "depth_mm=1e300"], "1e+06"),
-        (["--gauge", "g36", "--resolution", "nan"], "--resolution nan"),
         (["--gauge", "g36", "--tolerance", "deep_mm=1"], '"depth_mm"'),
         (["--gauge", "g36", "--tolerance", "depth_mm"], "NAME=NUMBER"),
-        (["--gauge", "g36", "--tolerance", "nu=-1"], "from 0 up"),
         (["--gauge", "g36", "--set", "gauge=[]"], "[[gauge]]"),
     ],
 )
@@ -162,11 +155,6 @@ def test_calibrate_prints_json_alone(tmp_path: Path, scene_file: Path, capsys: A
     options = ["--gauge", "g36", "--out", tmp_path / "cal", "--mu", ",".join(map(str, FEW)), "--json", *none]
     assert run("calibrate", scene_file, *options) == 0
     assert json.loads(capsys.readouterr().out)["mu"] == list(FEW)
-
-
-def test_the_help_names_every_tolerance(capsys: Any) -> None:
-    assert run("calibrate", "--help") == 0
-    assert set(TOLERANCES) <= set(re.findall(r"\w+", capsys.readouterr().out))
 
 
 # --- command ``estimate``: readings on the command line and in files, and what is refused ----------------------------
@@ -191,12 +179,9 @@ def test_many_readings_from_a_csv(tmp_path: Path, capsys: Any) -> None:
     ("text", "options", "told"),
     [
         ("strain\n0.01\nabc\n", [], "line 3: strain = 'abc'"),
-        ("strain\n0.01\nnan\n", [], "line 3: strain = 'nan': must be a finite number"),
         ("strain\n1,25,7\n", [], "line 2: strain = '1,25,7': must be a finite number; it has more cells than names"),
-        ("time,strain\n0,0,061\n", [], "line 2: has 3 cells, and there are 2 columns"),
         ("x\n1\n", [], "a column named g or strain "),
         ("", [], "reading"),
-        ("strain,std\n0.01,-1\n", [], "std of g = -1.0"),
         ("strain\n0.01\n", ["--strain", "0.1"], "--csv"),
     ],
 )
@@ -219,17 +204,10 @@ def test_decimal_commas_are_read_from_files_and_streams(separator: str, tmp_path
     assert child.communicate(path.read_text())[0] == said
 
 
-@pytest.mark.parametrize("options", [["--strain", "1e300"], ["--strain", "0.01", "--std", "1e300"]])
-def test_a_reading_that_would_overflow_is_refused(options: list[str], tmp_path: Path, capsys: Any) -> None:
-    kept = save(curve(straight), tmp_path / "calibration.json")
-    assert run("estimate", kept, *options) == 2
-    assert "1e+300" in capsys.readouterr().err
-
-
 def test_estimate_of_nan_and_of_nothing(tmp_path: Path, capsys: Any) -> None:
     kept = save(curve(straight), tmp_path / "calibration.json")
-    assert run("estimate", kept, "--strain", "nan") == 2
-    assert "g = nan" in capsys.readouterr().err
+    for options, said in ((["nan"], "g = nan"), (["1e300"], "1e+300"), (["0.01", "--std", "1e300"], "1e+300")):
+        assert said in refused(capsys, "estimate", kept, "--strain", *options)
     assert run("estimate", kept) == 2
     assert run("estimate", kept, "--strain", "0.1", "--out", tmp_path / "x.csv") == 2
 
@@ -259,8 +237,6 @@ def test_the_command_takes_readings_by_name(tmp_path: Path, joint: Calibration, 
         (("--strain", "c=0.05"), "--strain c=0.05: c "),
         (("--strain", "a=much"), "NAME=NUMBER"),
         (("--strain", "a=0.05", "--strain", "a=0.06"), "--strain a=0.06: a "),
-        (("--strain", "a=nan", "--strain", "b=0.05"), "a = nan"),
-        (("--strain", "a=0.05", "--std", "b=-1"), "std"),
     ],
 )
 def test_commands_that_are_refused(
@@ -358,7 +334,6 @@ def pressed_scene(tmp_path: Path) -> Path:
     ("factor", "free", "told"),
     [
         (1000.0, FREE, "line 9: gauge_g36 ="),
-        (1.0, {"material.E_MP": (0.05, 5.0)}, "E_MP"),
         (-1.0, FREE, "of the opposite sign"),
         (1.0, {"press.depth_mm": (5.0, 6.0)}, "5"),
         (1.0, {"depth_offset_mm": (-1.0, 0.3)}, "line 9: depth_mm = 10: with depth_offset_mm = 0.3 it is 10.3, and "),
@@ -404,11 +379,8 @@ COARSE = [option for text in SETS for option in ("--set", text)]
     [
         (("--gauges", "0"), "--gauges 0: "),
         (("--gauges", "2", "--free", "finger.radius_mm=60:200"), "--gauges"),
-        (("--gauges", "2", "--tolerance", "depht_mm=1"), '"depth_mm"'),
         (("--gauges", "2", "--mu", "0.1,0.2"), "three"),
-        (("--gauges", "2", "--free", "gauge.x_mm=100:200"), "--free gauge.x_mm=100:200: no gauge"),
         (("--gauges", "2", "--free", "gauge.y_mm=-9:0"), "--free gauge.y_mm=-9:0: no gauge"),
-        (("--gauges", "2", "--noise", "1e300"), "--noise 1e+300: must be a finite number from 1e-12 to 1000"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, capsys: Any, options: tuple[str, ...], told: str) -> None:
@@ -444,16 +416,11 @@ def test_design_prints_json_alone(block: Path, tmp_path: Path, capsys: pytest.Ca
     [
         (["--free", "finger.radius_mm"], "KEY=LOW:HIGH"),
         (["--free", "finger.radius_mm=200:60"], "LOW"),
-        (["--free", "finger.radius_mm=60:inf"], "KEY=LOW:HIGH"),
-        (["--free", "finger.radus_mm=60:200"], '"radius_mm"'),
         (["--free", "gauge.g9.x_mm=1:2"], '"g9"'),
         (["--free", "gauge.g36.x_mm=1:2", "--free", "gauge.0.x_mm=1:3"], "gauge.0.x_mm"),
         (["--free", "gauge.g36.x_mm=1:2", "--gauge", "g9"], "--gauge g9"),
         (["--free", "gauge.g36.x_mm=1:2", "--budget", "0"], "--budget 0"),
         (["--free", "gauge.g36.x_mm=1:2", "--mu", "0.5,0.1"], "ascending"),
-        (["--free", "gauge.g36.x_mm=1:2", "--noise", "0"], "--noise 0"),
-        (["--free", "gauge.g36.x_mm=1:2", "--noise", "1e300"], "--noise 1e+300: must be a finite number"),
-        (["--free", "gauge.g36.x_mm=1:2", "--seed", "-1"], "--seed -1: must be a whole number from 0 up"),
     ],
 )
 def test_bad_input_is_one_line(options, expected, root, tmp_path, capsys) -> None:

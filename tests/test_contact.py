@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import get_args
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -13,13 +12,12 @@ from scipy.spatial import Delaunay
 from finger3d.contact.conditions import ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.law import ContactLaw, NormalLaw, Signorini
-from finger3d.contact.rules import RULES, STEP_DEPENDENT_RULES, RuleName, maeno_active_set
+from finger3d.contact.rules import RULES, RuleName, maeno_active_set
 from finger3d.contact.solve import solve_increment
-from finger3d.contact.state import ContactState, next_state, pressure
+from finger3d.contact.state import ContactState
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
-from finger3d.errors import Finger3dError, Outcome
+from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.tensors import bases_of
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
@@ -43,14 +41,6 @@ def test_projected_forces_are_admissible_and_projected_on_themselves(dim: int) -
         assert np.allclose(again, projected, rtol=1e-12)
 
 
-def test_without_friction_every_closed_point_slips() -> None:
-    problem, force = random_problem(3)
-    problem = replace(problem, friction=np.zeros(len(force)))
-    projected, status, _ = project_on_friction_cone(problem, force, problem.relative_displacement(force))
-    assert STICK not in status
-    assert (projected[:, 1:] == 0.0).all()
-
-
 def test_the_projection_and_the_residual_know_the_same_solutions() -> None:
     compliance, gap = half_plane(21, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 21) ** 2
     free = np.column_stack([gap - 0.3, np.full(21, -0.01)])
@@ -70,23 +60,6 @@ def test_the_projection_and_the_residual_know_the_same_solutions() -> None:
     harder = found.force + 0.1 * largest * np.outer(np.arange(21) == j, [0.0, np.sign(found.force[j, 1])])
     assert residual(harder, moved, found.status, mu, 1.0) == pytest.approx(0.1, rel=0.1)
     assert residual(found.force * np.nan, moved, found.status, mu, 1.0) == np.inf
-
-
-@pytest.mark.parametrize(
-    ("gap", "sign", "augmentation", "refusal"),
-    [
-        (0.0, 1.0, None, None),
-        (np.nan, 1.0, None, Outcome.NOT_FINITE),
-        (0.0, -1.0, None, Outcome.INDEFINITE),
-        (0.0, -1.0, np.ones((2, 2)), None),
-    ],
-)
-def test_what_cannot_be_solved_is_said_before_it_is_tried(
-    gap: float, sign: float, augmentation: np.ndarray | None, refusal: Outcome | None
-) -> None:
-    rest, operator = ContactState.at_rest(np.zeros(2), 2), sign * np.eye(4).reshape(2, 2, 2, 2)
-    problem = ContactProblem.of(rest, np.full((2, 2), gap), operator, ContactLaw(), 1.0, augmentation)
-    assert problem.refusal is refusal
 
 
 @dataclass(frozen=True)
@@ -114,14 +87,12 @@ def test_a_point_slips_at_the_coefficient_of_its_own_pressure() -> None:
     assert found.state.force[0] == pytest.approx([1.0, 0.9 / (1.0 + 2.0 / 2.0)], abs=1e-12)
 
 
-@pytest.mark.parametrize("guessed", [False, True])
-def test_pressure_dependent_coefficients_agree_with_the_pressures_found(guessed: bool) -> None:
+def test_pressure_dependent_coefficients_agree_with_the_pressures_found() -> None:
     compliance, gap, area = half_plane(41, 2, 0.2857, 0.05), np.linspace(-1.0, 1.0, 41) ** 2, np.full(41, 0.05)
     law, state = Saturating(0.8, 0.3), ContactState.at_rest(gap, 2)
     for depth, slide in ((0.2, 0.0), (0.4, 0.0), (0.4, 0.05), (0.4, 0.5)):
         free = np.column_stack([gap - depth, np.full(41, -slide)])
-        guess = np.full((41, 2), 0.01) if guessed else None
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(law), 1.0, area=area), guess)
+        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(law), 1.0, area=area))
         assert found.outcome.ok
         mu = law.coefficients(found.state.status, found.state.force[:, 0] / area)
         assert np.ptp(mu[found.state.force[:, 0] > 0.0]) > 0.1
@@ -143,15 +114,6 @@ def test_coefficients_that_never_agree_are_reported() -> None:
     )
     assert found.outcome is Outcome.NO_CONVERGENCE
     assert found.state is state
-
-
-@pytest.mark.parametrize("law", [Coulomb(0.3), TwoCoefficients(0.3, 0.5, "keep"), Saturating(0.3, 1.0)])
-def test_with_mu_changes_nothing_else(law: FrictionLaw) -> None:
-    assert law.with_mu(0.5) == type(law)(**(vars(law) | {"mu": 0.5}))
-    assert law.largest == 0.3
-    for value in (-1.0, float("nan"), True):
-        with pytest.raises(Finger3dError, match="mu"):
-            law.with_mu(value)
 
 
 @dataclass(frozen=True)
@@ -209,11 +171,6 @@ def test_every_rule_settles_a_normal_press(name: RuleName) -> None:
     assert found.outcome.ok
 
 
-def test_rules_are_those_that_a_scene_may_name() -> None:
-    assert set(RULES) == set(get_args(RuleName))
-    assert set(RULES) > STEP_DEPENDENT_RULES
-
-
 def test_where_it_settles_it_agrees_with_the_projection() -> None:
     compliance, gap = half_plane(21, 2, 0.2), np.linspace(-1, 1, 21) ** 2
     a = b = ContactState.at_rest(gap, 2)
@@ -248,33 +205,6 @@ def test_a_cycle_is_reported_and_never_called_converged() -> None:
     assert outcomes == {Outcome.CONVERGED, Outcome.CYCLED, Outcome.WRONG_WAY}
 
 
-def test_slip_adds_up_while_a_point_touches_and_displacement_always() -> None:
-    rest = ContactState.at_rest(np.ones(2), 2)
-    moved, force = np.array([[0.0, 0.1], [0.2, 0.3]]), np.array([[1.0, 0.5], [0.0, 0.0]])
-    status = np.array([SLIP, OPEN], dtype=np.int8)
-    after = next_state(next_state(rest, force, moved, status), force, moved, status)
-    assert after.tangential_displacement[:, 0] == pytest.approx([0.2, 0.6])
-    assert after.accumulated_slip[:, 0] == pytest.approx([0.2, 0.0])
-    assert after.gap == pytest.approx([0.0, 0.2])
-
-
-def test_forces_are_turned_into_the_scene_by_the_directions_of_their_points() -> None:
-    normal = np.array([[0.0, -1.0, 0.0], [0.6, -0.8, 0.0]])
-    state = replace(
-        ContactState.at_rest(np.zeros(2), 3), force=np.array([[1.0, 2.0, 3.0], [5.0, 0.0, 0.0]]), bases=bases_of(normal)
-    )
-    assert state.scene_force == pytest.approx(np.array([[2.0, -1.0, 3.0], [3.0, -4.0, 0.0]]))
-    assert state.of_points(np.array([1])).scene_force == pytest.approx(np.array([[3.0, -4.0, 0.0]]))
-    with pytest.raises(ValueError, match="directions"):
-        _ = ContactState.at_rest(np.zeros(2), 3).scene_force
-
-
-def test_pressure_is_unknown_without_an_area() -> None:
-    force = np.array([[2.0, 1.0], [3.0, 0.0]])
-    assert pressure(force, np.array([4.0, 0.5])) == pytest.approx([0.5, 6.0])
-    assert np.isnan(pressure(force, None)).all()
-
-
 MODULUS = 2.0
 
 
@@ -305,7 +235,7 @@ def half_extents(x: np.ndarray, state: ContactState) -> tuple[float, float]:
     return 0.5 * (ends[0][1] - ends[0][0]), 0.5 * (ends[1][1] - ends[1][0])
 
 
-@pytest.mark.parametrize("shift", np.linspace(0.0, 0.9, 7))
+@pytest.mark.parametrize("shift", np.linspace(0.0, 0.9, 3))
 def test_ends_are_known_better_than_the_points(shift: float) -> None:
     x = np.arange(-12.0, 12.0) + shift
     contact, stick = half_extents(x, cattaneo(x, 8.3, 5.1))
@@ -315,7 +245,7 @@ def test_ends_are_known_better_than_the_points(shift: float) -> None:
     assert stick == pytest.approx(5.1, abs=0.31)
 
 
-@pytest.mark.parametrize("size", [0.11, 0.08, 0.057])
+@pytest.mark.parametrize("size", [0.11, 0.057])
 def test_the_half_length_under_a_cylinder_is_that_of_hertz_within_an_eighth_of_a_spacing(size: float) -> None:
     block = designs()["block"](half_length_mm=40.0, height_mm=40.0, width_mm=1.0)
     model = Model(
@@ -341,18 +271,6 @@ def test_the_area_under_a_ball_is_that_of_hertz_within_a_tenth_of_a_spacing_all_
     numbers = measure(problem.points, list(march(problem))[-1])
     exact = math.pi * (0.75 * numbers["normal_force_N"] * 10.0 * (1.0 - 0.3**2)) ** (2.0 / 3.0)
     assert numbers["contact_area_mm2"] == pytest.approx(exact, rel=2.0 * 0.1 * 0.35 / 1.256)
-
-
-def test_the_order_of_the_points_does_not_matter() -> None:
-    x = np.arange(-12.0, 12.0)
-    mixed = np.random.default_rng(0).permutation(x)
-    assert half_extents(mixed, cattaneo(mixed, 8.3, 5.1)) == pytest.approx(half_extents(x, cattaneo(x, 8.3, 5.1)))
-
-
-def test_a_zone_that_reaches_the_last_point_ends_there() -> None:
-    x = np.arange(5.0)
-    for zone in on_line(x, cattaneo(x - 2.0, 100.0, 50.0)):
-        assert zone_ends(x, np.arange(5), zone) == (0.0, 4.0)
 
 
 def test_one_point_that_sticks_reaches_halfway_to_its_neighbours_and_none_nowhere() -> None:

@@ -9,16 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from finger3d.contact.acceleration import accelerated_newton, assemble_in_place, chord_step, threads_for, warm_start
-from finger3d.contact.conditions import ContactProblem, augmentation_parameters, project_on_friction_cone, residual
+from finger3d.contact.acceleration import accelerated_newton
+from finger3d.contact.conditions import ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.lemke import directions, friction_start, lemke
+from finger3d.contact.lemke import friction_start, lemke
 from finger3d.contact.newton import (
     ActiveSet,
     ActiveSetSystem,
     Iterate,
     NewtonResult,
-    Precision,
     assemble,
     block_gauss_seidel,
     force_of_sets,
@@ -52,7 +51,7 @@ def press(compliance: np.ndarray, gap: np.ndarray, path: list[tuple[float, ...]]
     return out
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     points=st.integers(1, 7),
@@ -81,7 +80,7 @@ def test_any_state_returned_as_converged_meets_every_condition(
             assert dim == 3 or mu > 1.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), points=st.integers(1, 8), mu=st.sampled_from(COEFFICIENTS))
 def test_in_two_dimensions_every_random_increment_settles(seed: int, points: int, mu: float) -> None:
     rng = np.random.default_rng(seed)
@@ -91,8 +90,8 @@ def test_in_two_dimensions_every_random_increment_settles(seed: int, points: int
     assert len(press(compliance, gap, path, mu)) == len(path)  # each settled, and its conditions proved, on the way
 
 
-@pytest.mark.parametrize("mu", COEFFICIENTS)
-@pytest.mark.parametrize("beta", [0.0, 0.2857, 0.5])
+@pytest.mark.parametrize("mu", [0.0, 0.25, 5.0, 1e6])
+@pytest.mark.parametrize("beta", [0.0, 0.2857])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_press_slide_release_press_settles(mu: float, beta: float, dim: int) -> None:
     x = np.linspace(-1.0, 1.0, 41)
@@ -118,15 +117,6 @@ def states_3d(points: int = 12) -> tuple[np.ndarray, np.ndarray, list[tuple[floa
     rng = np.random.default_rng(5)
     compliance = random_compliance(rng, points, 3, 0.5)
     return compliance, rng.uniform(0.0, 0.3, points), [(0.3, 0.0, 0.0), (0.6, 0.05, 0.1), (0.6, 0.2, -0.1)]
-
-
-def test_numbering_does_not_matter() -> None:
-    compliance, gap, path = states_3d()
-    order = np.random.default_rng(1).permutation(len(gap))
-    turned = press(compliance[order][:, :, order], gap[order], path, 0.3)
-    for a, b in zip(press(compliance, gap, path, 0.3), turned, strict=True):
-        assert np.array_equal(a.status[order], b.status)
-        assert np.abs(a.force[order] - b.force).max() < 1e-12
 
 
 def test_scene_turned_by_37_degrees_about_the_normal() -> None:
@@ -224,15 +214,6 @@ def test_one_point_coulomb_is_unique_below_its_critical_coefficient() -> None:
             press(compliance, np.array([0.0]), [tuple(rng.uniform(-1, 1, 2)) for _ in range(3)], mu)
 
 
-def test_no_touch_no_force() -> None:
-    compliance, gap, _ = states_3d()
-    free = np.column_stack([gap + 1.0, np.zeros((len(gap), 2))])
-    found = solve_increment(problem_of(compliance, free, 0.3, state=ContactState.at_rest(gap, 3)))
-    assert found.outcome.ok
-    assert not found.state.force.any()
-    assert (found.state.status == OPEN).all()
-
-
 Method = Callable[[ContactProblem, np.ndarray, int, bool], NewtonResult]
 
 
@@ -261,7 +242,7 @@ def pressed(method: Method, compliance: np.ndarray, gap: np.ndarray, mu: float) 
     return out
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.06, 0.25, 1.0, 10.0])
+@pytest.mark.parametrize("mu", [0.0, 0.25, 10.0])
 @pytest.mark.parametrize("case", [parabola, sphere])
 def test_plain_and_accelerated_newton_agree(case: Callable[[], tuple[np.ndarray, np.ndarray]], mu: float) -> None:
     fast, plain = (pressed(method, *case(), mu) for method in (accelerated_newton, newton))
@@ -269,9 +250,6 @@ def test_plain_and_accelerated_newton_agree(case: Callable[[], tuple[np.ndarray,
         assert np.array_equal(a.status, b.status)
         assert np.abs(a.force - b.force).max() < 1e-10 * b.force.max()
         assert np.abs(a.relative_displacement - b.relative_displacement).max() < 1e-11
-    assert sum(a.iterations for a in fast) <= sum(b.iterations for b in plain)
-    if case is sphere and 0.0 < mu <= 1.0:
-        assert sum(a.iterations for a in fast) < 0.5 * sum(b.iterations for b in plain)
 
 
 def test_what_single_precision_cannot_settle_is_settled_in_double() -> None:
@@ -284,101 +262,6 @@ def test_what_single_precision_cannot_settle_is_settled_in_double() -> None:
     found = accelerated_newton(problem, np.ones_like(free), 30, True)
     assert found.solved
     assert found.force[:, 0] == pytest.approx([1.0 / (2.0 - 1e-8)] * 2 + [1.0], rel=1e-7)
-
-
-@pytest.mark.parametrize(("dim", "accuracy"), [(2, 1e-12), (3, 1e-6)])  # round-off of double and of single precision
-def test_without_friction_the_warm_start_is_the_solution(dim: int, accuracy: float) -> None:
-    rng = np.random.default_rng(3)
-    compliance, free = random_compliance(rng, 9, dim, 1.0), rng.normal(size=(9, dim))
-    start = warm_start(problem_of(compliance, free, 0.0), np.zeros((9, dim)))
-    wanted = solve_increment(problem_of(compliance, free, 0.0))
-    assert wanted.outcome.ok
-    assert wanted.state.force[:, 0].max() > 0.0
-    assert np.abs(start - wanted.state.force).max() < accuracy * wanted.state.force.max()
-
-
-@pytest.mark.parametrize(("share", "kept"), [(1.0, True), (0.995, True), (0.9, False), (0.7, False)])
-def test_expected_forces_are_the_warm_start_if_they_nearly_fit(share: float, kept: bool) -> None:
-    compliance, gap = sphere()
-    free = np.stack([gap - 0.1, np.full(len(gap), 0.02), np.zeros(len(gap))], axis=1)
-    wanted = solve_increment(problem_of(compliance, free, 0.25, state=ContactState.at_rest(gap, 3))).state.force
-    expected = wanted.copy()
-    expected[:, 1:] *= share
-    start = warm_start(problem_of(compliance, free, 0.25), expected)
-    assert np.array_equal(start, expected) == kept
-    if not kept:
-        assert np.linalg.norm(start - wanted) < 0.1 * np.linalg.norm(expected - wanted)
-
-
-def test_the_warm_start_is_admissible_and_close() -> None:
-    compliance, gap = sphere()
-    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
-    wanted = solve_increment(problem_of(compliance, free, 0.25, 0.1))
-    assert wanted.outcome.ok
-    start = warm_start(problem_of(compliance, free, 0.25), np.zeros_like(free))
-    assert np.linalg.norm(start - wanted.state.force) < 1e-3 * np.linalg.norm(wanted.state.force)
-    assert (np.linalg.norm(start[:, 1:], axis=1) <= 0.25 * (1.0 + 1e-6) * start[:, 0]).all()
-
-
-def test_a_singular_operator_leaves_the_expected_forces() -> None:
-    force = np.array([[1.0, 0.0], [0.0, 0.0]])
-    problem = problem_of(np.ones((2, 2, 2, 2)), np.full((2, 2), -1.0), 0.3)
-    assert np.array_equal(warm_start(problem, force), force)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("precision", [np.float64, np.float32])
-@pytest.mark.parametrize("seed", range(4))
-def test_the_matrix_assembled_in_place_is_that_of_the_plain_assembly(dim: int, precision: Precision, seed: int) -> None:
-    problem, force = random_problem(dim, seed, points=12)
-    status = np.random.default_rng(seed).permutation(np.repeat([OPEN, STICK, SLIP], 4)).astype(np.int8)
-    status[:seed] = OPEN
-    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
-    wanted = assemble(problem, active, np.float64)
-    found = assemble_in_place(problem, active, precision)
-    assert found.dtype == precision
-    # an entry is a sum of at most nine products of numbers of order 1
-    assert np.abs(found - wanted).max() <= 50.0 * np.finfo(precision).eps * np.abs(wanted).max()
-
-
-def test_chord_steps_reduce_the_mismatch_of_slip_directions() -> None:
-    compliance, gap = sphere()
-    pressing = pressed(newton, compliance, gap, 0.25)[1]
-    free = np.stack([gap - 0.1, *np.zeros((2, len(gap)))], axis=1)
-    free[:, 1:] -= 0.01
-    problem = problem_of(compliance, free, 0.25)
-    found = newton(problem, pressing.force, 30, damped=False)
-    assert found.solved
-    slips = found.status == SLIP
-    assert slips.sum() > 5
-    # the system is assembled for slip directions that are 0.01 rad off
-    angle = 0.01 * np.random.default_rng(0).normal(size=len(gap))
-    turned = found.force.copy()
-    turned[slips, 1] -= (angle * found.force[:, 2])[slips]
-    turned[slips, 2] += (angle * found.force[:, 1])[slips]
-    before = Iterate.of(problem, turned)
-    assert (before.status == found.status).all()
-    system = ActiveSetSystem.of(problem, ActiveSet.of(problem, before.status, before.augmented_force))
-    force = chord_step(system, system.solution(), np.zeros_like(free))
-    mismatches = []
-    for _ in range(3):
-        iterate = Iterate.of(problem, force)
-        mismatches.append(iterate.mismatch)
-        force = chord_step(system, force, force - iterate.projected)
-    assert mismatches[1] < 0.1 * mismatches[0]
-    assert mismatches[2] < 0.1 * mismatches[1]
-
-
-def test_small_systems_run_on_one_thread() -> None:
-    from threadpoolctl import threadpool_info
-
-    with threads_for(600):
-        assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} == {1}
-
-
-def test_augmentation_is_isotropic_in_the_tangent_plane() -> None:
-    rho = augmentation_parameters(np.diag([1.0, 2.0, 4.0]), 3)
-    assert rho == pytest.approx(np.array([[1.0, 0.25, 0.25]]))
 
 
 def test_points_of_a_nearly_floating_body_stick_to_round_off() -> None:
@@ -396,7 +279,7 @@ def test_points_of_a_nearly_floating_body_stick_to_round_off() -> None:
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_newton_step_solves_the_linearised_projection_equation(dim: int, seed: int) -> None:
     problem, force = random_problem(dim, seed)
     # one iteration of the method makes the friction at slipping points admissible, where the system is the derivative
@@ -436,22 +319,6 @@ def test_the_matrix_is_that_of_the_blocks_written_out(dim: int) -> None:
     assert assemble(problem, active, np.float64) @ x == pytest.approx(image, rel=1e-9)
 
 
-def test_the_forces_of_an_active_set_are_admissible() -> None:
-    problem, force = random_problem(3, 4)
-    status = np.array([OPEN, STICK, SLIP, SLIP, STICK, OPEN, SLIP], dtype=np.int8)
-    active = ActiveSet.of(problem, status, Iterate.of(problem, force).augmented_force)
-    x = np.linspace(1.0, 2.0, active.size)
-    found = active.force(x)
-    assert not found[status == OPEN].any()
-    assert found[status == STICK].ravel() == pytest.approx(x[:6])
-    slipping = found[status == SLIP]
-    assert slipping[:, 0] == pytest.approx(x[6:9])
-    direction = Iterate.of(problem, force).augmented_force[status == SLIP, 1:]
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    assert np.sum(slipping[:, 1:] * direction, axis=1) == pytest.approx(0.5 * x[6:9])
-    assert direction[:, 0] * slipping[:, 2] - direction[:, 1] * slipping[:, 1] == pytest.approx(x[9:])
-
-
 def test_gauss_seidel_converges_to_the_solution_of_newton() -> None:
     problem, force = random_problem(3, 2)
     found = newton(problem, np.zeros_like(force), 60, damped=True)
@@ -463,7 +330,7 @@ def test_gauss_seidel_converges_to_the_solution_of_newton() -> None:
     assert np.abs(projected - swept).max() < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_solution_is_complementary(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(7, 7))
@@ -481,7 +348,7 @@ def test_without_a_solution_there_is_none() -> None:
     assert lemke(np.eye(2), np.array([-1.0, -2.0]), 0) is None
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_in_two_dimensions_the_active_set_is_that_of_the_solution(seed: int) -> None:
     problem, force = random_problem(2, seed)
     points = np.arange(len(force))
@@ -494,11 +361,3 @@ def test_in_two_dimensions_the_active_set_is_that_of_the_solution(seed: int) -> 
     assert np.array_equal(status, solution.status)
     exact = force_of_sets(problem, status, np.hstack([np.zeros((len(force), 1)), direction]))
     assert np.abs(exact - solution.force).max() < 1e-9 * np.abs(solution.force).max()
-
-
-def test_directions_span_the_tangent_plane() -> None:
-    assert directions(1).tolist() == [[1.0], [-1.0]]
-    polygon = directions(2, 6)
-    assert np.linalg.norm(polygon, axis=1) == pytest.approx(1.0)
-    assert polygon.sum(axis=0) == pytest.approx(0.0, abs=1e-14)
-    assert np.linalg.det(polygon[:2]) == pytest.approx(np.sin(np.pi / 3.0))

@@ -9,16 +9,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from finger3d.errors import Finger3dError
-from finger3d.fem.assembly import _CELLS_IN_CACHE, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh.simplex import quadratic
 from finger3d.fem.recovery.reactions import mean_traction_weights
 from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
-from finger3d.fem.tensors import bases_of, cofactor, determinant, rotated_delassus
-from finger3d.objects import vertical_frame
-from tests.contact_cases import random_compliance
+from finger3d.fem.tensors import cofactor, determinant
 from tests.meshes import full, grid
 from validation import cook, manufactured, patch_test
 from validation._common import mapped, side_load
@@ -33,45 +30,6 @@ def test_they_are_those_of_linear_algebra_singular_tensors_included() -> None:
     assert np.array_equal(cofactor(np.diag([1.0, 1.0, 0.0])), np.diag([0.0, 0.0, 1.0]))
 
 
-def unit_vectors(dim: int) -> np.ndarray:
-    vectors = np.random.default_rng(1).normal(size=(50, dim))
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_bases_are_orthonormal_and_begin_with_the_normal(dim: int) -> None:
-    normal = np.vstack([unit_vectors(dim), np.eye(dim)[1], -np.eye(dim)[1]])
-    bases = bases_of(normal)
-    assert np.array_equal(bases[:, 0], normal)
-    assert np.allclose(bases @ np.swapaxes(bases, 1, 2), np.eye(dim), atol=1e-12)
-    assert np.allclose(bases[-1], vertical_frame(dim))
-    # a rotation of the upright frame, not a reflection
-    assert np.allclose(np.linalg.det(bases), np.linalg.det(vertical_frame(dim)))
-
-
-def test_a_basis_is_turned_about_the_axis_across_both_normals() -> None:
-    normal = unit_vectors(3)
-    rotation = np.swapaxes(vertical_frame(3).T @ bases_of(normal), 1, 2)
-    axis = np.cross([0.0, -1.0, 0.0], normal)
-    assert np.allclose(np.einsum("cij,cj->ci", rotation, axis), axis, atol=1e-12)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_turned_compliance_is_that_of_turned_vectors(dim: int) -> None:
-    rng = np.random.default_rng(0)
-    compliance = random_compliance(rng, 5, dim)
-    turn = np.linalg.qr(rng.normal(size=(5, dim, dim)))[0]
-    force = rng.normal(size=(5, dim))
-    plain = np.einsum("idjk,jk->id", compliance, np.einsum("cki,ck->ci", turn, force))
-    assert np.einsum("idjk,jk->id", rotated_delassus(compliance, turn), force) == pytest.approx(
-        np.einsum("cik,ck->ci", turn, plain), rel=1e-10
-    )
-    assert rotated_delassus(compliance, np.tile(np.eye(dim), (5, 1, 1))) is compliance
-    some = np.array([3, 0])
-    of_some = rotated_delassus(compliance, turn[some], some)
-    assert of_some == pytest.approx(rotated_delassus(compliance, turn)[np.ix_(some, range(dim), some, range(dim))])
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("mixed", [False, True])
 def test_rigid_motions_cost_nothing_and_nothing_else_does(dim: int, mixed: bool) -> None:
@@ -84,27 +42,6 @@ def test_rigid_motions_cost_nothing_and_nothing_else_does(dim: int, mixed: bool)
     rigid = dim * (dim + 1) // 2
     assert np.abs(values[:rigid]).max() < 1e-12 * values[-1]
     assert values[rigid] > 1e-6 * values[-1]
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("mixed", [False, True])
-def test_other_numbers_of_the_nodes_give_the_same_matrix_in_another_order(dim: int, mixed: bool) -> None:
-    mesh = mapped(grid((20, 8) if dim == 2 else (5, 3, 4), 0.2), lambda x: x + 0.05 * np.sin(2 * x[:, ::-1]))
-    assert len(mesh.cells) > _CELLS_IN_CACHE
-    n, elastic = len(mesh.points), Elasticity.of(1.0, 0.3, mixed=mixed)
-    to = np.random.default_rng(0).permutation(n)
-    turned = Mesh(mesh.points[np.argsort(to)], to[mesh.cells], {})
-    one, other = stiffness(mesh, elastic), stiffness(turned, elastic)
-    upper = one.upper
-    assert upper.has_canonical_format
-    assert (upper.indices[upper.indptr[:-1]] == np.arange(upper.shape[0])).all()  # upper triangle, diagonal stored
-    order = (to[:, None] * dim + np.arange(dim)).ravel()
-    if mixed:
-        number = np.searchsorted(other.pressure_vertices, to[one.pressure_vertices])
-        order = np.concatenate([order, n * dim + number])
-    difference = full(other.upper)[order][:, order] - full(upper)
-    assert upper.nnz == other.upper.nnz
-    assert abs(difference).max() < 1e-14 * abs(upper).max()  # sums in another order
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -239,8 +176,3 @@ def test_a_traction_that_jumps_between_parts_is_not_smeared(dim: int) -> None:
         jumping = mean_traction_weights(mesh, "y-", box, moduli=(1.0, 50.0)) @ forces
         assert jumping == pytest.approx(mean, rel=1e-9)
         assert abs(mean_traction_weights(mesh, "y-", box) @ forces / mean - 1.0) > 1e-3
-
-
-def test_a_box_beside_the_face_is_refused() -> None:
-    with pytest.raises(Finger3dError, match="40 % of it is not on the face y-"):
-        mean_traction_weights(quadratic(grid((2, 2))), "y-", np.array([[[0.7], [1.2]]]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -19,8 +18,8 @@ from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.solids.bars import BarRelaxation, Bars
 from finger3d.fem.solids.deformed import stretch
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
-from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
-from finger3d.fem.tensors import InvertedError, determinant
+from finger3d.fem.solids.kelvin import InfiniteBody
+from finger3d.fem.tensors import determinant
 from tests.energies import energy_of_body
 from tests.meshes import full, grid
 from validation._common import mapped, side_load
@@ -43,14 +42,11 @@ def relaxing(solid: TotalLagrangian, rng: np.random.Generator) -> Relaxing:
     return Relaxing(0.7, 0.8, past + np.swapaxes(past, 1, 2))
 
 
-@pytest.mark.parametrize("relaxes", [False, True])
 @pytest.mark.parametrize(("dim", "nu", "plane_stress"), CASES)
-def test_tangent_is_the_derivative_of_the_internal_forces(
-    dim: int, nu: float, plane_stress: bool, relaxes: bool
-) -> None:
+def test_tangent_is_the_derivative_of_the_internal_forces(dim: int, nu: float, plane_stress: bool) -> None:
     mesh = mapped(grid((2,) * dim, 0.15), lambda x: x + 0.03 * np.sin(3 * x[:, ::-1]))
     rng, solid = np.random.default_rng(1), body(mesh, nu, plane_stress)
-    past = relaxing(solid, rng) if relaxes else None
+    past = relaxing(solid, rng)
     x = 0.015 * rng.normal(size=unknowns(solid))
     direction = rng.normal(size=len(x))
     ahead, behind = (solid.internal_forces(x + h * direction, past) for h in (1e-6, -1e-6))
@@ -143,12 +139,6 @@ def test_internal_forces_turn_with_a_superposed_rotation(dim: int) -> None:
     assert energy_of_body(solid, turned) == pytest.approx(energy_of_body(solid, x), rel=1e-12)
 
 
-def test_inverted_cells_are_an_error() -> None:
-    mesh = quadratic(grid((1, 1, 1)))
-    with pytest.raises(InvertedError):
-        body(mesh, 0.3).internal_forces(-2.0 * mesh.points.ravel())
-
-
 @pytest.mark.parametrize("terms", [((0.5, 2.0), (0.5, -2.0)), ((1.0, 8.0),), ((1.0, 1.3),)])
 @pytest.mark.parametrize("nu", [0.3, 0.49])
 def test_plane_stress_has_a_thickness_at_any_stretch(nu: float, terms: tuple[tuple[float, float], ...]) -> None:
@@ -161,23 +151,6 @@ def test_plane_stress_has_a_thickness_at_any_stretch(nu: float, terms: tuple[tup
     kirchhoff = law.stress(f) @ np.swapaxes(f, 1, 2)
     out_of_plane = kirchhoff[:, 2, 2] + material.bulk * (j - 1.0) * j
     assert np.abs(out_of_plane / (np.abs(kirchhoff).max(axis=(1, 2)) + material.bulk * j)).max() < 1e-10
-
-
-def test_newton_finds_the_thickness_at_any_strain_and_at_rest() -> None:
-    """Quadratic convergence: round-off at the root does not start a search by halves."""
-
-    class Counted(Ogden):
-        calls: ClassVar[int] = 0
-
-        def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
-            Counted.calls += 1
-            return super().principal_stress(stretches)
-
-    material = Hyperelastic.of(Counted(0.4, ((0.5, 2.0), (0.5, -2.0))), 0.499, plane_stress=True)
-    slopes = np.random.default_rng(2).normal(scale=0.2, size=(500, 2, 2))
-    slopes[::5] = 0.0
-    material.deformation(slopes)
-    assert Counted.calls < 12
 
 
 def test_thick_sphere_under_pressure() -> None:
@@ -231,8 +204,8 @@ def test_a_uniform_deformation_stretches_every_direction_by_its_gradient() -> No
         assert stretch(mesh, u, np.array([0.4, 0.6]), direction) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", [NeoHooke(1.0), MooneyRivlin(0.4, 0.3), Ogden(1.0, ((0.7, 2.0), (0.3, -2.0)))])
-@pytest.mark.parametrize(("nu", "plane_stress"), [(0.3, False), (0.3, True), (0.5, False), (0.5, True)])
+@pytest.mark.parametrize("law", [NeoHooke(1.0), Ogden(1.0, ((0.7, 2.0), (0.3, -2.0)))])
+@pytest.mark.parametrize(("nu", "plane_stress"), [(0.3, True), (0.5, False)])
 @pytest.mark.parametrize("relaxes", [False, True])
 def test_a_stiff_part_has_the_stress_of_its_law_without_round_off(
     law: IsochoricLaw, nu: float, plane_stress: bool, relaxes: bool
@@ -340,14 +313,3 @@ def test_a_patch_is_the_integral_of_its_point_forces() -> None:
     expected = dblquad(point, begin, end, low, high)[0] / ((end - begin) * (high - low))
     found = body.self_displacement(*(np.array(v) for v in (begin, end, low, high, s, z)))
     assert found == pytest.approx(expected, rel=1e-7)
-
-
-@pytest.mark.parametrize("thickness", [None, 2.0])
-def test_bars_unload_themselves_and_the_matrix_is_symmetric(thickness: float | None) -> None:
-    body = InfiniteBody(E, NU, thickness=thickness)
-    foil = FoilPatches.of(np.zeros(3), X, 4.0, 1.0, 8, 1 if thickness else 3)
-    own = foil.strain_due_to(foil, body)
-    assert own.shape == (len(foil.area), len(foil.area))
-    pull = own * foil.area if thickness is None else own
-    assert (np.diag(own) > 0.0).all()  # a bar that pulls at its ends stretches the body between them
-    assert np.isfinite(pull).all()

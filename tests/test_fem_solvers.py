@@ -13,7 +13,6 @@ import scipy.sparse as sp
 from finger3d.errors import MissingError
 from finger3d.fem.solvers import mumps, pardiso
 from finger3d.fem.solvers.condense import condense, is_installed
-from finger3d.fem.solvers.factors import WholeSolutions
 from tests.meshes import SOLVERS, held_cube
 
 
@@ -49,25 +48,6 @@ def test_elimination_gives_the_rows_before_their_forces_are_known(solver: str, c
     want = found.solve(load + padded.T @ force)
     assert eliminated.unknowns(force).shape == load.shape
     assert np.abs(eliminated.unknowns(force) - want).max() < 1e-11 * np.abs(want).max()
-
-
-STIFFNESS = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]])
-
-
-class Dense(WholeSolutions):
-    def __init__(self) -> None:
-        self.rows, self.solved = sp.csr_matrix([[1.0, 0.0, 2.0]]), 0
-
-    def solve(self, load: np.ndarray) -> np.ndarray:
-        self.solved += 1
-        return np.linalg.solve(STIFFNESS, load)
-
-
-def test_without_row_forces_nothing_is_solved_again() -> None:
-    factor = Dense()
-    eliminated, _ = factor.eliminated(np.ones((3, 2)))
-    assert factor.substituted(eliminated, np.zeros((1, 2))) is eliminated
-    assert factor.solved == 1
 
 
 needs_mumps = pytest.mark.skipif(not is_installed("mumps"), reason="needs the extra mumps")
@@ -126,12 +106,6 @@ def test_bodies_that_share_the_library_do_not_disturb_each_other() -> None:
     del other
     gc.collect()
     assert np.array_equal(first.solve(load), want)
-
-
-@needs_mumps
-def test_a_header_of_another_form_is_an_import_error() -> None:
-    with pytest.raises(ImportError):
-        mumps._declarations("typedef struct { int n; } OTHER;")
 
 
 @pytest.mark.skipif(not is_installed("pardiso"), reason="no MKL")

@@ -16,7 +16,6 @@ from finger3d.geometry.design import check_core, check_layer
 from finger3d.geometry.registry import designs
 from finger3d.geometry.section import (
     Core,
-    Section,
     block_section,
     cylinder_section,
     largest_core_mm,
@@ -30,7 +29,7 @@ from tests.designs import GOOD, make
 
 
 @pytest.mark.parametrize("name", GOOD)
-@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 1e-3, 2e4, "5", True])
+@pytest.mark.parametrize("value", [-1.0, math.nan, 2e4, "5"])
 def test_every_dimension_refuses_what_is_no_length(name: str, value: Any) -> None:
     for key in GOOD[name]:
         with pytest.raises(Finger3dError) as refused:
@@ -88,10 +87,8 @@ def test_dimensions_that_do_not_fit_together_name_key_value_and_limit(changes: d
         ({"half_length_mm": 10.0}, r"skin_mm = 1: .*half_length_mm .*radius_mm"),
         ({"edge_height_mm": 0.2, "skin_mm": 1.0}, r"skin_mm = 1: .*below 0\.1"),
         ({"core_height_mm": 0.0}, r"core_height_mm = 0, .*core_half_length_mm"),
-        ({"core_half_length_mm": 0.0}, r"core_half_length_mm = 0, .*core_height_mm"),
         ({"core_half_length_mm": 8.5}, r"core_half_length_mm = 8\.5 .*at most 8 mm"),
         ({"core_height_mm": 10.9}, r"core_height_mm = 10\.9: .*below 10\.4"),
-        ({"core_height_mm": 11.9, "skin_mm": 0.0}, r"core_height_mm = 11\.9: "),
     ],
 )
 def test_parts_that_overlap_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
@@ -164,12 +161,6 @@ def test_parts_that_do_not_fit_are_refused() -> None:
         check_core("fig9", fig9, 10.0, largest_core_mm(fig9, 10.0))
     assert largest_core_mm(fig9, 50.0) == pytest.approx(36.6)
     assert largest_layer_mm(block_section(3.0, 2.0)) == 2.0
-
-
-@pytest.mark.parametrize("section", [cylinder_section(100.0, 50.0, 36.6), block_section(20.0, 15.0)])
-def test_fractions_are_the_inverse_of_points(section: Section) -> None:
-    u = np.linspace(0.0, 1.0, 11)
-    np.testing.assert_allclose(section.contact.fraction(section.contact.at(u)[:, 0]), u, atol=1e-14)
 
 
 # --- CAD of designs: labels of faces, cuts, and what is no finger ----------------------------------------------------

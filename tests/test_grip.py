@@ -171,7 +171,6 @@ def test_the_least_grip_of_a_plate() -> None:
         ({"object": {"shape": "plane"}}, "two fingers hold a closed body"),
         ({"object": {"shape": "cylinder", "radius_mm": 4.0}}, "a cylinder with length_mm"),
         ({"press": {"depth_mm": 1.0}}, "must not stand beside"),
-        ({"grip": {"steps": 3}}, "either force_N or closing_mm"),
         ({"grip": {"force_N": 1.0, "closing_mm": 1.0}}, "either force_N or closing_mm"),
         ({"grip": {"force_N": 1.0, "mass_g": 1.0}, "model": {"domain": "plane-strain"}}, "grip.down"),
         ({"effects": {"viscosity": {"prony": [[0.3, 0.5]]}}}, "not with"),

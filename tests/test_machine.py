@@ -13,21 +13,17 @@ import tomllib
 from importlib import metadata
 from importlib.metadata import packages_distributions
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import finger3d
-from finger3d import _extras, _machine
+from finger3d import _extras
 from finger3d._machine import (
     PACKAGES,
     child_environment,
     cores,
-    made_with,
-    memory_bytes,
-    source_hash,
     versions,
 )
 from finger3d.errors import MissingError
@@ -46,29 +42,6 @@ def test_versions_are_those_installed_and_absent_packages_are_left_out() -> None
     assert set(found) <= {"python", *PACKAGES}
 
 
-def test_the_source_of_designs_effects_and_tables_shapes_numbers(tmp_path: Path, monkeypatch) -> None:
-    package = tmp_path / "finger3d"
-    files = [package / "effects" / "own.py", package / "silicones.toml", tmp_path / "geometries" / "own.py"]
-    for file in files:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text("1")
-    monkeypatch.setattr(_machine, "__file__", str(package / "_machine.py"))
-    source_hash.cache_clear()
-    found = {made_with()["the source of finger3d and its designs"]}
-    for file in files:
-        file.write_text("2")
-        source_hash.cache_clear()
-        found.add(source_hash())
-    source_hash.cache_clear()
-    assert len(found) == 4
-    assert "matplotlib" not in made_with()
-
-
-def test_changing_the_answer_changes_no_later_one() -> None:
-    versions()["numpy"] = "0"
-    assert versions()["numpy"] != "0"
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no processor affinity")
 def test_only_cores_that_may_be_used_count() -> None:
     allowed = os.sched_getaffinity(0)
@@ -79,20 +52,10 @@ def test_only_cores_that_may_be_used_count() -> None:
         os.sched_setaffinity(0, allowed)
 
 
-def test_available_memory_is_part_of_all() -> None:
-    found = memory_bytes()
-    assert found is None or 0 < found[1] <= found[0]
-
-
 def test_a_child_imports_the_same_package(tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-c", "import finger3d; print(finger3d.__file__)"]
     done = subprocess.run(command, env=child_environment(), cwd=tmp_path, capture_output=True, text=True, check=True)
     assert Path(done.stdout.strip()) == Path(finger3d.__file__)
-
-
-def test_an_existing_path_is_kept_behind_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
-    assert child_environment()["PYTHONPATH"].endswith(":/elsewhere")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only the Linux kernel ends a child with its parent")
@@ -117,25 +80,6 @@ def _runs(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
-
-
-def test_an_address_space_without_room_for_the_libraries_is_recognised(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
-    for limit, enough in ((None, True), (10**8, False), (10**10, True)):
-        monkeypatch.setattr(_machine, "address_limit", lambda limit=limit: limit)
-        assert _machine.enough_address_space() == enough
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "200")  # each takes a stack and buffers
-    assert not _machine.enough_address_space()
-
-
-def test_buffers_that_do_not_fit_are_an_error_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_machine, "address_limit", lambda: 10**9)
-    _machine.reserve_for_linear_algebra()
-    monkeypatch.setattr(_machine, "_BUFFERS_BYTES", 2**62)
-    with pytest.raises(MemoryError):
-        _machine.reserve_for_linear_algebra()
-    monkeypatch.setattr(_machine, "address_limit", lambda: None)
-    _machine.reserve_for_linear_algebra()
 
 
 KILLED = """
@@ -238,42 +182,6 @@ def test_a_requirement_names_command_extra_and_a_way_around(monkeypatch: pytest.
     monkeypatch.setattr(_extras, "find_spec", lambda module: None)
     with pytest.raises(MissingError, match=r'^show needs pyvista: .* -m pip install .*\[view\]", or add --png FILE$'):
         _extras.require("show", "pyvista", instead="add --png FILE")
-
-
-def test_an_import_that_fails_inside_an_installed_package_is_no_missing_extra() -> None:
-    assert _extras.absent(ModuleNotFoundError("No module named 'pyvista.odd'", name="pyvista.odd")) is None
-    assert _extras.absent(ModuleNotFoundError("No module named 'other'", name="other")) is None
-    assert _extras.absent(ImportError("cannot load", name="pyvista")) is None
-
-
-@pytest.mark.parametrize(
-    ("record", "said"),
-    [
-        ('{"url": "file:///home/a%20b/finger3d", "dir_info": {}}', '"/home/a b/finger3d[cad]"'),
-        ('{"url": "file:///tmp/finger3d-0.1.0-py3-none-any.whl"}', '"/tmp/finger3d-0.1.0-py3-none-any.whl[cad]"'),
-        (None, '"finger3d[cad]"'),
-    ],
-)
-def test_the_hint_of_an_installed_package_names_what_it_came_from(record, said, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(_extras, "__file__", str(tmp_path / "site-packages" / "finger3d" / "_extras.py"))
-    monkeypatch.setattr(_extras, "distribution", lambda name: SimpleNamespace(read_text=lambda file: record))
-    assert _extras.install("cad") == f"{sys.executable} -m pip install {said}"
-
-
-def test_the_full_extra_brings_what_the_readme_shows(root: Path) -> None:
-    extras = tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    text = (root / "README.md").read_text(encoding="utf-8")
-    shown = {
-        "pandas": "to_dataframe()",
-        "pyvista": "to_pyvista()",
-        "dash": "`app`",
-        "build123d": "`export`",
-    }
-    assert all(words in text for words in shown.values())
-    own = re.findall(r"\w+", extras["full"][0].partition("[")[2])
-    brought = {re.match(r"[\w-]+", line)[0] for name in own for line in extras[name]}
-    brought |= {re.match(r"[\w-]+", line)[0] for line in extras["full"][1:]}
-    assert set(shown) <= brought
 
 
 def test_a_command_that_lacks_its_extra_ends_with_one_line(root, paper_scene, tmp_path, monkeypatch) -> None:

@@ -10,38 +10,24 @@ import pytest
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
-from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, quadratic
+from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.fem.surface.traces import BoundarySurface, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build, mesh_part
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
+from finger3d.mechanics.discretise.contact_geometry import contact_geometry
 from finger3d.mechanics.discretise.moved_mesh import stretched
-from finger3d.mechanics.discretise.problem import object_share, rigid_gap, scatter_to_points, under_pressure
 from finger3d.mechanics.discretise.regular_points import regular_points
-from finger3d.mechanics.discretise.symmetry import held_dofs, symmetry
+from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import Cylinder, MeshObject, ObjectPose, Plane, RigidObject, Sphere, Wave, Wedge
-from tests.contact_cases import random_compliance
-from tests.logs import Log
+from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.meshes import grid, part_volume
 from tests.models import block, fig9, last, run
 from tests.soft_object_cases import half_ball, pad
 from validation._increments import imbalance
-
-
-@pytest.mark.parametrize("domain", ["solid", "plane-strain"])
-def test_points_that_touch_come_first(domain: str) -> None:
-    """The object sinks into the points in nearly the order of their distance: products end with the last that bears."""
-    problem, frames = run(fig9(domain=domain))
-    for frame in frames:
-        touching = np.flatnonzero(frame.meshed_state.contact.force[:, 0])
-        assert touching[-1] < 1.1 * len(touching) + 1
-    assert len(touching) < 0.9 * len(problem.surface.nodes)
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
@@ -65,17 +51,6 @@ def test_solvers_behind_the_same_interface_agree(monkeypatch: pytest.MonkeyPatch
     assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=1e-11)
 
 
-def test_a_long_press_is_announced_before_it_is_condensed(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = fig9(domain="plane-strain")
-    said = {}
-    for seconds in (0.0, 1e3):
-        monkeypatch.setattr("finger3d.mechanics.discretise.build._LONG_S", seconds)
-        build(model, log := Log())
-        said[seconds] = [line for line in log.lines if line.startswith("warning: mesh.size_mm = 2 takes about ")]
-    assert len(said[0.0]) == 1
-    assert not said[1e3]
-
-
 COARSE = MeshOptions(1.5, 1.5, "swept")
 
 
@@ -91,41 +66,6 @@ def test_forces_on_the_whole_finger_are_those_of_the_part_and_its_images() -> No
     (row,) = (gauge.rows(problem.meshed_body) for gauge in problem.model.gauges)
     (reading,) = problem.read(force).values()
     assert reading == pytest.approx((row @ problem.unknowns(force)[: row.shape[1]]).item(), rel=1e-9)
-    together = list(problem.unknowns_of([force, 2.0 * force, 0.0 * force]))
-    assert together[1] == pytest.approx(2.0 * together[0], rel=1e-12, abs=1e-15)
-    for one, other in zip(together, problem.unknowns_of([force, 2.0 * force, 0.0 * force], block=1), strict=True):
-        assert other == pytest.approx(one, rel=1e-12, abs=1e-15)
-
-
-def test_a_reduced_problem_has_no_mesh() -> None:
-    problem = replace(build(block(mesh=COARSE)), condensed_body=None)
-    with pytest.raises(Finger3dError, match="mesh"):
-        _ = problem.mesh
-
-
-def test_what_cannot_touch_has_no_gap() -> None:
-    problem = build(block(mesh=COARSE, object=Plane()))
-    gap = rigid_gap(problem.placed(ObjectPose(0.2)), problem.surface)
-    on_face = problem.surface.points[:, 1] == 3.0
-    assert gap[on_face] == pytest.approx(np.full(on_face.sum(), -0.2), abs=1e-9)
-    assert np.isinf(gap[~on_face]).all()
-    assert problem.gap(ObjectPose(0.2))[on_face] == pytest.approx(gap[on_face])
-
-
-def test_directions_that_symmetry_holds_are_not_coupled() -> None:
-    rows = random_compliance(np.random.default_rng(0), 3, 2).reshape(6, 6)[:5, :5]
-    active = np.array([0, 2, 3])
-    out = scatter_to_points(rows, active, 2, 2).reshape(4, 4)
-    assert np.array_equal(out[np.ix_(active, active)], rows[:3, :3])
-    assert np.array_equal(out[1], [0.0, rows[:3, :3].diagonal().max(), 0.0, 0.0])
-
-
-def test_of_two_equal_bodies_each_has_half_of_the_displacement() -> None:
-    problem = build(block(mesh=COARSE, object=Plane()))
-    own = under_pressure(problem.surface, problem.delassus)
-    assert object_share(own, own) == pytest.approx(np.full(len(own), 0.5))
-    assert object_share(own, 0.0 * own) == pytest.approx(np.zeros(len(own)))
-    assert object_share(own, 3.0 * own) == pytest.approx(np.full(len(own), 0.75))
 
 
 @pytest.mark.parametrize(
@@ -156,15 +96,6 @@ def test_the_whole_finger_is_the_part_and_its_mirror_images(domain: Domain) -> N
     assert whole.force[mirrored, 0] == pytest.approx(whole.force[:, 0])
     assert whole.force[mirrored, 1] == pytest.approx(-whole.force[:, 1])
     assert (whole.status[mirrored] == whole.status).all()
-
-
-def test_points_on_a_symmetry_plane_do_not_move_across_it() -> None:
-    problem = build(block())
-    held = held_dofs(problem.body.mesh, problem.axes, held_ends=False)
-    on_plane = np.flatnonzero(problem.body.mesh.points[:, 0] == 0.0)
-    assert set(on_plane * 3) <= set(held)
-    row = np.flatnonzero(problem.surface.points[:, 0] == 0.0) * 3 + 1
-    assert not set(row) & set(problem.system.active_dofs)
 
 
 def top(dim: int) -> BoundarySurface:
@@ -199,14 +130,6 @@ def test_the_normal_of_a_ball_is_the_mean_direction_to_its_centre() -> None:
     assert made.angles(made) == pytest.approx(np.zeros(len(wanted)))
 
 
-def test_normals_on_a_symmetry_plane_lie_in_it() -> None:
-    face, normal = top(3), np.array([0.6, -0.8, 0.0])
-    made = contact_geometry(lambda at: (at @ normal, np.tile(normal, (len(at), 1))), face, axes=("x",))
-    on_plane = face.points[:, 0] == 0.0
-    assert np.allclose(made.bases[on_plane, 0], [0.0, -1.0, 0.0])
-    assert np.allclose(made.bases[~on_plane, 0], normal)
-
-
 def test_an_object_as_soft_as_the_finger_meets_it_half_way() -> None:
     face, tilt = top(2), 0.2
     normal = np.array([np.sin(tilt), -np.cos(tilt)])
@@ -214,15 +137,6 @@ def test_an_object_as_soft_as_the_finger_meets_it_half_way() -> None:
         lambda at: (at @ normal, np.tile(normal, (len(at), 1))), face, object_share=np.full(len(face.points), 0.5)
     )
     assert np.allclose(made.bases[:, 0], [np.sin(tilt / 2.0), -np.cos(tilt / 2.0)])
-
-
-def test_walls_touch_only_what_they_face() -> None:
-    wall = surface(quadratic(grid((2, 2))), "x+")
-    below, beside = np.tile([0.0, -1.0], (len(wall.points), 1)), np.tile([-1.0, 0.0], (len(wall.points), 1))
-    wall = replace(wall, face=np.full(len(wall.points), FREE_FACES.index("walls"), dtype=np.int8))
-    assert not may_touch(wall, below).any()
-    assert may_touch(wall, beside).all()
-    assert may_touch(replace(wall, face=np.full(len(wall.points), CONTACT, dtype=np.int8)), below).all()
 
 
 def test_points_have_the_distance_asked_for_and_lie_on_the_surface() -> None:
@@ -234,27 +148,6 @@ def test_points_have_the_distance_asked_for_and_lie_on_the_surface() -> None:
     # the circle of radius 100 mm through the top at 50 mm
     height = 36.6 + np.sqrt(100.0**2 - points.points[:, 0] ** 2) - np.sqrt(100.0**2 - 50.0**2)
     assert points.points[:, 1] == pytest.approx(height, rel=1e-12)
-
-
-@pytest.mark.parametrize("domain", ["solid", "plane-strain"])
-def test_means_of_a_linear_function_are_its_values_at_inner_points(domain: str) -> None:
-    points = regular_points(block(domain=domain), (-1.0, 1.0, -1.0, 1.0), 0.5)
-    ends = np.abs(points.points - points.points.mean(axis=0)).max(axis=0)
-    inner = (np.abs(points.points[:, ::2]) < ends[::2] - 1e-9).all(axis=1)
-    assert inner.any()
-    slope = np.array([0.3, 0.0, -0.7])[: points.points.shape[1]]
-    assert (points.average @ (points.samples @ slope))[inner] == pytest.approx(
-        (points.points @ slope)[inner], abs=1e-12
-    )
-    assert np.asarray(points.average.sum(axis=1)).ravel() == pytest.approx(np.ones(len(points.points)))
-
-
-def test_the_box_ends_with_the_finger_and_a_place_lies_between_four_points() -> None:
-    points = regular_points(block(), (-9.0, 9.0, -9.0, 9.0), 0.7, np.array([0.2, 0.1]))
-    assert np.abs(points.points[:, 0]).max() == 4.0
-    assert np.abs(points.points[:, 2]).max() == 2.0
-    near = np.sort(np.hypot(points.points[:, 0] - 0.2, points.points[:, 2] - 0.1))[:4]
-    assert near == pytest.approx(np.full(4, 0.35 * np.sqrt(2.0)))
 
 
 CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)
@@ -274,10 +167,8 @@ def with_dimension(model: Model, name: str, change: float) -> Model:
     return replace(model, design=replace(model.design, **{name: getattr(model.design, name) + change}))
 
 
-@pytest.mark.parametrize(
-    "design", [CLIPPED, designs()["hemisphere"](radius_mm=4.0), FINGERTIP], ids=lambda design: design.name
-)
-def test_an_unstructured_mesh_stretches_with_the_dimensions(design: Any) -> None:
+def test_an_unstructured_mesh_stretches_with_the_dimensions() -> None:
+    design = FINGERTIP
     model = replace(UNSTRUCTURED, design=design, parts=PARTS if design.part_labels else ())
     mesh = build(model).mesh
     for name in design.dimensions:
@@ -287,7 +178,7 @@ def test_an_unstructured_mesh_stretches_with_the_dimensions(design: Any) -> None
         assert growth == pytest.approx(wanted[1] - wanted[0], rel=0.05, abs=1e-9), name  # facets cut off the round
 
 
-@pytest.mark.parametrize("name", CLIPPED.dimensions)
+@pytest.mark.parametrize("name", ["radius_mm", "width_mm"])
 def test_a_stretched_mesh_is_that_of_the_other_design(name: str) -> None:
     problem = build(replace(UNSTRUCTURED, mesh=MeshOptions(0.8, 1.2, "swept")))
     other = with_dimension(problem.model, name, 0.1).design
@@ -299,7 +190,7 @@ def test_a_stretched_mesh_is_that_of_the_other_design(name: str) -> None:
     assert curved_volume(mesh) == pytest.approx(other.volume_mm3, rel=1e-4)
 
 
-@pytest.mark.parametrize("name", FINGERTIP.dimensions)
+@pytest.mark.parametrize("name", ["radius_mm", "skin_mm", "core_height_mm"])
 def test_parts_follow_the_section_of_a_body(name: str) -> None:
     model = replace(UNSTRUCTURED, design=FINGERTIP, parts=PARTS, mesh=MeshOptions(0.8, 1.2, "swept"))
     other = with_dimension(model, name, 1e-4)
@@ -314,14 +205,13 @@ def test_parts_follow_the_section_of_a_body(name: str) -> None:
 
 
 SHAPES: list[RigidObject] = [
-    Plane(), Plane(tilt=0.05), Cylinder(radius_mm=4.0), Cylinder(0.3, radius_mm=4.0), Cylinder(radius_mm=4.0, axis="x"),
+    Plane(tilt=0.05), Cylinder(0.3, radius_mm=4.0), Cylinder(radius_mm=4.0, axis="x"),
     Wedge(angle=0.2, tip_radius_mm=1.0), Wave(wavelength_mm=3.0, amplitude_mm=0.1),
-    Wave(wavelength_mm=3.0, amplitude_mm=0.1, axis="x"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("obj", SHAPES, ids=lambda o: f"{type(o).__name__} {getattr(o, 'axis', '')}")
-@pytest.mark.parametrize("domain", ["plane-strain", "plane-stress", "solid"])
+@pytest.mark.parametrize("domain", ["plane-strain", "solid"])
 def test_a_stiff_object_is_the_rigid_one_and_a_soft_one_gives(obj: RigidObject, domain: Any) -> None:
     rigid = run(pad(object=obj, domain=domain))
     stiff = run(Effect(1e12, 0.3).apply(pad(object=obj, domain=domain)))
@@ -357,7 +247,7 @@ def test_compliances_add_under_a_rigid_punch_of_uniform_pressure() -> None:
     assert default["normal_force_N"] == pytest.approx(0.3 * 48.0 / (3.0 / 1.0 + 3.0 / 2.0), rel=1e-10)
 
 
-@pytest.mark.parametrize("obj", [Cylinder(radius_mm=4.0, axis="x"), Wedge(angle=0.2, tip_radius_mm=1.0), Plane()])
+@pytest.mark.parametrize("obj", [Cylinder(radius_mm=4.0, axis="x"), Plane()])
 def test_quarter_and_whole_agree(obj: RigidObject) -> None:
     model = Effect(1.0, 0.49).apply(pad(object=obj))
     a, b = last(replace(model, symmetry=("x", "z"))), last(replace(model, symmetry=()))

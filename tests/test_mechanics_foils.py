@@ -21,7 +21,7 @@ from finger3d.fem.assembly import Stiffness
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh.simplex import CONTACT
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
-from finger3d.fem.solvers.condense import condense, spring_forces, stiffened
+from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
@@ -31,7 +31,6 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
-from finger3d.scene.scene import parse
 from tests.foil_cases import FOIL, LEGS, MIDDLE, block
 from tests.models import marched
 from tests.scenes import HALF_CYLINDER, changed, written
@@ -40,26 +39,9 @@ from validation._foil import wing
 ASIDE = Gauge("a", 1.3, 1.7, 0.4, 0.5, 1.5)
 
 
-def test_springs_on_rows_are_those_of_the_stiffer_body() -> None:
-    rng = np.random.default_rng(0)
-    rows = rng.normal(size=(5, 9))
-    stiff = rng.normal(size=(9, 9))
-    stiff = stiff @ stiff.T + np.eye(9)
-    springs = np.array([2.0, 0.0, 1e6])
-    soft = rows @ np.linalg.solve(stiff, rows.T)
-    soft = 0.5 * (soft + soft.T)
-    hard = rows @ np.linalg.solve(stiff + rows[2:].T @ (springs[:, None] * rows[2:]), rows.T)
-    assert stiffened(soft, springs) == pytest.approx(hard, abs=1e-9)
-    force = np.array([1.0, -2.0, 0.0, 0.0, 0.0])
-    assert spring_forces(soft, springs, soft @ force) == pytest.approx(-springs * (hard @ force)[2:], abs=1e-9)
-    assert np.array_equal(stiffened(soft, np.zeros(3)), soft)
-    assert stiffened(soft, np.zeros(0)) is soft
-
-
-@pytest.mark.parametrize("nu", [0.3, 0.49])
 @pytest.mark.parametrize("domain", ["plane-strain", "plane-stress", "solid"])
-def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> None:
-    model = FOIL.apply(block(domain=domain, material=Isotropic(1.0, nu), gauges=(MIDDLE, ASIDE)))
+def test_condensed_foils_are_foils_in_the_stiffness(domain: str) -> None:
+    model = FOIL.apply(block(domain=domain, material=Isotropic(1.0, 0.49), gauges=(MIDDLE, ASIDE)))
     problem = build(model)
     assert problem.factorizations == 1
     inlay = discretised_foils(model.inclusions, model, problem.mesh, problem.axes)
@@ -75,19 +57,6 @@ def test_condensed_foils_are_foils_in_the_stiffness(domain: str, nu: float) -> N
     mesh_alone[r:, r:] -= problem.inclusions.subgrid_compliance
     found = stiffened(mesh_alone, problem.inclusions.bar_stiffness)[: r + 2, : r + 2]
     assert found == pytest.approx(direct, abs=1e-8 * direct.max())
-
-
-def test_the_rows_of_gauges_are_means_of_their_bars() -> None:
-    model = FOIL.apply(block(domain="plane-strain", gauges=(MIDDLE, ASIDE)))
-    problem = build(model)
-    inlay = discretised_foils(model.inclusions, model, problem.mesh, problem.axes)
-    whole, r = problem.body.condensed.compliance, len(problem.system.active_dofs)
-    assert inlay.gauge_weights.sum(axis=1) == pytest.approx(1.0)
-    assert whole[r : r + 2] == pytest.approx(inlay.gauge_weights @ whole[r + 2 :], abs=1e-12 * whole.max())
-    assert (
-        np.linalg.eigvalsh(problem.inclusions.subgrid_compliance).min()
-        > -1e-3 * np.abs(problem.inclusions.subgrid_compliance).max()
-    )  # finer is more compliant
 
 
 def test_a_foil_across_a_bar_shares_its_load() -> None:
@@ -128,12 +97,9 @@ def test_a_foil_as_soft_as_nothing_reads_the_free_strain() -> None:
     [
         ((MIDDLE,), ("x", "z")),
         ((ASIDE,), ()),
-        ((replace(ASIDE, z_mm=0.0),), ("z",)),
         ((replace(ASIDE, x_mm=0.0, angle=0.0),), ("x",)),
-        ((replace(ASIDE, x_mm=0.0, angle=np.pi / 2, z_mm=0.0),), ("x", "z")),
         ((replace(MIDDLE, angle=0.1),), ("z",)),
         ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, np.pi - 0.5, 1.5)), ("x", "z")),
-        ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, -0.5, 1.5)), ("x", "z")),
         ((replace(ASIDE, z_mm=0.0), Gauge("b", -1.3, 1.7, 0.0, np.pi - 0.5, 1.4)), ("z",)),
     ],
 )
@@ -153,12 +119,6 @@ def test_quarter_and_whole_agree() -> None:
     assert a.gauges["a"] == pytest.approx(a.gauges["b"], rel=1e-12)
     force = [measure(p.points, f)["normal_force_N"] for p, f in ((quarter, a), (whole, b))]
     assert force[0] == pytest.approx(force[1], rel=1e-9)
-
-
-def test_a_foil_off_the_middle_breaks_the_balance_of_friction() -> None:
-    problem = build(FOIL.apply(block(gauges=(ASIDE,), domain="plane-strain")))
-    assert problem.axes == ()
-    assert abs(measure(problem.points, marched(problem)[-1])["tangential_force_x_N"]) > 1e-5
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
@@ -307,29 +267,14 @@ def test_the_contact_face_is_refined_close_to_the_gauge_and_the_body_below_it_is
     assert np.count_nonzero(below) <= 1.5 * np.count_nonzero(before)
 
 
-@pytest.mark.parametrize("changes", [{"gauges": ()}, {}], ids=["no gauge", "factor 1"])
-def test_without_a_gauge_or_at_factor_one_the_mesh_stays_as_it_is(changes: dict[str, Any]) -> None:
-    usual = build(model(8.0, 1.0, gauges=()))
-    same = build(model(8.0, 4.0 if changes else 1.0, **changes))
-    assert same.body.report.hash == usual.body.report.hash
-
-
-def test_the_report_describes_the_refined_mesh() -> None:
-    usual, finer = build(model(8.0, 1.0)).body.report, build(model(8.0, 4.0)).body.report
-    assert finer.cells > 2 * usual.cells
-    assert finer.volume_mm3 == pytest.approx(usual.volume_mm3, rel=1e-12)
-    assert finer.hash != usual.hash
-
-
-@pytest.mark.parametrize("y", [40.0, 33.0])
-def test_a_larger_factor_makes_no_edge_of_the_contact_face_longer(y: float) -> None:
+def test_a_larger_factor_makes_no_edge_of_the_contact_face_longer() -> None:
     longest = []
     for refinement in (1.0, 2.0, 4.0, 8.0, 16.0):
-        surface = build(model(4.0, refinement, gauges=(Gauge("g", 36.0, y),))).surface
+        surface = build(model(4.0, refinement, gauges=(Gauge("g", 36.0, 40.0),))).surface
         x = np.unique(surface.points[surface.face == CONTACT, 0])
         longest.append(np.diff(x)[np.abs(x[1:] - 36.0) < 6.0].max())
     assert all(finer <= coarser + 1e-9 for coarser, finer in pairwise(longest))
-    # the gauge lies 3.4 or 10.4 mm under the face, whose edges are an eighth of that at least
+    # the gauge lies 3.4 mm under the face, whose edges are an eighth of that at least
     assert longest[-1] < 0.5 * longest[0]
 
 
@@ -348,18 +293,6 @@ def test_the_companion_of_an_error_bar_is_refined_alike() -> None:
     assert beside.model.mesh.gauge_refinement == 4.0
     # of the rest of the mesh, from which the errors of forces come; pressures count in one of the ratios only
     assert edge_ratio(problem, beside) == pytest.approx(edge_ratio(usual, companion(usual)), rel=0.02)
-
-
-def test_the_key_of_a_scene_reaches_the_mesh_and_is_written_with_it() -> None:
-    tree = {
-        "finger": {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 4.0},
-        "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.3}, "press": {"depth_mm": 1.0},
-        "mesh": {"gauge_refinement": 3.0},
-    }  # fmt: skip
-    scene = parse(tree)
-    assert scene.model().mesh.gauge_refinement == 3.0
-    assert scene.with_mesh(replace(scene.mesh, size_mm=0.5)).mesh.gauge_refinement == 3.0
-    assert scene.as_dict()["mesh"]["gauge_refinement"] == 3.0
 
 
 def test_a_forecast_counts_the_cells_around_gauges() -> None:

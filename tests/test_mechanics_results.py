@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from finger3d.contact.friction import OPEN, SLIP, Coulomb, FrictionLaw, TwoCoefficients
+from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Outcome
@@ -32,45 +31,11 @@ from finger3d.mechanics.postprocess.penetration import (
 from finger3d.mechanics.results.cavity import CAVITY, cavity_warnings
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.mechanics.results.slip_margin import largest_force
-from finger3d.mechanics.results.state import State
-from finger3d.objects import Cylinder, Move, ObjectPose, Plane, RigidObject, Sphere, Wedge
+from finger3d.objects import Cylinder, ObjectPose, Plane, RigidObject, Sphere, Wedge
 from finger3d.scene import parse
 from tests.held_cases import MU, PRESS, N, held
 from tests.meshes import grid
 from tests.models import block, ended, fig9, half_cylinder, run, small_section
-
-
-def test_points_that_close_move_until_they_touch() -> None:
-    # the gaps of five points: one closes midway, one early, one late, one recedes, one touches already
-    gap = np.array([0.2, 0.1, 0.9, 0.3, 0.0])
-    change = np.array([[-0.4, 0.06], [-0.4, -0.06], [-0.4, 0.06], [0.1, 0.06], [-0.1, 0.06]])
-    status = np.array([OPEN, OPEN, OPEN, OPEN, SLIP], dtype=np.int8)
-    bases = np.broadcast_to(np.array([[0.0, -1.0], [1.0, 0.0]]), (5, 2, 2)).copy()
-    contact = ContactState(status, np.zeros((5, 2)), gap, np.zeros((5, 1)), np.zeros((5, 1)), bases)
-    last = Move(ObjectPose(0.0), ObjectPose(1.0))
-    state = State(contact, None, (last, change))
-    same, half = Move(last.end, ObjectPose(2.0)), Move(last.end, ObjectPose(1.5))
-    assert state.share_until_touch(same) == pytest.approx([0.5, 0.25, 1.0, 1.0, 0.0])
-    assert state.share_until_touch(half) == pytest.approx([0.5, 0.25, 0.5, 0.5, 0.0])
-    wanted = np.array([[0.03, 0.2], [-0.015, 0.1], [0.06, 0.4], [0.06, -0.1], [0.0, 0.0]])
-    assert state.motion_until_touch(same) == pytest.approx(wanted)
-    assert not state.motion_until_touch(Move(last.end, ObjectPose(1.0, slide_x_mm=0.5))).any()
-    assert not State(contact, None).motion_until_touch(same).any()
-
-
-@pytest.mark.parametrize("changes", [{"rule": "paper"}, {"friction": TwoCoefficients(0.25, 0.7, "keep")}])
-def test_presses_that_their_increments_define_take_these_as_they_are(
-    changes: dict[str, str | FrictionLaw], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    problem = build(replace(half_cylinder(0.5, steps=3), **changes))
-
-    def refused(*arguments: Any) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(State, "motion_until_touch", refused)
-    steps = list(march(problem))
-    assert len(steps) == 3
-    assert all(len(step.parts) == 1 for step in steps)
 
 
 def test_the_increment_in_which_contact_begins_has_three_parts() -> None:
@@ -92,30 +57,6 @@ def level_points(nx: int, nz: int, shift: float = 0.0) -> ContactPoints:
         np.arange(x.size), np.zeros(x.size, dtype=np.int8), at, np.ones(x.size), np.eye(3)[[1, 0, 2]], 10.0, 0.75,
         facets, np.ones(x.size),
     )  # fmt: skip
-
-
-def test_where_no_vertex_lies_on_the_line_its_edges_are_cut() -> None:
-    # rows at z = -0.25 and 0.75: edges along z meet z = 0 at x = 0..3, the diagonals a quarter of the way further
-    x, nearest = level_points(4, 2, shift=-0.25).middle_line()
-    np.testing.assert_allclose(np.sort(x), [0.0, 0.25, 1.0, 1.25, 2.0, 2.25, 3.0], atol=1e-12)
-    assert set(nearest) <= {0, 1, 2, 3}  # the row at z = -0.25 is the nearer one
-
-
-def test_points_beside_the_line_do_not_count_to_it() -> None:
-    points = level_points(4, 3, shift=-1.0)
-    x, nearest = points.middle_line()
-    np.testing.assert_array_equal(np.sort(x), np.arange(4.0))
-    assert (points.points[nearest, 2] == 0.0).all()
-
-
-@pytest.mark.parametrize(("rows", "resolved"), [(1, 0), (2, 0), (3, 27), (5, 45)])
-def test_a_zone_is_resolved_where_it_is_three_points_wide(rows: int, resolved: int) -> None:
-    points = level_points(9, 9, shift=-4.0)
-    middle = 0.5 if rows == 2 else 0.0
-    zone = np.abs(points.points[:, 2] - middle) <= 0.5 * (rows - 1)
-    assert points.resolved(zone).sum() == resolved
-    # along x the zone ends where the points end, which is no rim
-    assert points.rim(zone).sum() == 9 * min(rows, 2)
 
 
 def test_a_length_does_not_depend_on_the_half_that_is_meshed() -> None:
@@ -178,11 +119,6 @@ def test_an_inner_surface_is_told_to_cross_itself_when_its_faces_pass_each_other
     assert bool(cavity_warnings(mesh, move)) == crosses
 
 
-def test_a_body_without_an_inner_surface_has_no_warning() -> None:
-    mesh = quadratic(grid((1, 1, 1)))
-    assert cavity_warnings(mesh, np.zeros_like(mesh.points)) == []
-
-
 def test_the_largest_force_of_a_flat_contact() -> None:
     """mu N along every axis in its plane."""
     problem = build(block(object=Plane(), legs=(PRESS, held(0.03, 0.04 * 0.5))))
@@ -191,14 +127,6 @@ def test_the_largest_force_of_a_flat_contact() -> None:
         most, pressure = largest_force(problem.points, last.state, problem.model.friction, np.array(along))
         assert most == pytest.approx(MU * N, rel=1e-9)
         assert pressure == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_wall_across_x_has_no_friction_along_x() -> None:
-    problem = build(block(object=Plane(), legs=(PRESS,), domain="plane-strain"))
-    *_, last = march(problem)
-    walls = np.tile(np.eye(2), (len(problem.points.points), 1, 1))  # normals along x, tangents along y
-    points, state = replace(problem.points, basis=walls), replace(last.state, bases=None)
-    assert largest_force(points, state, problem.model.friction, np.array([1.0, 0.0, 0.0]))[0] == 0.0
 
 
 HEIGHT, DEPTH = 10.0, 0.6

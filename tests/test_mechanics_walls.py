@@ -21,10 +21,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.passing import moves_too_far, passes_through
 from finger3d.mechanics.postprocess.penetration import check_surface
 from finger3d.mechanics.results.history import measure
-from finger3d.objects import Cylinder, MeshObject, Move, ObjectPose, Plane, RigidObject, Sphere, Wave
+from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave
 from tests.bodies import ball, box, channel, write_stl
 from tests.models import block, ended, fig9, last, run
 from tests.scenes import BLOCK, changed, written
@@ -55,21 +54,9 @@ def test_a_confined_block_is_compressed_uniaxially() -> None:
     np.testing.assert_allclose(pressure[problem.points.face == WALLS], nu / (1.0 - nu) * vertical, rtol=5e-3)
 
 
-def test_a_vertex_on_a_crease_is_a_point_of_each_face() -> None:
-    surface = build(in_slot()).surface
-    rim = surface.nodes[(surface.face == WALLS) & (surface.points[:, 1] == 3.0)]
-    assert len(rim) == 1
-    first, second = np.flatnonzero(surface.nodes == rim[0])
-    assert {surface.face[first], surface.face[second]} == {0, WALLS}
-    normals = {int(surface.face[k]): surface.normals[k] for k in (first, second)}
-    np.testing.assert_allclose(normals[0], [0.0, 1.0], atol=1e-12)
-    np.testing.assert_allclose(normals[WALLS], [1.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.4])
-def test_the_part_between_symmetry_planes_is_the_whole(friction: float) -> None:
+def test_the_part_between_symmetry_planes_is_the_whole() -> None:
     slot = MeshObject(surface=channel(8.02, 2.0, 3.0))
-    model = in_slot(object=slot, domain="solid", friction=Coulomb(friction), mesh=MeshOptions(1.0, 1.5, "swept"))
+    model = in_slot(object=slot, domain="solid", friction=Coulomb(0.4), mesh=MeshOptions(1.0, 1.5, "swept"))
     part, whole = build(model), build(replace(model, symmetry=()))
     assert part.axes == ("x", "z")
     found = []
@@ -181,28 +168,22 @@ def section(obj: RigidObject, *legs: Leg, finite: bool = False, **changes: objec
 
 
 @pytest.mark.parametrize("finite", [False, True])
-@pytest.mark.parametrize(("radius", "depth"), [(1.0, 1.2), (1.0, 2.4), (2.0, 2.4)])
 @pytest.mark.parametrize("shape", [Cylinder, Sphere])
-def test_one_increment_beyond_the_radius_presses_as_many_do(
-    shape: type[RigidObject], radius: float, depth: float, finite: bool
-) -> None:
-    obj = shape(radius_mm=radius)
-    once, often = (last(section(obj, Leg(depth, steps=n), finite=finite))["normal_force_N"] for n in (1, 12))
+def test_one_increment_beyond_the_radius_presses_as_many_do(shape: type[RigidObject], finite: bool) -> None:
+    obj = shape(radius_mm=1.0)
+    once, often = (last(section(obj, Leg(2.4, steps=n), finite=finite))["normal_force_N"] for n in (1, 12))
     assert once == pytest.approx(often, rel=0.02)
     assert once > 2.0
 
 
-@pytest.mark.parametrize("finite", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_slide_over_more_than_a_ball_presses_as_a_slide_in_many_increments_does(finite: bool) -> None:
+def test_a_slide_over_more_than_a_ball_presses_as_a_slide_in_many_increments_does() -> None:
     ball_07 = Sphere(radius_mm=0.7)
-    once, often = (
-        last(section(ball_07, Leg(0.5, steps=n), Leg(0.5, slide_x_mm=3.0, steps=n), finite=finite)) for n in (1, 4)
-    )
+    once, often = (last(section(ball_07, Leg(0.5, steps=n), Leg(0.5, slide_x_mm=3.0, steps=n))) for n in (1, 4))
     assert once["normal_force_N"] == pytest.approx(often["normal_force_N"], rel=0.1)
     assert once["tangential_force_x_N"] == pytest.approx(often["tangential_force_x_N"], rel=0.1)
 
 
-@pytest.mark.parametrize("thickness", [0.4, 1.1, 1.5])
+@pytest.mark.parametrize("thickness", [0.4, 1.5])
 def test_a_closed_plate_presses_as_a_thick_one_whatever_its_thickness(thickness: float) -> None:
     thick, thin = (
         last(section(MeshObject(surface=box(6.0, t, 40.0)), Leg(1.0, steps=1)))["normal_force_N"]
@@ -211,9 +192,8 @@ def test_a_closed_plate_presses_as_a_thick_one_whatever_its_thickness(thickness:
     assert thin == pytest.approx(thick, rel=1e-3)
 
 
-@pytest.mark.parametrize("thickness", [1e-4, 1e-3])
-def test_a_foil_whose_edges_cut_through_between_the_points_is_not_converged(thickness: float) -> None:
-    *_, end = march(build(section(MeshObject(surface=box(6.0, thickness, 40.0)), Leg(1.0, steps=1))))
+def test_a_foil_whose_edges_cut_through_between_the_points_is_not_converged() -> None:
+    *_, end = march(build(section(MeshObject(surface=box(6.0, 1e-3, 40.0)), Leg(1.0, steps=1))))
     assert end.outcome is Outcome.PASSED_THROUGH
     assert not end.outcome.ok
 
@@ -223,34 +203,6 @@ def test_a_ball_pressed_to_its_radius_pushes_a_solid() -> None:
     pressed = [last(block(object=Sphere(radius_mm=1.0), legs=(Leg(1.0, steps=n),), mesh=mesh)) for n in (1, 8)]
     assert pressed[0]["normal_force_N"] == pytest.approx(pressed[1]["normal_force_N"], rel=0.02)
     assert pressed[0]["normal_force_N"] > 0.5
-
-
-def test_increments_are_cut_only_where_the_object_moves_by_half_its_mean_chord() -> None:
-    # the mean chord of a circle is pi R / 2
-    problem = build(section(Cylinder(radius_mm=2.0), Leg(1.0, steps=1)))
-    gap, still = np.zeros(len(problem.surface.nodes)), np.zeros_like(problem.surface.points)
-    for depth, far in ((0.49 * math.pi, False), (0.51 * math.pi, True)):
-        carried = still + [0.0, -depth]
-        assert moves_too_far(problem, Move(ObjectPose(0.0), ObjectPose(depth)), gap, carried) == far
-        assert not moves_too_far(problem, Move(ObjectPose(0.0), ObjectPose(depth)), gap + 4.0, carried)  # out of reach
-    assert moves_too_far(problem, Move(ObjectPose(1.0), ObjectPose(1.0, turn_z=0.6)), gap, still)
-    plane = build(section(Plane(), Leg(1.0, steps=1)))
-    assert not moves_too_far(plane, Move(ObjectPose(0.0), ObjectPose(5.0)), gap[:0], still[:0])
-
-
-def test_a_point_that_ends_at_the_far_face_or_beyond_has_passed_through() -> None:
-    plate = MeshObject(surface=box(6.0, 0.02, 40.0))
-    problem = build(section(plate, Leg(1.0, steps=1)))
-    count = len(problem.surface.nodes)
-    gap, rest = np.zeros(count), np.zeros((count, 2))
-    under = problem.surface.points[:, 0] == np.abs(problem.surface.points[:, 0]).min()
-    move = Move(ObjectPose(0.0), ObjectPose(1.0))
-    for height, through in ((-1.0, False), (-0.98, True), (-0.5, True), (0.0, True)):
-        after = np.where(under[:, None], [0.0, height], [0.0, -1.0])
-        assert passes_through(problem, move, rest, after, gap) == through
-    # from above the first touch, too: the path is followed, however thin the object is
-    apart = np.where(under[:, None], [0.0, -0.2], [0.0, -1.0])
-    assert passes_through(problem, move, apart, np.where(under[:, None], 0.0, apart), gap + 0.2)
 
 
 def test_mean_chords_are_volume_over_projected_area() -> None:

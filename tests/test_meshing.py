@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,8 +22,8 @@ from finger3d.meshing import cache
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.refinement.bisection import refined
 from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.refinement.sizing import Sizing, count_cells, rounded_zone, sizing
-from finger3d.meshing.report import content_hash, mesh_report
+from finger3d.meshing.refinement.sizing import Sizing, count_cells, sizing
+from finger3d.meshing.report import mesh_report
 from finger3d.meshing.structured.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.meshing.unstructured.solids import box
@@ -125,30 +124,7 @@ def stored(tmp_path: Path) -> tuple[Path, Mesh]:
     return path, mesh
 
 
-@pytest.mark.parametrize("volume", [math.nan, math.inf, -1.0, 0.0])
-def test_a_volume_that_is_none_is_not_trusted(stored: tuple[Path, Mesh], volume: float, tmp_path: Path) -> None:
-    cache.save(tmp_path / "mesh.npz", stored[1], volume)
-    assert cache.load(tmp_path / "mesh.npz") is None
-
-
-def test_the_cache_keeps_parts(tmp_path: Path) -> None:
-    design = make("fingertip")
-    options = MeshOptions(size_mm=2.0, base_size_mm=4.0, mesher="swept", layers=1)
-    mesh = mesh_solid(design, options, (-1, 1, -1, 1), BOTH)[0]
-    path = tmp_path / "mesh.npz"
-    assert cache.save(path, mesh, design.volume_mm3)
-    found = cache.load(path)
-    assert found is not None
-    assert found[0].part_labels == ("skin", "core")
-    np.testing.assert_array_equal(found[0].part, mesh.part)
-    with np.load(path) as whole:
-        arrays = {name: whole[name] for name in whole.files}
-    arrays["part"] = 0 * arrays["part"]
-    np.savez(path, **arrays)
-    assert cache.load(path) is None
-
-
-@pytest.mark.parametrize("damage", ["cut", "empty", "noise", "text", "absent", "changed", "array"])
+@pytest.mark.parametrize("damage", ["cut", "absent", "changed"])
 def test_a_damaged_cache_file_is_not_trusted(stored: tuple[Path, Mesh], damage: str) -> None:
     path, mesh = stored
     data = path.read_bytes()
@@ -159,28 +135,11 @@ def test_a_damaged_cache_file_is_not_trusted(stored: tuple[Path, Mesh], damage: 
             arrays = {name: whole[name] for name in whole.files}
         arrays["facets_base"] = arrays["facets_base"][:-1]
         np.savez(path, **arrays)
-    elif damage == "array":  # np.load gives the array itself, which is no archive
-        with path.open("wb") as stream:
-            np.save(stream, np.zeros(3))
     else:
-        middle = len(data) // 2
-        noise = data[:middle] + bytes(b ^ 255 for b in data[middle : middle + 64]) + data[middle + 64 :]
-        path.write_bytes({"cut": data[:middle], "empty": b"", "noise": noise, "text": b"not a mesh"}[damage])
+        path.write_bytes(data[: len(data) // 2])
     assert cache.load(path) is None
     assert cache.save(path, mesh, 250.0)
     assert cache.load(path) is not None
-
-
-def test_a_damaged_file_is_meshed_again(stored: tuple[Path, Mesh], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FINGER3D_CACHE", str(stored[0].parent))
-    path = cache.folder() / f"{cache.key(FIG9, OPTIONS, rounded_zone(FIG9, OPTIONS, ZONE), BOTH)}.npz"
-    path.parent.mkdir(parents=True)
-    path.write_bytes(stored[0].read_bytes()[:-500])
-    monkeypatch.setattr(tetwild, "new_mesh", lambda *_: (stored[1], 1000.0, 0.0))
-    report = mesh_solid(FIG9, OPTIONS, ZONE, BOTH)[1]
-    assert not report.from_cache
-    assert report.cache_path == str(path)
-    assert mesh_solid(FIG9, OPTIONS, ZONE, BOTH)[1].from_cache
 
 
 def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
@@ -194,7 +153,7 @@ def test_a_cache_that_cannot_be_written_is_said_and_does_not_stop_the_work(
     assert "kept" in said.lines[-1]
 
 
-def test_the_key_knows_all_that_shapes_the_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_knows_all_that_shapes_the_mesh() -> None:
     other = designs()["clipped_cylinder"](100.0, 50.0, 36.6, 20.0 + 1e-12)
     finer = MeshOptions(size_mm=4.0, base_size_mm=10.0)
     coarser = MeshOptions(size_mm=5.0, base_size_mm=12.0)
@@ -209,8 +168,6 @@ def test_the_key_knows_all_that_shapes_the_mesh(monkeypatch: pytest.MonkeyPatch)
     ]
     assert len(set(keys)) == len(keys)
     assert cache.key(FIG9, OPTIONS, ZONE, ("z", "x")) == keys[0]
-    monkeypatch.setattr(cache, "source_hash", lambda folder: f"other {folder}")
-    assert cache.key(FIG9, OPTIONS, ZONE, BOTH) not in keys
 
 
 def test_designs_typed_at_a_prompt_share_no_mesh() -> None:
@@ -218,12 +175,6 @@ def test_designs_typed_at_a_prompt_share_no_mesh() -> None:
     typed = [type("Own", (block,), {"name": "own", "__module__": "typed at a prompt"}) for _ in range(2)]
     first, second = (cache.key(own(5.0, 5.0, 5.0), OPTIONS, ZONE, BOTH) for own in typed)
     assert first != second
-
-
-def test_near_zones_share_a_mesh() -> None:
-    zone = rounded_zone(FIG9, OPTIONS, (-38.2, 38.2, -10.0, 10.0))
-    assert zone == rounded_zone(FIG9, OPTIONS, (-36.9, 39.7, -10.0, 10.0)) == ZONE
-    assert rounded_zone(FIG9, OPTIONS, (-49.0, 49.0, 0.0, 0.0)) == (-50.0, 50.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("size", "text"), [(30.0, "mesh.size_mm"), (0.05, "tetrahedra, .* GB.*allowed")])
@@ -241,15 +192,6 @@ def test_a_report_of_a_quarter_is_that_of_the_whole_body() -> None:
     # Kuhn's cells have dihedral angles of 45, 60 and 90 degrees
     assert found.min_dihedral_deg == pytest.approx(45.0, abs=1e-9)
     assert not found.from_cache
-
-
-def test_the_hash_tells_meshes_apart_and_does_not_depend_on_memory_order() -> None:
-    mesh = grid((2, 2))
-    moved = mesh.points.copy()
-    moved[4] += [1e-15, 0.0]
-    assert content_hash(mesh) == content_hash(Mesh(np.asfortranarray(mesh.points), mesh.cells, {}))
-    assert content_hash(mesh) != content_hash(Mesh(moved, mesh.cells, {}))
-    assert content_hash(mesh) != content_hash(Mesh(mesh.points, mesh.cells[::-1], {}))
 
 
 def fig9_sizing(size: float, base: float, zone: tuple[float, float, float, float]) -> Sizing:
@@ -295,12 +237,6 @@ def test_lengths_grow_with_the_distance_from_the_nearest_and_are_mirrored() -> N
     )
     assert GRADING.at(places, 0.3) == pytest.approx(wanted, rel=1e-12)
     assert GRADING.at(places * [-1.0, 1.0, -1.0], 0.3) == pytest.approx(wanted, rel=1e-12)
-
-
-def test_a_size_between_two_classes_errs_by_less_than_half_a_class() -> None:
-    sizes = np.geomspace(0.1, 10.0, 50)
-    found = [Grading(np.zeros((1, 3)), np.array([size])).at(np.zeros((1, 3)), 0.3)[0] for size in sizes]
-    assert np.abs(np.log2(np.array(found) / sizes)).max() <= 0.25 + 1e-12
 
 
 PLACE, SHORTEST = np.array([3.0, 3.5, 0.0]), 0.2
@@ -357,20 +293,6 @@ def test_cells_are_as_small_as_wanted_and_grow_away(dim: int) -> None:
 def test_no_angle_of_a_section_falls_below_half_of_the_smallest() -> None:
     mesh = body(2)
     assert min_angle_deg(refined(mesh, wanted)) >= 0.5 * min_angle_deg(mesh)  # Rosenberg and Stenger 1975
-
-
-def test_a_mesh_that_is_fine_enough_is_returned_as_it_is() -> None:
-    mesh = body(3)
-    assert refined(mesh, lambda points: np.full(len(points), 100.0)) is mesh
-
-
-def test_a_check_of_the_number_of_cells_ends_the_refinement() -> None:
-    def check(cells: int) -> None:
-        if cells > 2000:
-            raise Finger3dError("too many")
-
-    with pytest.raises(Finger3dError, match="too many"):
-        refined(body(3), lambda points: np.full(len(points), 0.05), check)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

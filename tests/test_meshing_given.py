@@ -49,12 +49,9 @@ def test_both_kinds_of_files_of_gmsh_are_read(name: str) -> None:
     ("text", "told"),
     [
         (TET10.replace("4.1 0 8", "2.2 0 8"), r" 2\.2 .*4\.1: gmsh -format msh41"),
-        (TET10.replace("4.1 0 8", "5 0 8"), r" 5 .*4\.1: gmsh -format msh41"),
         ("solid x\n", r"\$MeshFormat"),
-        ("", r"\$MeshFormat"),
         (TET10[:-60], "damaged or incomplete"),
         (TET10.replace("3 1 0 10\n", "3 1 1 10\n"), "Mesh.SaveParametric = 0"),
-        (TET10.replace("$Nodes", "$PartitionedEntities\n1\n0\n0 0 0 0\n$EndPartitionedEntities\n$Nodes"), "undivided"),
         (TET10.replace("3 1 11 1\n3 1 2 3 4 5 6 7 8 9 10", "3 1 5 1\n3 1 2 3 4 5 6 7 8"), "1 of type hexahedron"),
         (
             TET10.replace("3 3 1 3\n", "2 2 1 2\n").split("3 1 11 1")[0] + "$EndElements\n",
@@ -125,18 +122,7 @@ def test_the_innermost_of_nested_volumes_names_a_part(
             assert read_contents(path).part.tolist() == parts
 
 
-@pytest.mark.parametrize("order", [("outside", "base"), ("base", "outside")])
-def test_a_surface_of_several_groups_has_the_name_that_counts(order: tuple[str, str], tmp_path: Path) -> None:
-    path = tmp_path / "one.msh"
-    text = TET10.replace("$PhysicalNames\n3\n2 1", f'$PhysicalNames\n4\n2 9 "{order[0]}"\n2 1')
-    text = text.replace('2 1 "base"', f'2 1 "{order[1]}"').replace("1 1 1 1 0\n2", "1 1 2 9 1 0\n2")
-    path.write_text(text, encoding="ascii")
-    found = read_contents(path)
-    assert set(found.label) == {"outside", "base", "contact"}
-    assert {name: found.triangles[found.label == name].tolist() for name in order} == dict.fromkeys(order, [[0, 2, 1]])
-
-
-@pytest.mark.parametrize(("name", "encoding"), [("K\u00f6rper", "latin-1"), ("\u529b", "gb18030"), ("\u529b", "utf-8")])
+@pytest.mark.parametrize(("name", "encoding"), [("K\u00f6rper", "latin-1"), ("\u529b", "gb18030")])
 def test_names_may_have_any_letters(name: str, encoding: str, tmp_path: Path) -> None:
     path = tmp_path / "one.msh"
     path.write_bytes(TET10.replace("skin", name).encode(encoding))
@@ -148,15 +134,12 @@ def test_names_may_have_any_letters(name: str, encoding: str, tmp_path: Path) ->
     assert set(read_contents(tmp_path / "one.vtu").part) == {name}
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
+@pytest.mark.parametrize("degree", [2, 3])
 def test_lagrange_cells_of_vtk_are_read_up_to_degree_2(degree: int, tmp_path: Path) -> None:
     import pyvista
 
     path = tmp_path / "body.vtu"
-    if degree == 2:
-        write_mesh_vtu(path, quadratic(cube(1)))
-    else:
-        vtu_of(path, cube(1))
+    write_mesh_vtu(path, quadratic(cube(1)))
     expected, grid = read_contents(path), pyvista.read(path)
     types = np.select([np.isin(grid.celltypes, [10, 24]), True], [71, 69]).astype(np.uint8)
     cells = np.append(grid.cells, [20, *np.arange(20) % 4]) if degree == 3 else grid.cells
@@ -259,16 +242,6 @@ def test_a_mesh_of_gmsh_is_a_finger(name: str) -> None:
     }  # fmt: skip
 
 
-def test_the_surface_is_closed_and_facets_face_outward() -> None:
-    body = given_mesh(GMSH / "binary.msh")
-    edges = np.sort(body.surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
-    # chords of a quarter of an edge: a sixteenth of the chords of whole edges
-    assert body.surface.volume == pytest.approx(body.volume_mm3, rel=5e-4)
-    base = body.mesh.points[body.mesh.facets["base"][:, :3]]
-    assert (np.cross(base[:, 1] - base[:, 0], base[:, 2] - base[:, 0])[:, 1] < 0.0).all()
-
-
 def test_linear_cells_become_quadratic_with_straight_edges(tmp_path: Path) -> None:
     body = made(tmp_path, cube())
     assert body.mesh.element.is_quadratic
@@ -365,9 +338,3 @@ def test_a_mesh_comes_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.cells, mesh.cells)
     for label, facets in mesh.facets.items():
         assert {frozenset(f) for f in back.facets[label].tolist()} == {frozenset(f) for f in facets.tolist()}
-
-
-def test_names_of_parts_come_back_with_their_quotation_marks(tmp_path: Path) -> None:
-    mesh = replace(given_mesh(GMSH / "binary.msh").mesh, part_labels=("a\"b \\ 'c' K\u00f6rper",))
-    write_mesh_vtu(tmp_path / "again.vtu", mesh)
-    assert given_mesh(tmp_path / "again.vtu").mesh.part_labels == mesh.part_labels

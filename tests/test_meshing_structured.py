@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,9 @@ from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
 from finger3d.geometry.cad import sound
 from finger3d.geometry.implicit import ImplicitCylinder, ImplicitPlane, ImplicitSphere
 from finger3d.geometry.registry import designs
-from finger3d.geometry.section import cylinder_section, with_layer
 from finger3d.geometry.tessellate import Tessellation, tessellate
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.structured.bands import bands, outline, thin_places
 from finger3d.meshing.structured.snap import (
     MIN_DIHEDRAL_DEG,
     Seams,
@@ -79,15 +76,14 @@ def check_planes(mesh: Mesh, design: Any) -> None:
     np.testing.assert_allclose(contact[inner, 1], design.top(contact[inner, 0], z[inner]), rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("symmetry", [(), ("x",)])
 @pytest.mark.parametrize("name", ALL)
-def test_sections_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
-    design = ALL[name]
+def test_sections_are_sound(name: str) -> None:
+    design, symmetry = ALL[name], ("x",)
     mesh, report = mesh_section(design, sizes(design), zone_of(design), symmetry)
     assert mesh.dim == 2
     check_whole(mesh)
     check_planes(mesh, design)
-    assert ("symmetry_x" in mesh.facets) == bool(symmetry)
+    assert "symmetry_x" in mesh.facets
     assert report.volume_mm3 == pytest.approx(report.cad_volume_mm3, rel=1e-4)
     assert report.cad_volume_mm3 == pytest.approx(design.volume_mm3, rel=1e-12)
     assert (report.points, report.cells) == (len(mesh.points), len(mesh.cells))
@@ -95,7 +91,7 @@ def test_sections_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
     assert report.min_dihedral_deg > (5.0 if name in ("lens", "low") else 11.0)
 
 
-@pytest.mark.parametrize("symmetry", [(), ("x",), ("z",), ("x", "z")])
+@pytest.mark.parametrize("symmetry", [(), ("x", "z")])
 @pytest.mark.parametrize("name", ["fig9", "half", "block"])
 def test_swept_solids_are_sound(name: str, symmetry: tuple[str, ...]) -> None:
     design = ALL[name]
@@ -145,7 +141,7 @@ def test_the_curved_area_converges_with_the_fourth_power_of_the_size() -> None:
     assert (rates > 3.5).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     radius=st.floats(1.0, 200.0),
     length=st.floats(0.4, 1.0),
@@ -186,7 +182,7 @@ def test_structured_meshes_load_no_cad() -> None:
     assert not loaded(program, "build123d", "OCP", "pytetwild", "trimesh", "scipy", "vtk")
 
 
-@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("size", [0.5, 2.0])
 def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: float) -> None:
     options = MeshOptions(size_mm=size, base_size_mm=8.0, mesher="swept")
     mesh = mesh_section(FIG9, options, (-40.0, 40.0, 0.0, 0.0))[0]
@@ -205,9 +201,6 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
     [
         ({"size_mm": 60.0, "base_size_mm": 60.0}, "mesh.size_mm = 60 .*width, 20 mm"),
         ({"size_mm": 3.0, "base_size_mm": 2.0}, "mesh.base_size_mm = 2 .*size_mm"),
-        ({"size_mm": 0.0}, "mesh.size_mm = 0.0 "),
-        ({"base_size_mm": math.nan}, "mesh.base_size_mm = nan "),
-        pytest.param({"size_mm": 0.01, "base_size_mm": 0.02}, "mesh.size_mm = 0.01 .* GB", marks=pytest.mark.slow),
     ],
 )
 def test_sizes_that_cannot_work_are_refused_in_one_line(changes: dict[str, float], text: str) -> None:
@@ -223,7 +216,7 @@ def test_a_wall_too_thin_for_the_size_is_refused() -> None:
         mesh_section(design, MeshOptions(size_mm=20.0, base_size_mm=50.0), (-20.0, 20.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("size", [5.6, 4.0, 2.8, 2.0])
+@pytest.mark.parametrize("size", [5.6, 2.0])
 def test_no_layer_along_z_is_thicker_than_the_edges_at_the_contact(size: float) -> None:
     options = MeshOptions(size_mm=size, base_size_mm=4.0 * size, mesher="swept", layers=2)
     mesh = mesh_solid(FIG9, options, zone_of(FIG9))[0]
@@ -242,13 +235,9 @@ def test_the_least_number_of_layers_is_kept() -> None:
 FINGERTIP = designs()["fingertip"]
 BODIES = {
     "skin and core": FINGERTIP(100.0, 50.0, 36.6, 20.0, 3.0, 30.0, 20.0),
-    "base plate": FINGERTIP(100.0, 50.0, 36.6, 20.0, 0.0, 50.0, 3.0),
-    "tall core": FINGERTIP(100.0, 50.0, 36.6, 20.0, 1.0, 5.0, 45.0),
     "core nearly as long": FINGERTIP(100.0, 50.0, 36.6, 20.0, 0.0, 49.0, 20.0),
-    "steep walls": FINGERTIP(8.0, 8.0, 6.0, 16.0, 0.0, 3.0, 10.0),
     "half cylinder": FINGERTIP(8.0, 8.0, 0.0, 16.0, 1.0, 3.0, 4.0),
     "lens": FINGERTIP(100.0, 50.0, 0.0, 16.0, 1.0, 20.0, 5.0),
-    "low": FINGERTIP(100.0, 80.0, 5.0, 16.0, 1.0, 30.0, 5.0),
     "thin skin": FINGERTIP(100.0, 50.0, 36.6, 20.0, 0.2),
     "block": make("block"),
 }
@@ -315,17 +304,6 @@ def test_a_skin_has_two_cells_through_its_thickness() -> None:
     assert (on_axis[:, 0] == 0.0).sum() == 3
 
 
-def test_equal_bodies_with_and_without_parts_have_equal_outlines() -> None:
-    plain = cylinder_section(100.0, 50.0, 36.6)
-    skinned = with_layer(plain, 2.0)
-    assert [len(bands(s).bands) for s in (plain, skinned)] == [1, 2]
-    assert not len(thin_places(plain)[0])
-    u = np.linspace(0.0, 2.0, 9)
-    np.testing.assert_array_equal(outline(plain, u), outline(skinned, u))
-    inner = bands(skinned).bands[0].points(u[:5], 0.0)
-    assert np.hypot(inner[:, 0], inner[:, 1] - plain.contact.at(np.zeros(1))[0, 1] + 100.0) == pytest.approx(98.0)
-
-
 def test_points_go_where_their_surfaces_meet() -> None:
     plane = ImplicitPlane(np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))
     tilted = ImplicitPlane(np.array([0.2, 0.0, 0.0]), np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0))
@@ -381,29 +359,6 @@ def test_where_faces_join_smoothly_a_node_goes_onto_the_nearest(rounded: tuple[T
     assert np.hypot(moved[0] - 4.5, moved[1] - 3.5) == pytest.approx(1.5, abs=1e-12)
 
 
-def test_a_node_that_cannot_reach_where_its_faces_meet_stays_beside(
-    rounded: tuple[Tessellation, dict[str, int]],
-) -> None:
-    near, on = placed_on(rounded, [2.0, 4.9, 3.7], "top end")
-    assert on == {"top", "end"}
-    np.testing.assert_allclose(near, [2.0, 5.0, 4.0], atol=1e-12)
-    beside, on = placed_on(rounded, [2.0, 4.9, 3.7], "top end", reach=0.2)
-    assert on == {"top"}
-    np.testing.assert_allclose(beside, [2.0, 5.0, 3.7], atol=1e-12)
-    # Nothing takes a node off the base.
-    moved, on = placed_on(rounded, [2.0, 0.02, 1.0], "base wall", reach=0.2)
-    assert on == {"base"}
-    np.testing.assert_array_equal(moved, [2.0, 0.0, 1.0])
-
-
-def test_a_crease_between_faces_is_no_seam(rounded: tuple[Tessellation, dict[str, int]]) -> None:
-    body, number = rounded
-    sets = np.zeros((3, len(body.faces)), dtype=bool)
-    for row, names in enumerate((("top", "end"), ("wall", "base"), ("fillet", "end"))):
-        sets[row, [number[n] for n in names]] = True
-    np.testing.assert_array_equal(Seams(body).one_per_smooth_group(np.zeros((3, 3)), sets), sets)
-
-
 def test_points_without_a_place_are_reported() -> None:
     axis = np.array([0.0, 1.0, 0.0])
     faces = faces_of(ImplicitPlane(np.zeros(3), axis), ImplicitPlane(axis, axis))
@@ -421,7 +376,7 @@ def shaken(design: Any, symmetry: tuple[str, ...], by: float) -> tuple[np.ndarra
     return points, tets.reshape(-1, 4)
 
 
-@pytest.mark.parametrize("symmetry", [(), ("x",), ("x", "z")])
+@pytest.mark.parametrize("symmetry", [(), ("x", "z")])
 @pytest.mark.parametrize(("design", "by"), [(FIG9, 0.1), (HALF, 0.01)], ids=["fig9", "half"])
 def test_a_shaken_mesh_is_put_back_on_its_surfaces(design: Any, by: float, symmetry: tuple[str, ...]) -> None:
     mesh = snap(*shaken(design, symmetry, by), body_of(design, symmetry, 1e-4 * design.height_mm))

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from finger3d._child import in_child
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.mesh.quality import curved_jacobians, curved_volume
 from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
@@ -22,17 +20,15 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import tessellate_parts
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.given.interfaces import part_facets, parts_of, points_on, thickness
+from finger3d.meshing.given.interfaces import part_facets
 from finger3d.meshing.refinement.sizing import sizing
 from finger3d.meshing.structured.snap import UnusableMeshError, check_closed, snap
-from finger3d.meshing.unstructured import _meshers, netgen, tetwild
+from finger3d.meshing.unstructured import netgen, tetwild
 from finger3d.meshing.unstructured.solids import (
     box,
-    check_tets,
     check_volume,
     finer_in_layers,
     glued_solids,
-    on_cad,
     tessellated,
 )
 from finger3d.progress import QUIET
@@ -104,19 +100,15 @@ def at(index: int, value: float) -> np.ndarray:
     ("points", "triangles", "text"),
     [
         (np.zeros((0, 3)), np.zeros((0, 3), dtype=int), "0 triangles"),
-        (CUBE, SIDES[:1], "1 triangles"),
         (at(0, math.nan), SIDES, "NaN"),
-        (at(0, math.inf), SIDES, "infinite"),
         (CUBE * 1e-9, SIDES, "diagonal"),
-        (CUBE * 1e9, SIDES, "diagonal"),
         (CUBE * [1.0, 1.0, 0.0], SIDES, "flat"),
         (CUBE * [1.0, 1.0, 5e-4], SIDES, "thin"),
         (CUBE + 1e9, SIDES, "origin"),
         (CUBE, SIDES[1:], "closed"),
         (CUBE, SIDES[:, ::-1], "inside out"),
-        (CUBE, np.vstack([SIDES[:1, ::-1], SIDES[1:]]), "flipped"),
     ],
-    ids=["empty", "one triangle", "nan", "inf", "tiny", "huge", "flat", "thin", "far", "hole", "inverted", "mixed"],
+    ids=["empty", "nan", "tiny", "flat", "thin", "far", "hole", "inverted"],
 )
 def test_surfaces_that_crash_or_hang_pytetwild_are_refused(points: Any, triangles: Any, text: str) -> None:
     with pytest.raises(Finger3dError, match=text) as refused:
@@ -185,17 +177,6 @@ def test_a_hemisphere_of_few_cells_is_curved() -> None:
     assert report.volume_mm3 == pytest.approx(ball.volume_mm3, rel=2e-3)
 
 
-def test_points_of_the_size_field_are_as_dense_as_the_cells() -> None:
-    field = field_of(FIG9, NETGEN, ZONE, ())
-    points, sizes = netgen.size_points(field)
-    assert (points >= field.low).all()
-    assert (points <= field.high).all()
-    np.testing.assert_allclose(sizes, field.at(points))
-    assert sizes.min() == NETGEN.size_mm
-    # every point stands for a box no longer than its edge length; the boxes fill the field's box
-    assert np.sum(sizes**3) >= np.prod(field.high - field.low)
-
-
 def test_stl_is_left_to_ftetwild(tmp_path: Path) -> None:
     body = imported(write_stl(tmp_path / "body.stl", box_of(10.0, 8.0, 6.0)))
     with pytest.raises(Finger3dError, match=r"'netgen' .*STL.*'ftetwild'"):
@@ -208,37 +189,10 @@ def test_without_the_package_a_line_names_it(monkeypatch: pytest.MonkeyPatch) ->
         netgen.new_mesh(FIG9, NETGEN, ZONE, BOTH, QUIET)
 
 
-@pytest.mark.parametrize(("limit", "text"), [(0.01, " within 0 s"), (60.0, "netgen .*return code 1.: .*Error")])
-def test_a_child_that_fails_is_told(monkeypatch: pytest.MonkeyPatch, limit: float, text: str) -> None:
-    if limit > 1.0:
-        monkeypatch.setattr(netgen, "size_points", lambda field: (np.zeros((1, 2)), np.ones(1)))  # two coordinates
-    body = SimpleNamespace(shape=glued_solids(FIG9, BOTH).shape)
-    with pytest.raises(UnusableMeshError, match=text):
-        netgen.run_child(body, field_of(FIG9, NETGEN, ZONE, BOTH), limit)  # type: ignore[arg-type]
+def test_a_child_that_takes_too_long_is_told() -> None:
+    with pytest.raises(UnusableMeshError, match=" within 0 s"):
+        netgen.run_child(glued_solids(FIG9, BOTH), field_of(FIG9, NETGEN, ZONE, BOTH), 0.01)
     assert "netgen.occ" not in sys.modules
-
-
-def test_it_answers_with_positive_tets_that_fill_the_solid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from build123d import export_step
-
-    block = designs()["block"](half_length_mm=2.0, height_mm=1.0, width_mm=2.0)
-    export_step(glued_solids(block, ()).shape, tmp_path / "block.step")
-    scratch = tmp_path / "scratch"
-    scratch.mkdir()
-    monkeypatch.setenv("TMPDIR", str(scratch))
-    monkeypatch.chdir(scratch)
-    content = np.frombuffer((tmp_path / "block.step").read_bytes(), dtype=np.uint8)
-    counts = []
-    for size in (1.0, 0.1):
-        given = {"step": content, "largest": 1.0, "rate": 0.3, "points": [[0.0, 1.0, 0.0]], "sizes": [size]}
-        found = in_child(_meshers.netgen, 120.0, **given)
-        points, tets = found["points"], found["tets"]
-        volumes = signed_volumes(Mesh(points, tets, {}))
-        assert (volumes > 0.0).all()
-        np.testing.assert_allclose(volumes.sum(), 4.0 * 1.0 * 2.0, rtol=1e-9)
-        counts.append(len(tets))
-    assert counts[1] > 2 * counts[0]
-    assert list(scratch.iterdir()) == []
 
 
 TOLERANCE_MM = 0.1
@@ -265,25 +219,6 @@ def test_edges_in_a_thin_part_are_no_longer_than_it_is_thick() -> None:
     layer = 2.0 * (8.0 * 4.0 * 0.25) / (2.0 * 8.0 * 4.0 + 2.0 * (8.0 + 4.0) * 0.25)
     assert (fine.at(inside) <= 1.6 * layer).all()
     assert fine.at(np.array([[0.0, 0.2, 0.0]]))[0] > 2.0 * layer
-
-
-def test_tets_that_are_none_or_inverted_or_do_not_fill_the_body_are_refused() -> None:
-    mesh = grid((2, 2, 2))
-    check_tets(mesh.points, mesh.cells, 1.0)
-    for tets, volume, text in (
-        (mesh.cells[:0], 1.0, "no cells"),
-        (mesh.cells[:, [1, 0, 2, 3]], 1.0, "inverted"),
-        (mesh.cells, 2.0, "volume"),
-    ):
-        with pytest.raises(UnusableMeshError, match=text):
-            check_tets(mesh.points, tets, volume)
-
-
-def test_tets_in_the_wrong_place_are_no_part_of_a_body() -> None:
-    body = tessellated(SKINNED, glued_solids(SKINNED, ()), TOLERANCE_MM)
-    mesh = grid((2, 2, 2))
-    with pytest.raises(UnusableMeshError):
-        on_cad(mesh.points + 100.0, mesh.cells, body, "a mesher")
 
 
 FINGERTIP = make("fingertip")
@@ -335,7 +270,6 @@ def test_a_step_file_with_a_core_and_a_cavity_is_meshed(tmp_path: Path) -> None:
 
 def cube_of_two() -> tuple[np.ndarray, np.ndarray]:
     """Six tets of the unit cube about its diagonal."""
-    from tests.meshes import grid
 
     mesh = grid((2, 2, 2))
     return mesh.points, mesh.cells
@@ -362,11 +296,6 @@ def halves() -> Any:
     return tessellate_parts(glue({"": low.solids()[0], "top": high.solids()[0]}, "cube"), 1e-3)
 
 
-def test_points_are_sorted_by_the_solid_that_holds_them() -> None:
-    points = np.array([[0.5, 0.1, 0.5], [0.5, 0.9, 0.5], [0.5, 1.1, 0.5], [-0.1, 0.2, 0.5]])
-    assert parts_of(points, halves()).tolist() == [0, 1, OUTSIDE, OUTSIDE]
-
-
 def test_nodes_near_an_interface_come_onto_it() -> None:
     points, cells = cube_of_two()
     part = (points[cells].mean(axis=1)[:, 1] > 0.5).astype(np.int64)
@@ -375,14 +304,6 @@ def test_nodes_near_an_interface_come_onto_it() -> None:
     assert (mesh.points[interface(mesh, 0, 1), 1] == 0.5).all()
     for number in range(2):
         assert part_volume(mesh, number) == pytest.approx(0.5, rel=1e-12)
-
-
-def test_a_layer_is_as_thick_as_it_is_and_sampled_all_over() -> None:
-    layer = box_of(20.0, 0.5, 10.0)
-    assert thickness(layer) == pytest.approx(0.5 / (1.0 + 0.05 + 0.025))
-    points = points_on(layer, 1.0)
-    np.testing.assert_array_equal(points, points_on(Triangles(layer.points, layer.faces), 1.0))
-    assert np.ptp(points, axis=0) == pytest.approx([20.0, 0.5, 10.0], rel=0.1)
 
 
 def test_a_skin_thinner_than_the_envelope_is_refused() -> None:

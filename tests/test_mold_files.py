@@ -25,7 +25,7 @@ from finger3d.mold.export import export
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.output import mold_page, print_remarks, write_mold
 from finger3d.mold.parts import Mold
-from finger3d.mold.printing import GAP_MM, as_printed, in_a_row, islands, thickness
+from finger3d.mold.printing import as_printed, in_a_row, islands, thickness
 from finger3d.mold.sheet import close_lines, open_lines, pour_lines, prepare_lines, sheet
 from finger3d.progress import Progress
 from finger3d.scene import parse
@@ -280,10 +280,15 @@ def test_every_part_prints(name, molds) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("design", sorted(set(BODIES) - {"fingertip"}))
-@pytest.mark.parametrize("kind", ["CAD", "STL"])
+@pytest.mark.parametrize(("kind", "options"), [("", ALL[0]), (" as STL", ALL[2])], ids=["CAD", "STL"])
+def test_every_design_prints(design, kind, options) -> None:
+    check(made(design + kind, options))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("options", ALL, ids=lambda options: "-".join(str(value) for value in options.values()))
-def test_every_design_prints_with_all_options(design, kind, options) -> None:
-    check(made(f"{design} as STL" if kind == "STL" else design, options))
+def test_a_design_prints_with_all_options(options) -> None:
+    check(made("clipped_cylinder", options))
 
 
 def test_a_thin_wall_is_found() -> None:
@@ -305,13 +310,6 @@ def test_what_begins_in_the_air_is_found() -> None:
     assert len(found) == 1
     np.testing.assert_allclose(found[0], [7.0, 0.0, 3.25], atol=0.26)
     assert len(islands(box(20.0, 10.0, 3.0, (0.0, 0.0, 1.5)))) == 0
-
-
-def test_parts_stand_in_a_row() -> None:
-    parts = {name: Shell(box(4.0, 2.0, 1.0, (2.0, 1.0, 0.5)), 0.0, 0.0) for name in "abc"}
-    placed = in_a_row(parts)
-    for name, x in zip("abc", (0.0, 4.0 + GAP_MM, 8.0 + 2.0 * GAP_MM), strict=True):
-        assert placed[name].surface.low == pytest.approx([x, 0.0, 0.0])
 
 
 def test_outer_faces_lie_on_the_bed(paper_mold) -> None:

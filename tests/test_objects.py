@@ -17,12 +17,11 @@ from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions
+from finger3d.mechanics.model import Leg
 from finger3d.mechanics.results.history import measure
 from finger3d.objects import (
     Cylinder,
     DistanceTracker,
-    HeldBody,
     MeshObject,
     Move,
     ObjectPose,
@@ -34,13 +33,11 @@ from finger3d.objects import (
     Wedge,
 )
 from finger3d.objects.first_contact import ContactPath, first_touch, initial_contact
-from finger3d.objects.rigid import CROSSWISE, HALF_TURN, UPSIDE_DOWN, Prism, rotation
+from finger3d.objects.rigid import Prism, rotation
 from finger3d.scene import scene_of
-from finger3d.scene.tables import record_of, table_of
 from tests.bodies import ball, box, channel, random_points
 from tests.designs import FIG9, SMALL
 from tests.models import block, ended
-from tests.soft_object_cases import half_ball
 
 
 # heights at (x, z) = (3, 4) above the lowest point at (0, 0), and one mm beside it along x
@@ -78,18 +75,6 @@ def test_what_lies_beside_a_narrow_object_is_not_touched() -> None:
     assert 0.3 < got["normal_force_N"] / plane["normal_force_N"] < 0.7
 
 
-@pytest.mark.parametrize("turn", [UPSIDE_DOWN, CROSSWISE, HALF_TURN])
-def test_a_place_comes_back_from_the_scene(turn: np.ndarray) -> None:
-    rng = np.random.default_rng(0)
-    body = HeldBody(design=SMALL, turn=turn, origin=rng.normal(size=3), place=rng.normal(size=3))
-    points = rng.normal(size=(10, 3))
-    assert body.to_design(body.to_scene(points)) == pytest.approx(points, rel=1e-12)
-    # the design's top faces down
-    assert (body.to_scene(np.eye(3)[1:2]) - body.to_scene(np.zeros((1, 3))))[0] == pytest.approx([0.0, -1.0, 0.0])
-    assert body.is_reflected == (turn is UPSIDE_DOWN)
-    assert body.is_crosswise == (turn is CROSSWISE)
-
-
 @pytest.mark.parametrize(
     "obj",
     [
@@ -110,39 +95,6 @@ def test_its_contact_face_is_the_surface_of_the_object(obj: RigidObject) -> None
     at[:, 1] += held.design.height_mm
     distance, _ = PlacedObject.of(obj, 0.0).distance(at)
     assert np.abs(distance).max() < 1e-12
-
-
-def test_an_endless_object_is_as_long_or_as_wide_as_the_finger() -> None:
-    along_z, along_x = (Cylinder(radius_mm=4.0, axis=axis).held_body(SMALL, True) for axis in ("z", "x"))
-    assert along_z.design.width_mm == SMALL.width_mm
-    assert along_x.design.width_mm == 2.0 * SMALL.half_length_mm
-    section = Cylinder(radius_mm=4.0, axis="x").held_body(SMALL, False)
-    assert (section.design.height_mm, section.design.half_length_mm) == (4.0, SMALL.half_length_mm)
-
-
-def test_faces_have_a_block_behind_them_and_bodies_their_own() -> None:
-    shapes = (
-        Plane(),
-        Wedge(angle=0.2),
-        Wave(wavelength_mm=3.0, amplitude_mm=0.1),
-        Cylinder(radius_mm=1.0),
-        Sphere(radius_mm=1.0),
-    )
-    for obj in shapes:
-        assert obj.is_face == (obj.held_body(SMALL, True) is None)
-        assert obj.has_section
-
-
-def test_a_body_of_triangles_is_held_whole_on_its_highest_plane() -> None:
-    obj = MeshObject(0.5, -0.25, surface=half_ball(3.0))
-    held = obj.held_body(SMALL, True)
-    assert held.is_whole
-    assert held.mesher == obj.body_mesher == "ftetwild"
-    assert not obj.has_section
-    assert held.design.height_mm == pytest.approx(3.0)
-    # the top of the design, its middle, is the lowest point of the object
-    lowest = held.to_scene(np.array([[0.0, held.design.height_mm, 0.0]]))[0]
-    assert lowest == pytest.approx([0.5, 0.0, -0.25], abs=1e-9)
 
 
 def test_turns_are_about_fixed_axes_x_first() -> None:
@@ -172,34 +124,6 @@ def test_a_prism_is_the_same_all_along_its_axis(kind: type[Prism], axis: str) ->
     assert not obj.is_level(rotation(0.1, 0.0, 0.0) if axis == "z" else rotation(0.0, 0.0, 0.1))
 
 
-@pytest.mark.parametrize("obj", [Plane(), Cylinder(radius_mm=2.0), Sphere(radius_mm=2.0)])
-def test_a_pose_counts_as_turned_only_where_it_changes_the_body(obj: RigidObject) -> None:
-    turned = type(obj)(**{**vars(obj), "turn_y": 0.2})
-    assert not obj.is_turned
-    assert turned.is_turned == (not isinstance(obj, Sphere))
-
-
-@pytest.mark.parametrize(
-    ("obj", "length"),
-    [
-        (Plane(), None),
-        (Sphere(radius_mm=3.0), 3.0),
-        (Cylinder(radius_mm=4.0), 4.0),
-        (Wedge(angle=0.5), None),
-        (Wedge(angle=0.5, tip_radius_mm=0.2), 0.2),
-        (Wave(wavelength_mm=5.0, amplitude_mm=0.1), 5.0),
-    ],
-)
-def test_the_detail_is_the_shortest_length_of_the_surface(obj: RigidObject, length: float | None) -> None:
-    assert (obj.detail.length_mm if obj.detail else None) == length
-    assert obj.is_flat == isinstance(obj, Plane)
-
-
-def test_angles_are_degrees_in_a_table_and_radians_in_the_object() -> None:
-    table = table_of(Wedge).model_validate({"angle_deg": 30.0})
-    assert record_of(Wedge, table) == Wedge(angle=math.radians(30.0))
-
-
 @pytest.mark.parametrize("amplitude", [0.05, 2.0])
 def test_the_nearest_point_is_found_on_flat_and_on_steep_waves(amplitude: float) -> None:
     wave = Wave(wavelength_mm=3.0, amplitude_mm=amplitude)
@@ -213,11 +137,6 @@ def test_the_nearest_point_is_found_on_flat_and_on_steep_waves(amplitude: float)
     assert np.abs(np.abs(distance) - dense).max() < 1e-4
     assert ((distance < 0.0) == (y > wave.section_profile(r))).all()
     assert np.hypot(slope_r, slope_y) == pytest.approx(np.ones(40))
-
-
-def test_only_a_flat_wave_is_convex() -> None:
-    assert not Wave(wavelength_mm=4.0, amplitude_mm=0.5).is_convex
-    assert Wave(wavelength_mm=4.0, amplitude_mm=0.0).is_convex
 
 
 def test_the_clearance_never_exceeds_the_distance() -> None:
@@ -250,27 +169,6 @@ def test_a_triangulated_ball_presses_like_the_exact_one() -> None:
     # facets of 3 degrees lie up to 1.4 um inside, 0.5 % of the depth
     assert meshed["normal_force_N"] == pytest.approx(exact["normal_force_N"], rel=0.01)
     assert abs(meshed["tangential_force_x_N"]) < 1e-10  # symmetric, so the quarter is solved
-
-
-@pytest.mark.slow
-def test_turning_a_mesh_object_and_its_slide_turns_the_result() -> None:
-    # A quarter turn about y of a square pad: x becomes z. The mesh is not its own image, so to its accuracy only.
-    square = designs()["block"](half_length_mm=3.0, height_mm=3.0, width_mm=6.0)
-    surface = replace(ball(4.0), points=ball(4.0).points * [1.8, 1.0, 1.0])
-    turned = replace(surface, points=surface.points[:, [2, 1, 0]] * [1.0, 1.0, -1.0])
-    options = MeshOptions(0.4, 1.5, "swept")
-    legs = (Leg(0.2, steps=1), Leg(0.2, slide_x_mm=0.05, steps=1))
-    across = (Leg(0.2, steps=1), Leg(0.2, slide_z_mm=-0.05, steps=1))
-    a, _ = pressed(design=square, mesh=options, object=MeshObject(0.5, 0.2, surface=surface), legs=legs)
-    b, _ = pressed(design=square, mesh=options, object=MeshObject(0.2, -0.5, surface=turned), legs=across)
-    assert b["normal_force_N"] == pytest.approx(a["normal_force_N"], rel=0.03)
-    assert b["tangential_force_z_N"] == pytest.approx(-a["tangential_force_x_N"], rel=0.05)
-
-
-def test_a_ball_has_no_edges_where_contact_ends_and_a_box_has() -> None:
-    assert not MeshObject(surface=ball(5.0)).has_edges
-    assert MeshObject(surface=box(2.0, 3.0, 4.0)).has_edges
-    assert not Sphere(radius_mm=5.0).has_edges
 
 
 def test_points_in_contact_beside_a_gear_lie_on_its_teeth() -> None:
@@ -449,12 +347,6 @@ def test_an_edge_between_the_points_of_the_grid_is_found() -> None:
     assert first_touch(ContactPath(dome, wedge, 10.0, 8.0)).height_mm == pytest.approx(expected, abs=1e-6)
 
 
-def test_the_contact_box_follows_a_slide() -> None:
-    still, slid = (initial_contact(path(Sphere(radius_mm=5.0), slide=s)).contact_box for s in (0.0, 3.0))
-    assert slid[0] == pytest.approx(still[0], abs=0.2)
-    assert slid[1] > still[1] + 2.0
-
-
 def test_an_object_that_touches_the_base_first_is_refused() -> None:
     with pytest.raises(Finger3dError, match="base"):
         initial_contact(path(Cylinder(radius_mm=40.0, x_mm=45.0, axis="z"), depth=9.0))
@@ -519,23 +411,6 @@ def test_several_bumps_as_high_are_all_tried() -> None:
         return 5.0 - 0.5 * (x - 7.003) ** 2 * (x + 7.003) ** 2 / 50.0 - 1e-3 * z**2 + 1e-7 * x
 
     assert first_touch(ContactPath(top, Plane(), 10.0, 2.0)).height_mm == pytest.approx(5.0 + 7.003e-7, abs=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("obj", "path", "text"),
-    [
-        (MeshObject(90.0, surface=ball(20.0)), PRESS, "never"),
-        (Sphere(90.0, radius_mm=20.0), PRESS, "never"),
-        (MeshObject(surface=channel(110.0, 45.0)), PRESS, "base"),
-        (MeshObject(55.0, surface=box(10.0, 5.0, 30.0)), PRESS, "area"),
-        (MeshObject(0.0, 20.0, surface=box(10.0, 10.0, 10.0)), PRESS, "never"),
-    ],
-    ids=["beside", "sphere beside", "hangs to the base", "only the rim", "beside along z"],
-)  # fmt: skip
-def test_approaches_that_are_refused(obj: RigidObject, path: Sequence[Sequence[float]], text: str) -> None:
-    with pytest.raises(Finger3dError, match=text) as refused:
-        near(obj, path)
-    assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

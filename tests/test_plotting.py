@@ -13,10 +13,9 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.errors import Outcome
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.mesh.simplex import Mesh
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings.columns import strain_columns
-from finger3d.plotting import cost, sensitivity
 from finger3d.plotting import solid as render
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison
@@ -24,13 +23,11 @@ from finger3d.plotting.figures import (
     contact_figure,
     force_figure,
     marker_figure,
-    middle_line,
     zones,
 )
 from finger3d.plotting.gauges import marks_of
 from finger3d.plotting.identify import Panel
 from finger3d.plotting.identify import draw as draw_fit
-from finger3d.plotting.layout import DPI, Sheet, sheet
 from finger3d.plotting.optimise import GaugeMap, draw_places
 from finger3d.plotting.optimise import draw as draw_search
 from finger3d.report.sweep import sweep_charts
@@ -142,25 +139,6 @@ def test_a_picture_is_legible_on_a_page_and_its_parts_do_not_overlap(
     assert not [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)]
 
 
-def test_axes_stand_in_equal_cells_below_the_title(tmp_path: Path) -> None:
-    made = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1))
-    box = made.axes[4].get_position()
-    assert (box.x0 * 6.0, box.y0 * 2.0) == pytest.approx((2.2, 0.3))
-    assert (box.width * 6.0, box.height * 2.0) == pytest.approx((1.7, 0.6))
-    titled = sheet(6, 3, (2.0, 1.0), (0.2, 0.1, 0.3, 0.1), "a title")
-    assert titled.figure.get_figheight() > 2.0
-    top = titled.axes[0].get_position()
-    assert top.y1 * titled.figure.get_figheight() == pytest.approx(1.9)
-
-
-def test_a_picture_is_written_at_its_size(tmp_path: Path) -> None:
-    from PIL import Image
-
-    sheet(2, 2, (3.0, 2.0), (0.5, 0.1, 0.5, 0.1)).save(tmp_path / "ü.png")
-    with Image.open(tmp_path / "ü.png") as image:
-        assert image.size == (6 * DPI, 2 * DPI)
-
-
 # --- pictures are drawn, show what they should, and survive a machine without OpenGL ---------------------------------
 
 
@@ -236,19 +214,6 @@ def test_a_huge_mu_does_not_flatten_the_contact_forces(tmp_path: Path) -> None:
     assert tall[0] > 50
 
 
-def test_force_against_depth_is_drawn(tmp_path: Path) -> None:
-    force_figure(tmp_path / "f.png", STEPS)
-    assert share(tmp_path / "f.png", "#c0392b", within=0.05) > 1e-4
-    assert share(tmp_path / "f.png", render.COLOURS[STICK], within=0.05) > 1e-4
-
-
-def test_many_increments_are_a_curve_without_markers(tmp_path: Path) -> None:
-    many = [{**STEPS[-1], "depth_mm": 0.01 * k, "friction_sum_N": 0.01 * k} for k in range(320)]
-    force_figure(tmp_path / "many.png", many)
-    force_figure(tmp_path / "few.png", many[::10])
-    assert share(tmp_path / "many.png", "#c0392b", within=0.05) < share(tmp_path / "few.png", "#c0392b", within=0.05)
-
-
 def test_forces_are_drawn_against_the_slides_that_there_are(tmp_path: Path) -> None:
     slid = [{**step, "slide_x_mm": 0.1 * k, "slide_z_mm": 0.0, "tangential_force_z_N": 1e-12 * k}
             for k, step in enumerate(STEPS)]  # fmt: skip
@@ -257,25 +222,6 @@ def test_forces_are_drawn_against_the_slides_that_there_are(tmp_path: Path) -> N
     high, low = (pixels(tmp_path / name).shape[0] for name in ("slid.png", "pressed.png"))
     assert high == 2 * low
     assert share(tmp_path / "slid.png", "#3c8d4f", within=0.05) == 0.0  # round-off along z
-
-
-@pytest.mark.parametrize(
-    ("z", "expected"),
-    [
-        ([0.0] * 6 + [0.3] * 2, (0.0, [0, 1, 2, 3, 4, 5])),  # those beside the line have another traction
-        ([0.0] * 2 + [0.3] * 3 + [0.6] * 3, (0.0, [0, 1, 2, 3, 4])),  # hardly any on the line
-        ([0.9] * 4 + [1.5] * 4, (1.5, [4, 5, 6, 7])),  # none near it: where the pressure is largest
-    ],
-)
-def test_the_line_that_is_drawn(z: list[float], expected: tuple[float, list[int]]) -> None:
-    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
-    table = {
-        "face": [top] * 8 + [wall], "x_mm": [0.1 * k for k in range(9)], "z_mm": [*z, 0.0],
-        "pressure_MPa": [0.1 * k for k in range(9)],
-    }  # fmt: skip
-    at, points = middle_line(table, 0.4, 2.0)
-    assert (at, points.tolist()) == expected
-    assert middle_line(table, 0.4, None)[1].tolist() == list(range(8))
 
 
 def table(moved: np.ndarray) -> dict[str, np.ndarray]:
@@ -287,7 +233,7 @@ def table(moved: np.ndarray) -> dict[str, np.ndarray]:
     return columns | {f"displacement_{a}_mm": both[:, k] for k, a in enumerate("xyz")}
 
 
-@pytest.mark.parametrize(("longest", "factor"), [(0.3, 5.0), (0.011, 200.0), (1.0, 2.0), (10.0, 0.2)])
+@pytest.mark.parametrize(("longest", "factor"), [(0.011, 200.0), (10.0, 0.2)])
 def test_arrows_are_magnified_by_a_round_number_to_a_visible_length(
     longest: float, factor: float, tmp_path: Path, figures: list[Any]
 ) -> None:
@@ -307,11 +253,6 @@ def test_arrows_are_magnified_by_a_round_number_to_a_visible_length(
 def test_a_solid_is_seen_along_the_press_axis(tmp_path: Path, figures: list[Any]) -> None:
     marker_figure(tmp_path / "a.png", table(np.array([[0.1, -0.4, 0.2]] * 3)))
     assert figures[0].axes[0].get_ylabel() == "z (mm)"
-
-
-def test_markers_that_do_not_move_are_drawn(tmp_path: Path, figures: list[Any]) -> None:
-    marker_figure(tmp_path / "a.png", table(np.zeros((3, 3))))
-    assert "drawn 1 times" in figures[0].axes[0].get_title()
 
 
 # --- calibration.png and map.png of a calibration --------------------------------------------------------------------
@@ -387,31 +328,6 @@ def test_forces_of_solids_are_shown_against_their_width_and_the_rest_relative_to
         assert [[*one.get_ydata()] for one in drawn] == [LINE[key]] * 3
 
 
-def test_without_a_solid_there_is_nothing_to_relate_to(tmp_path: Path, figures: list[Any]) -> None:
-    section = replace(case("plane strain", 20.0, 3.6), lines={"z = 0": LINE})
-    draw_comparison(tmp_path / "a.png", [section], 20.0, "sections alone")
-    bars = figures[0].axes[1]
-    assert not bars.patches
-    assert not bars.axison
-
-
-# --- figure of what accuracy costs: a line for each number, in the order of the time ---------------------------------
-
-
-def test_each_number_has_a_line_in_the_order_of_the_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Any] = []
-    save = Sheet.save
-    monkeypatch.setattr(Sheet, "save", lambda sheet, path: (made.append(sheet), save(sheet, path)))
-    errors = {"normal_force_N": [0.01, 0.1, 0.03], "gauge_g": [0.02, 0.2, 0.06]}
-    cost.draw(tmp_path / "cost.png", "a scene", [9.0, 1.0, 3.0], errors, 3.0)
-    (axes,) = made[0].axes
-    lines = {line.get_label(): line for line in axes.lines}
-    assert list(lines["gauge_g"].get_xdata()) == [1.0, 3.0, 9.0]
-    assert list(lines["gauge_g"].get_ydata()) == pytest.approx([20.0, 6.0, 2.0])
-    assert set(lines["this mesh"].get_xdata()) == {3.0}
-    assert (tmp_path / "cost.png").stat().st_size > 5000
-
-
 # --- identify.png ----------------------------------------------------------------------------------------------------
 
 
@@ -450,7 +366,7 @@ def test_the_best_so_far_never_falls_and_failed_designs_are_left_out(tmp_path: P
     assert convergence.get_ylabel() == "sensitivity"
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 3])
 def test_a_map_for_each_gauge_and_the_standard_deviations(count: int, tmp_path: Path, figures: list[Any]) -> None:
     rng, mus = np.random.default_rng(0), (0.2, 0.5, 1.0)
     places = np.column_stack([rng.uniform(-50.0, 50.0, 30), rng.uniform(0.0, 40.0, 30), np.zeros(30)])
@@ -473,33 +389,3 @@ def test_a_map_for_each_gauge_and_the_standard_deviations(count: int, tmp_path: 
     drawn = {one.get_label(): one.get_ydata() for one in last.get_lines()}
     assert ("together" in drawn) == (count > 1)
     assert [*drawn["g1 alone"]] == [0.1, 0.2, 0.3]
-
-
-# --- figure of effects: a panel for each number, its keys in the order of the table, small ones left out -------------
-
-
-def test_each_number_has_a_panel_with_its_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Any] = []
-    save = Sheet.save
-    monkeypatch.setattr(Sheet, "save", lambda sheet, path: (made.append(sheet), save(sheet, path)))
-    effects = {"press.depth_mm": 2.0, "friction.mu": -1.0, "material.nu": 1e-6}
-    table = [
-        {
-            "number": number,
-            "key": key,
-            "change": 0.1,
-            "falling": -effect,
-            "falling_error": 0.1,
-            "growing": effect,
-            "growing_error": 0.1,
-        }
-        for number in ("gauge_a", "normal_force_N")
-        for key, effect in effects.items()
-    ]
-    sensitivity.draw(tmp_path / "s.png", "a scene", {"gauge_a": 0.01, "normal_force_N": 3.0}, table)
-    (sheet,) = made
-    assert len(sheet.axes) == 2
-    for axes in sheet.axes:
-        labels = [label.get_text() for label in axes.get_yticklabels()]
-        assert [text.split(" by ")[0] for text in labels] == ["press.depth_mm", "friction.mu"]
-        assert [bar.get_width() for bar in axes.patches] == [-2.0, 1.0, 2.0, -1.0]

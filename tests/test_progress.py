@@ -35,17 +35,6 @@ def test_plain_report_writes_a_line_per_event() -> None:
     assert (report.steps_done, report.steps_total) == (2, 2)
 
 
-def test_a_remark_gives_way_to_what_was_just_printed(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 0.0
-    monkeypatch.setattr("time.perf_counter", lambda: now)
-    stream = io.StringIO()
-    report = PlainProgress(stream)
-    for text in ("1 N at 1 mm", "2 N at 2 mm", "3 N at 3 mm", "4 N at 4 mm"):
-        now += 0.6
-        report.remark(text)
-    assert stream.getvalue().splitlines() == ["[    1.2 s] 2 N at 2 mm", "[    2.4 s] 4 N at 4 mm"]
-
-
 def test_the_silent_report_still_counts(capsys) -> None:
     report = work(Progress())
     assert (report.steps_done, report.steps_total) == (2, 2)

@@ -243,22 +243,6 @@ def test_the_readings_of_two_gauges_give_the_mu_it_states(
 
 
 @pytest.mark.slow
-def test_the_reading_of_one_gauge_gives_the_mu_it_states(
-    root: Path, folder: Path, capsys: pytest.CaptureFixture
-) -> None:
-    assert main(["new", "scene.toml"]) == 0
-    one = [c for c in commands(root) if "--gauge g36 --out out/cal" in c or "--strain 0.05" in c]
-    assert len(one) == 2
-    for command in one:
-        assert main(shlex.split(command)[1:]) == 0
-    *_, told = capsys.readouterr().out.splitlines()
-    found = re.match(r"mu = ([\d.]+) \+- ([\d.]+) \(90 % interval [\d.]+ to [\d.]+\)$", told)
-    assert found, told
-    (quoted,) = re.findall(r"--strain 0\.05 +# mu = ([\d.]+)", (root / "docs/sensor.md").read_text(encoding="utf-8"))
-    assert float(found[1]) == pytest.approx(float(quoted), abs=0.006)  # two digits
-
-
-@pytest.mark.slow
 def test_every_estimate_of_the_tutorial_on_friction_finds_the_mu_that_was_read(
     root: Path, folder: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,11 +18,10 @@ from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.mesh.simplex import Mesh, quadratic
 from finger3d.results import journal
 from finger3d.results.journal import Journal, Row, number_in, opened
-from finger3d.results.states import chosen, load_states
-from finger3d.results.summary import gauges_of, read_json, read_rows, steps_of, title_of
+from finger3d.results.states import load_states
+from finger3d.results.summary import read_json
 from finger3d.results.vtu import write_vtu
 from tests.commands import loaded
-from tests.scenes import SECTION, pressed
 
 TASK = {"scene": {"mu": 0.5}, "points": 3}
 
@@ -64,12 +63,9 @@ def test_another_task_is_refused_and_its_rows_stay(tmp_path) -> None:
     [
         (2, lambda a, b, c: [a, "[1]\n", c]),
         (2, lambda a, b, c: [a, "[" * 100_000 + "\n", c]),
-        (2, lambda a, b, c: [a, b.replace("0.25", "0.26"), c]),
         (2, lambda a, b, c: [a, b.replace("0.25", "NaN"), c]),
         (2, lambda a, b, c: [a, b[:-9] + "\n", c]),
         (2, lambda a, b, c: [a, c, b]),
-        (2, lambda a, b, c: [a, a, b, c]),
-        (2, lambda a, b, c: [a, c]),
         (1, lambda a, b, c: [b, c]),
         (4, lambda a, b, c: [a, b, c, "\n"]),
     ],
@@ -88,14 +84,6 @@ def test_the_first_damaged_line_is_named_and_nothing_is_lost(line: int, edit: Ca
     assert [row["n"] for row in rows_of(tmp_path)] == [0, 0.25, 2][: line - 1]
 
 
-def test_a_journal_of_another_task_is_damaged(tmp_path) -> None:
-    rows_of(tmp_path / "a", {"n": 0})
-    rows_of(tmp_path / "b", task={"points": 3})
-    (tmp_path / "b" / "rows.jsonl").write_bytes((tmp_path / "a" / "rows.jsonl").read_bytes())
-    with pytest.raises(Finger3dError, match=r"rows.jsonl: line 1: "):
-        rows_of(tmp_path / "b", task={"points": 3})
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -111,8 +99,8 @@ def test_what_has_changed_is_named(changes: dict, said: str, tmp_path) -> None:
         rows_of(tmp_path, task={**task, **changes})
 
 
-@pytest.mark.parametrize("name", ["numpy", "the source of finger3d and its designs"])
-def test_rows_made_with_other_packages_or_other_source_are_refused(name: str, tmp_path, monkeypatch) -> None:
+def test_rows_made_with_other_source_are_refused(tmp_path, monkeypatch) -> None:
+    name = "the source of finger3d and its designs"
     rows_of(tmp_path, {"n": 0})
     monkeypatch.setattr(journal, "made_with", lambda: {**made_with(), name: "other"})
     with pytest.raises(Finger3dError, match=f"{name} has changed since"):
@@ -171,23 +159,6 @@ def test_zones_of_kept_steps_have_the_areas_of_the_summary(solid: Path, section:
                 assert zone_area(facets, area, zone) == pytest.approx(steps[step - 1][f"{name}_area_mm2"], rel=1e-4)
 
 
-def test_few_of_many_steps_are_kept_the_last_among_them() -> None:
-    assert chosen(0) == []
-    assert chosen(1) == [0]
-    kept = chosen(160, 10)
-    assert len(kept) == 10
-    assert kept[-1] == 159
-    assert np.ptp(np.diff(kept)) <= 1
-
-
-def test_steps_of_something_else_are_refused_in_one_line(tmp_path: Path) -> None:
-    np.savez(tmp_path / "steps.npz", a=1)
-    (tmp_path / "text.npz").write_text("no")
-    for name in ("steps.npz", "text.npz", "absent.npz"):
-        with pytest.raises(Finger3dError, match="press"):
-            load_states(tmp_path / name)
-
-
 def test_damaged_steps_are_one_line_that_names_the_file(section: Path, tmp_path: Path) -> None:
     """A checksum covers every array."""
     raw = (section / "steps.npz").read_bytes()
@@ -213,55 +184,12 @@ def test_damaged_steps_are_one_line_that_names_the_file(section: Path, tmp_path:
         assert "\n" not in str(refused.value)
 
 
-FINGER = {"finger": {"geometry": "half_cylinder"}}
-GAUGE = {"name": "g", "x_mm": 1.0, "y_mm": 2, "z_mm": 0.0, "angle_deg": 30.0, "length_mm": 1.0}
-
-
 @pytest.mark.parametrize(("text", "told"), [("", "summary.json"), ("{", "summary.json"), ("[]", "JSON")])
 def test_a_damaged_summary_is_refused(text: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(Finger3dError, match=told) as error:
         read_json(tmp_path / "summary.json")
     assert str(tmp_path / "summary.json") in str(error.value)
-
-
-def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Finger3dError, match="summary.json"):
-        read_json(tmp_path / "summary.json")
-
-
-def test_a_missing_table_has_no_rows_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
-    assert read_rows(tmp_path / "results.csv") == []
-    (tmp_path / "results.csv").write_bytes(b"a,b\n1,\xff\n")
-    with pytest.raises(Finger3dError, match="results.csv"):
-        read_rows(tmp_path / "results.csv")
-    (tmp_path / "results.csv").write_text("a,b\n1,2\n")
-    assert read_rows(tmp_path / "results.csv") == [{"a": "1", "b": "2"}]
-
-
-def test_the_title_is_that_of_the_scene_or_names_finger_and_object() -> None:
-    assert title_of(FINGER | {"title": "my finger"}) == "my finger"
-    assert title_of(FINGER) == "half_cylinder on a plane"
-    assert title_of(FINGER | {"object": {"shape": "wedge"}}) == "half_cylinder on a wedge"
-
-
-def test_gauges_are_read_in_radians_and_bad_numbers_refused() -> None:
-    (gauge,) = gauges_of({"gauge": [GAUGE]})
-    assert (gauge.name, gauge.y_mm, gauge.angle) == ("g", 2.0, pytest.approx(math.pi / 6.0))
-    assert gauges_of({}) == []
-    for bad in (math.nan, "1", None):
-        with pytest.raises(ValueError, match=str(bad)):
-            gauges_of({"gauge": [GAUGE | {"x_mm": bad}]})
-
-
-def test_steps_have_the_numbers_of_the_file(tmp_path: Path) -> None:
-    folder = pressed(tmp_path, SECTION)
-    summary = read_json(folder / "summary.json")
-    steps = steps_of(summary)
-    assert [step.normal_force_N for step in steps] == [step["normal_force_N"] for step in summary["steps"]]
-    assert steps[-1].gauges == summary["steps"][-1]["gauges"]
-    with pytest.raises(TypeError):
-        steps_of({"steps": [{"depth_mm": 1.0}]})
 
 
 def tetrahedra() -> Mesh:
@@ -307,20 +235,6 @@ def test_vtu_is_read_back_identical(tmp_path: Path, mesh: Mesh, kind: int) -> No
     np.testing.assert_array_equal(grid["status"], fields["status"])
     np.testing.assert_array_equal(grid["held"], fields["held"])
     np.testing.assert_array_equal(grid.cell_data["volume"], volume)
-
-
-def test_vtk_measures_the_same_volume_on_quadratic_cells(tmp_path: Path) -> None:
-    import pyvista
-
-    write_vtu(tmp_path / "f.vtu", quadratic(tetrahedra()), {})
-    # The two tetrahedra hold 1/6 and 2/6 of the unit cube.
-    assert pyvista.read(tmp_path / "f.vtu").volume == pytest.approx(0.5, rel=1e-12)
-
-
-def test_vtu_refuses_a_field_of_another_length(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="'u'"):
-        write_vtu(tmp_path / "f.vtu", triangles(), {"u": np.zeros(3)})
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_writing_loads_neither_vtk_nor_pyvista(tmp_path: Path) -> None:

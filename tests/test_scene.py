@@ -8,7 +8,6 @@ import re
 import tomllib
 import tracemalloc
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -21,13 +20,11 @@ import finger3d
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.objects import MeshObject, Plane
 from finger3d.scene import load, parse, scene_of, tables_of, tree
-from finger3d.scene.files import contents
 from finger3d.scene.schema import schema
-from tests.bodies import box, channel, write_stl
+from tests.bodies import box, write_stl
 from tests.commands import loaded
 from tests.given_meshes import cube, vtu_of
 from tests.scene_tables import HEIGHT, SMALL, scene_with_object
@@ -109,20 +106,6 @@ def test_the_contract_example_loads_without_its_effects(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    "finger",
-    [
-        {"geometry": "half_cylinder", "radius_mm": 5.0, "width_mm": 10.0},
-        {"geometry": "block", "half_length_mm": 10.0, "height_mm": 5.0, "width_mm": 10.0, "skin_mm": 0.5},
-    ],
-)
-def test_every_design_loads(finger) -> None:
-    scene = parse({**SMALL, "finger": finger, "press": {"depth_mm": 0.5}})
-    assert scene.design.height_mm == 5.0
-    assert scene.as_dict()["finger"] == finger
-
-
-@pytest.mark.parametrize("defaults", [True, False])
-@pytest.mark.parametrize(
     "extra",
     [
         {},
@@ -133,12 +116,13 @@ def test_every_design_loads(finger) -> None:
         {"model": {"domain": "plane-stress"}, "mesh": {"mesher": "swept", "size_mm": 1.0}},
     ],
 )
-def test_round_trip(extra, defaults) -> None:
+def test_round_trip(extra) -> None:
     scene = parse({**SMALL, "friction": {"mu": 0.2}, **extra})
-    again = parse(tomllib.loads(scene.to_toml(defaults)))
-    assert again == scene
-    assert again.model() == scene.model()
-    assert again.as_dict() == scene.as_dict()
+    for defaults in (True, False):
+        again = parse(tomllib.loads(scene.to_toml(defaults)))
+        assert again == scene
+        assert again.model() == scene.model()
+        assert again.as_dict() == scene.as_dict()
 
 
 @given(
@@ -172,16 +156,6 @@ def test_as_dict_is_json_with_every_default() -> None:
     assert tree["press"]["steps"] == "auto"
     assert tree["mesh"]["mesher"] == "ftetwild"
     assert tree["effects"] == {"auto": False}
-
-
-def test_scenes_that_differ_are_not_equal() -> None:
-    assert parse(SMALL) != parse({**SMALL, "friction": {"mu": 0.1}})
-
-
-def test_an_object_without_a_shape_is_a_plane() -> None:
-    placed = parse({**SMALL, "object": {"x_mm": 1.0, "tilt_deg": 2.0}})
-    assert placed == parse({**SMALL, "object": {"shape": "plane", "x_mm": 1.0, "tilt_deg": 2.0}})
-    assert parse({**SMALL, "object": {}}) == parse(SMALL)
 
 
 def test_a_path_a_dict_and_a_scene_are_the_same_scene(tmp_path: Path) -> None:
@@ -231,12 +205,6 @@ def test_overrides_are_applied_before_checking(tmp_path) -> None:
     assert scene.title == "as text = quoted"
     assert scene.legs[0].steps == "auto"
     assert scene.design.name == "block"
-
-
-def test_an_override_reaches_into_a_list(tmp_path) -> None:
-    legs = {"leg": [{"depth_mm": 5.0}, {"depth_mm": 0.0}]}
-    path = written(tmp_path, parse({**SMALL, "press": legs}).to_toml())
-    assert load(path, ["press.leg.1.depth_mm=2.5"]).legs == (Leg(5.0, steps="auto"), Leg(2.5, steps="auto"))
 
 
 READINGS = {
@@ -299,13 +267,6 @@ def test_true_and_false_switch_effects(tmp_path) -> None:
     assert load(path, on).effects["kinetic_friction"].ratio == 0.5
 
 
-def test_the_file_is_not_changed_by_an_override(tmp_path) -> None:
-    path = written(tmp_path, parse(SMALL).to_toml())
-    before = path.read_bytes()
-    load(path, ["friction.mu=0.5"])
-    assert path.read_bytes() == before
-
-
 def test_byte_order_mark_and_windows_lines_are_taken(tmp_path) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(b"\xef\xbb\xbf" + parse(SMALL).to_toml().replace("\n", "\r\n").encode())
@@ -328,9 +289,7 @@ LONG = ".".join("a" * 20_000)
 @pytest.mark.usefixtures("memory")
 @pytest.mark.parametrize(
     "text",
-    [f"{LONG}=1", f"friction.mu=1\n{LONG}=1", f"friction={{{LONG}=1}}", f"press.leg.{'9' * 20_000}=1", "." * 40_000,
-     f"friction={'{a=' * 60}1{'}' * 60}"],
-    ids=["key", "second line", "value", "number", "dots", "tables"],
+    [f"{LONG}=1", f"press.leg.{'9' * 20_000}=1", f"friction={'{a=' * 60}1{'}' * 60}"], ids=["key", "number", "tables"],
 )  # fmt: skip
 def test_a_key_of_many_parts_is_refused_in_little_memory(text: str) -> None:
     with pytest.raises(Finger3dError) as told:
@@ -339,30 +298,10 @@ def test_a_key_of_many_parts_is_refused_in_little_memory(text: str) -> None:
 
 
 @pytest.mark.usefixtures("memory")
-@pytest.mark.parametrize("line", [f"{LONG} = 1", f"[{LONG}]", f"friction = {{{LONG} = 1}}"])
+@pytest.mark.parametrize("line", [f"{LONG} = 1", f"[{LONG}]"])
 def test_a_file_with_a_key_of_many_parts_is_refused_in_little_memory(line: str, tmp_path) -> None:
     with pytest.raises(Finger3dError, match="a key is too long"):
         load(written(tmp_path, f"{line}\n"))
-
-
-@pytest.mark.parametrize(
-    ("surface", "table", "text"),
-    [
-        (box(2, 2, 2), {"x_mm": 50.0}, "never"),
-        (channel(12.0, 4.9), {}, "base"),
-        (box(2e3, 2e3, 2e3), {}, "200 .* 10 mm"),
-        (box(2e-3, 2e-3, 2e-3), {}, r"10 mm.* 1000 "),
-        (box(2, 2, 2), {"scale": 0.0}, "object.scale = 0.0: .* 1e-6 to 1e6"),
-        (box(2, 2, 2), {"scael": 2.0}, '"scale"'),
-        (Triangles(box(2, 2, 2).points, box(2, 2, 2).faces[2:]), {}, "closed"),
-    ],
-    ids=["beside", "base", "huge", "tiny", "scale", "misspelt", "hole"],
-)
-def test_objects_that_a_scene_refuses(tmp_path: Path, surface: Triangles, table: dict[str, Any], text: str) -> None:
-    surface = replace(surface, points=surface.points * 1.0001)
-    with pytest.raises(Finger3dError, match=text) as refused:
-        parse(scene_with_object(write_stl(tmp_path / "object.stl", surface), **table))
-    assert "\n" not in str(refused.value)
 
 
 def test_paths_are_relative_to_the_scene_and_survive_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,25 +350,6 @@ def test_a_finger_that_was_drawn_in_another_unit_has_a_scale(tmp_path: Path) -> 
         parse({**scene, "finger": {"geometry": str(metres)}})
 
 
-def test_object_scale_changes_the_object(tmp_path: Path) -> None:
-    path = write_stl(tmp_path / "inches.stl", box(0.2, 0.1, 0.2))
-    obj = parse(scene_with_object(path, scale=25.4)).object
-    assert isinstance(obj, MeshObject)
-    assert obj.surface.volume == pytest.approx(0.004 * 25.4**3)
-
-
-def test_the_contents_of_all_files_of_bodies_are_told_apart(tmp_path: Path) -> None:
-    (tmp_path / "finger.step").write_bytes(b"1")
-    (tmp_path / "coin.stl").write_bytes(b"1")
-    given = {"finger": {"geometry": "finger.step"}, "object": {"shape": "mesh", "path": "coin.stl"}}
-    first = contents(given, tmp_path / "scene.toml")
-    (tmp_path / "coin.stl").write_bytes(b"2")
-    second = contents(given, tmp_path / "scene.toml")
-    assert [*first] == [*second] == [str(tmp_path / "finger.step"), str(tmp_path / "coin.stl")]
-    assert [name for name in first if first[name] != second[name]] == [str(tmp_path / "coin.stl")]
-    assert contents({"finger": {"geometry": "block"}}) == {}
-
-
 def test_a_file_that_is_a_circle_of_links_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.step").symlink_to("a.step")
     for table in ({"geometry": "a.step"}, None):
@@ -457,20 +377,6 @@ def test_the_reference_names_every_key_with_its_meaning(root: Path) -> None:
         "angle_deg",
         "prony",
     } <= keys
-
-
-def test_the_template_names_every_design_shape_and_key_of_an_object() -> None:
-    from importlib import resources
-
-    from finger3d.geometry.registry import designs
-    from finger3d.objects import OBJECTS
-    from finger3d.scene.tables import table_of
-
-    text = resources.files("finger3d").joinpath("new_scene.toml").read_text(encoding="utf-8")
-    words = set(re.findall(r"\w+", text))
-    assert {*designs(), *OBJECTS} <= words
-    assert {key for record in OBJECTS.values() for key in table_of(record).model_fields} <= words
-    assert {key for design in designs().values() for key in table_of(design).model_fields} <= words
 
 
 SCENE = {

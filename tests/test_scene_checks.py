@@ -55,36 +55,17 @@ PRESS = "[press]\ndepth_mm = 10.0\nsteps = 10\n"
 # what is replaced, by what, and what the line must say
 MISTAKES = {
     "misspelt key": ("nu = 0.49", "nuu = 0.49", ["material.nuu = 0.49", '"nu"']),
-    "wrong case": ("E_MPa", "e_mpa", ["material.e_mpa", '"E_MPa"']),
     "forgotten unit": ("radius_mm", "radius", ["finger.radius", '"radius_mm"']),
     "unknown key": ("mu = 0.25", "mu = 0.25\ncolour = 3", ["friction.colour = 3", "[friction]"]),
     "misspelt table": ("[friction]", "[frction]", ["frction", '"friction"']),
-    "unknown table": ("[friction]", "[sound]", ["sound", "title, finger"]),
     "missing nu": ("nu = 0.49\n", "", ["material.nu is missing", "from 0 to 0.5"]),
-    "missing E": ("E_MPa = 1.0\n", "", ["material.E_MPa is missing", "from 1e-9 to 1e9"]),
     "missing table": ("[material]\nE_MPa = 1.0\nnu = 0.49\n", "", ["material is missing", "E_MPa, nu"]),
-    "missing press": (PRESS, "", ["press "]),
     "missing depth": ("depth_mm = 10.0\n", "", ["press.depth_mm is missing"]),
-    "missing dimension": ("width_mm = 20.0\n", "", ["finger.width_mm is missing"]),
     "missing geometry": ('geometry = "clipped_cylinder"\n', "", ["finger.geometry is missing", '"half_cylinder"']),
-    "misspelt geometry key": ("geometry =", "geometri =", ["finger.geometri", '"geometry"']),
     "nu above 0.5": ("nu = 0.49", "nu = 0.6", ["material.nu = 0.6", "from 0 to 0.5"]),
-    "nu below 0": ("nu = 0.49", "nu = -0.1", ["material.nu = -0.1", "from 0 to 0.5"]),
     "E of 0": ("E_MPa = 1.0", "E_MPa = 0", ["material.E_MPa = 0", "from 1e-9 to 1e9"]),
-    "negative width": ("width_mm = 20.0", "width_mm = -20.0", ["finger.width_mm = -20.0", "from 0.01 to 10000"]),
     "edge too high": ("36.6", "120.0", ["edge_height_mm = 120", "radius_mm = 100"]),
-    "longer than round": (
-        "half_length_mm = 50.0",
-        "half_length_mm = 150.0",
-        ["half_length_mm = 150", "radius_mm"],
-    ),
     "misspelt geometry": ("clipped_cylinder", "clipped_cilinder", ['"clipped_cylinder"']),
-    "geometry of another": (
-        '"clipped_cylinder"',
-        '"half_cylinder"',
-        ["no such key", "[finger] takes geometry, radius_mm, width_mm"],
-    ),
-    "geometry not a text": ('"clipped_cylinder"', "3", ["finger.geometry = 3", '"block"']),
     "geometry from a file that is not there": (
         "clipped_cylinder",
         "finger.STEP",
@@ -96,37 +77,24 @@ MISTAKES = {
         ['finger.geometry = "finger.obj"', '".stl", ".step", ".stp", ".msh" or ".vtu"'],
     ),
     "depth 0": ("depth_mm = 10.0", "depth_mm = 0.0", ["press.depth_mm = 0.0", "from 1e-6 to 1e6"]),
-    "depth negative": ("depth_mm = 10.0", "depth_mm = -1.0", ["press.depth_mm = -1.0", "from 1e-6 to 1e6"]),
     "too deep": (
         "depth_mm = 10.0",
         "depth_mm = 50.0",
         ["press.depth_mm = 50.0", "49.9974 mm"],
     ),
     "steps 0": ("steps = 10", "steps = 0", ["press.steps = 0", 'from 1 to 10000 or "auto"']),
-    "steps a fraction": ("steps = 10", "steps = 2.5", ["press.steps = 2.5", "whole number"]),
-    "steps a word": ("steps = 10", 'steps = "many"', ['press.steps = "many"', '"auto"']),
     "text for a number": ("mu = 0.25", 'mu = "rough"', ['friction.mu = "rough"', "0 to 1e6"]),
-    "true for a number": ("mu = 0.25", "mu = true", ["friction.mu = true", "0 to 1e6"]),
-    "date for a number": ("mu = 0.25", "mu = 2024-01-01", ["friction.mu = 2024-01-01", "0 to 1e6"]),
     "NaN": ("mu = 0.25", "mu = nan", ["friction.mu = nan", "finite"]),
-    "infinity": ("depth_mm = 10.0", "depth_mm = inf", ["press.depth_mm = inf", "finite"]),
     "too large for a float": ("mu = 0.25", f"mu = 1{'0' * 400}", ["friction.mu = ", "0 to 1e6"]),
     "negative mu": ("mu = 0.25", "mu = -0.25", ["friction.mu = -0.25", "from 0 to 1e6"]),
-    "number for a text": ('title = "test"', "title = 5", ["title = 5", "text"]),
     "number for a table": ('title = "test"', 'title = "test"\nmodel = 2', ["model = 2", "a table"]),
     "one gauge in single brackets": ("[[gauge]]", "[gauge]", ["gauge = a table", "under double brackets\n"]),
     "mesh larger than the finger": ("size_mm = 2.0", "size_mm = 21.0", ["mesh.size_mm = 21.0", " 20"]),
-    "base larger than the finger": (
-        "size_mm = 2.0",
-        "base_size_mm = 60",
-        ["mesh.base_size_mm = 60", " 49.9974"],
-    ),
     "base finer than contact": (
         "size_mm = 2.0",
         "size_mm = 2.0\nbase_size_mm = 1.0",
         ["mesh.base_size_mm = 1.0", "size_mm"],
     ),
-    "mesh size 0": ("size_mm = 2.0", "size_mm = 0.0", ["mesh.size_mm = 0.0", "from 0.0001 to 10000"]),
     "tolerance beside a size": (
         "size_mm = 2.0",
         "size_mm = 2.0\ntolerance = 0.01",
@@ -134,46 +102,24 @@ MISTAKES = {
     ),
     "tolerance of 100 %": ("size_mm = 2.0", "tolerance = 1.0", ["mesh.tolerance = 1.0", "and below 1"]),
     "mesh time": ("size_mm = 2.0", "max_seconds = 9", ["mesh.max_seconds = 9", "only with mesh.tolerance"]),
-    "mesher": ("size_mm = 2.0", 'mesher = "gmsh"', ['mesh.mesher = "gmsh"', '"ftetwild", "netgen" or "swept"']),
     "domain": ("[mesh]", '[model]\ndomain = "planestrain"\n[mesh]', ['model.domain = "planestrain"', '"plane-strain"']),
-    "rule": ("[mesh]", '[contact]\nrule = "papr"\n[mesh]', ['contact.rule = "papr"', '"projection" or "paper"']),
     "unknown shape": ('"plane"', '"spher"', ['object.shape = "spher"', '"sphere"']),
-    "mesh without path": ('"plane"', '"mesh"', ["object.path is missing"]),
     "mesh that is not there": ('"plane"', '"mesh"\npath = "gear.stl"', ["gear.stl: there is no such file"]),
-    "mesh of another kind": ('"plane"', '"mesh"\npath = "gear.obj"', ["gear.obj: must be a file named .stl"]),
     "mesh as a shape": ('"plane"', '"gear.stl"', ['object.shape = "gear.stl"', '"mesh", and the file its path']),
-    "misspelt shape": ("shape =", "shap =", ["object.shap", '"shape"']),
-    "object of another shape": ('shape = "plane"', "radius_mm = 1.0", ["object.radius_mm = 1.0", "no such key"]),
     "escape in the title": ('title = "test"', 'title = "\\u001b[31mred"', ["title = ", "text"]),
-    "line break in a gauge's name": ('"g36"', '"g\\n36"', ["gauge.0.name = ", "text"]),
-    "separator in the title": ('title = "test"', 'title = "a\\u2028b"', ["title = ", "text"]),
-    "escape in a path": ('"plane"', '"mesh"\npath = "\\u001b[31m.stl"', ["object.path = ", "one line"]),
-    "escape in a geometry": ('"clipped_cylinder"', '"\\u001b[31m.stl"', ["finger.geometry = ", "one line"]),
-    "escape in an effect": (PRESS, PRESS + '[effects."\\u001b[31m"]\n', ["no such effect"]),
     "escape in a key": ("mu = 0.25", '"\\u001b[31mmu" = 0.25', ["no such key"]),
-    "sphere without radius": ('"plane"', '"sphere"', ["object.radius_mm is missing"]),
-    "tilt": ('"plane"', '"plane"\ntilt_deg = 90.0', ["object.tilt_deg = 90.0", "above -90 and below 90"]),
-    "axis": ('"plane"', '"cylinder"\nradius_mm = 1.0\naxis = "y"', ['object.axis = "y"', '"x" or "z"']),
     "gauge beside": ("x_mm = 36.0", "x_mm = 51.0", ["gauge.0.x_mm = 51.0", "from -50 to 50"]),
     "gauge above the dome": ("y_mm = 40.0", "y_mm = 45.0", ["gauge.0.y_mm = 45.0", "from 0 to 43.2926"]),
-    "gauge below the base": ("y_mm = 40.0", "y_mm = -1.0", ["gauge.0.y_mm = -1.0", "from 0 to"]),
-    "gauge out of the width": ("y_mm = 40.0", "y_mm = 40.0\nz_mm = 11.0", ["gauge.0.z_mm = 11.0", "from -10 to 10"]),
     "gauge too long": ("y_mm = 40.0", "y_mm = 40.0\nlength_mm = 40.0", ["gauge.0.length_mm = 40.0", "shorter"]),
     "gauge twice": (
         "[[gauge]]",
         '[[gauge]]\nname = "g36"\nx_mm = 0.0\ny_mm = 1.0\n[[gauge]]',
         ['gauge.name = "g36"', "more than once"],
     ),
-    "gauge without name": ('name = "g36"', 'name = ""', ['gauge.0.name = ""', "not empty"]),
     "press twice": (
         PRESS,
         PRESS + "[[press.leg]]\ndepth_mm = 1.0\n",
         ["press.depth_mm = 10.0", "beside [[press.leg]]"],
-    ),
-    "leg misspelt": (
-        PRESS,
-        "[[press.leg]]\ndept_mm = 1.0\n",
-        ["press.leg.0.dept_mm = 1.0", '"depth_mm"'],
     ),
     "leg too deep": (
         PRESS,
@@ -181,8 +127,6 @@ MISTAKES = {
         ["press.leg.1.depth_mm = 60.0"],
     ),
     "leg that starts at 0": (PRESS, "[[press.leg]]\ndepth_mm = 0.0\n", ["press.leg.0.depth_mm = 0.0", "above 0"]),
-    "leg in single brackets": (PRESS, "[press.leg]\ndepth_mm = 1.0\n", ["press.leg = a table", "brackets"]),
-    "no legs": (PRESS, "[press]\nleg = []\n", ["press.leg = []", "brackets, not empty"]),
     "slide in z of a section": (
         PRESS,
         PRESS + 'slide_z_mm = 1.0\n[model]\ndomain = "plane-strain"\n',
@@ -194,17 +138,9 @@ MISTAKES = {
         PRESS + "[effects]\nviscosity = 1\n",
         ["effects.viscosity = 1", "a table, [effects.viscosity], true or false"],
     ),
-    "effects not tables": (
-        PRESS,
-        PRESS + "[effects]\ntelepathy = true\n",
-        ["effects.telepathy", "no such effect"],
-    ),
     "not TOML": ("mu = 0.25", "mu is 0.25", ["not TOML", "at line 18, column 4"]),
-    "key twice": ("mu = 0.25", "mu = 0.25\nmu = 0.3", ["not TOML", "line 19"]),
     "open end": ("y_mm = 40.0\n", "y_mm = [", ["not TOML", "at line 30, column 9, the end of the file"]),
     "a number without end": ("mu = 0.25", f"mu = {'9' * 5000}", ["not TOML", "too long"]),
-    "line break in a key": ("mu = 0.25", '"m\\nu" = 0.25', ['friction."m\\nu" = 0.25', "no such key"]),
-    "line break in a value": ("mu = 0.25", 'mu = "a\\nb"', ['friction.mu = "a\\nb"', "a number"]),
 }
 
 
@@ -215,14 +151,13 @@ def scene(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("command", ["press", "plan"])
 @pytest.mark.parametrize("name", MISTAKES)
-def test_one_line_for_a_mistake(name, command, scene, capsys) -> None:
+def test_one_line_for_a_mistake(name, scene, capsys) -> None:
     old, new, expected = MISTAKES[name]
     assert old in SCENE
     scene.write_text(SCENE.replace(old, new, 1), encoding="utf-8")
     out = scene.parent / "out"
-    err = refused(capsys, command, scene, *(["--out", out] if command == "press" else []))
+    err = refused(capsys, "press", scene, "--out", out)
     assert err.startswith(f"finger3d: {scene}: ")
     for text in expected:
         assert text in err
@@ -246,13 +181,9 @@ def test_a_misspelt_required_key_is_one_mistake(scene, capsys) -> None:
     ("override", "expected"),
     [
         ("friction.mu=-1", ["--set friction.mu: friction.mu = -1", "from 0 to 1e6"]),
-        ("friction.mu=rough", ['friction.mu = "rough"', "0 to 1e6"]),
         ("frction.mu=1", ["frction", '"friction"']),
         ("friction.mu", ["--set", "KEY=VALUE"]),
-        ("=3", ["--set", "KEY=VALUE"]),
-        ("a..b=3", ["--set", "KEY=VALUE"]),
         ("gauge.1.x_mm=3", ["--set gauge.1.x_mm", "0 to 0"]),
-        ("gauge.x_mm=3", ["--set gauge.x_mm", "0 to 0"]),
         ("press.leg.0.depth_mm=3", ["press.depth_mm = 10.0", "beside [[press.leg]]"]),
         ("title.first=3", ["--set title.first", 'title = "test"']),
     ],
@@ -279,7 +210,6 @@ def test_a_file_that_holds_no_scene_is_named(content: bytes | None, told: str, t
     [
         ("model.domain=plane-strain", ['model.domain = "plane-strain"', '"solid"']),
         ("mesh.mesher=swept", ['mesh.mesher = "swept"', '"ftetwild"']),
-        ("gauge=[{name='a', x_mm=9.0, y_mm=1.0, z_mm=9.0}]", ["gauge.0.z_mm = 9.0"]),
         ("gauge=[{name='a', x_mm=7.0, y_mm=9.0}]", ["gauge.0.y_mm = 9.0", "from 0 to 7.14142"]),
     ],
 )
@@ -317,8 +247,6 @@ def test_a_leg_that_does_nothing_is_refused(legs, text) -> None:
     [
         ({}, []),
         ({"material": {"E_MPa": 1000.0, "nu": 0.4}}, ["1000, not from 0.001 to 100", "1 MPa = 1000 kPa"]),
-        ({"material": {"E_MPa": 100.0, "nu": 0.4}}, []),
-        ({"material": {"E_MPa": 5e-4, "nu": 0.4}}, ["0.0005, not from 0.001 to 100"]),
         (
             {"finger": {**FINGER, "radius_mm": 2e3, "half_length_mm": 50.0, "edge_height_mm": 1200.0}},
             ["height 1200.63"],
@@ -350,17 +278,13 @@ TAXEL = {"name": "t1", "x_mm": 0.0, "z_mm": 0.0, "length_mm": 2.0, "width_mm": 2
     ("tables", "said"),
     [
         ({"marker": [{**MARKER, "y_mm": 3.5}]}, 'marker.0.y_mm = 3.5: marker "m1" '),
-        ({"marker": [{**MARKER, "z_mm": 2.5}]}, 'marker.0.z_mm = 2.5: marker "m1" '),
-        ({"marker": [{**MARKER, "angle_deg": 3.0}]}, "marker.0.angle_deg"),
         ({"marker": [MARKER, MARKER]}, 'marker.name = "m1": '),
         ({"marker": [MARKER], "taxel": [{**TAXEL, "name": "m1"}]}, '.name = "m1": '),
         ({"marker": [MARKER], "taxel": [{**TAXEL, "name": "m1.x"}]}, 'taxel.name = "m1.x": '),
         ({"taxel": [{**TAXEL, "x_mm": 3.5}]}, 'taxel.0.x_mm = 3.5: taxel "t1" .* -3 to 3'),
         ({"taxel": [{**TAXEL, "width_mm": 5.0}]}, 'taxel.0.z_mm = 0.0: taxel "t1" '),
-        ({"taxel": [{**TAXEL, "length_mm": 0.0}]}, "taxel.0.length_mm = 0.0: "),
         ({"taxel": [{**TAXEL, "width_mm": None}]}, "taxel.0.width_mm is missing: .* required of a solid"),
         ({"marker_grid": {"spacing_mm": 1e-3}}, "marker_grid.spacing_mm = 0.001: .* 0.04 to 8"),
-        ({"marker_grid": {}}, "marker_grid.spacing_mm "),
     ],
 )
 def test_a_mistake_is_named(tables: dict, said: str) -> None:

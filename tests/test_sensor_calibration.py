@@ -14,7 +14,6 @@ from scipy.interpolate import PchipInterpolator
 
 from finger3d.analyses import pressed_body as pressing
 from finger3d.errors import Finger3dError
-from finger3d.fem.recovery.strain_reader import StrainReader
 from finger3d.mechanics.discretise.build import build
 from finger3d.sensor import Calibration, Tolerance, estimate, load, save
 from finger3d.sensor.calibration import summary
@@ -108,14 +107,6 @@ def test_knowing_a_cause_reduces_the_variance_by_its_share() -> None:
     squares = {"noise": 1.5e-4**2, "depth_mm": 1e-4**2, "nu": 2e-4**2}
     for name, square in squares.items():
         assert shares[name][0] == pytest.approx(square / sum(squares.values()), abs=1e-6)
-
-
-def test_readings_are_chosen_by_name() -> None:
-    joint = together(curve(straight), curve(saturating))
-    assert joint.of(["b"]).names == ("b",)
-    assert joint.of(["b", "a"]).at([0.5])[0] == pytest.approx(joint.at([0.5])[0][::-1])
-    with pytest.raises(Finger3dError, match="c: .* a, b"):
-        joint.of(["a", "c"])
 
 
 def gauge() -> Calibration:
@@ -295,11 +286,3 @@ def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
     best, angle = found.best()
     assert np.nanmax(found.worst_slope(0.5) - best) <= np.nanmax(best) * 0.05  # the best of 5 degree steps
     assert np.nanmin(angle) >= 0.0
-
-
-def test_a_reader_of_a_linear_field_is_exact() -> None:
-    problem = build(scene().model())
-    u = problem.mesh.points @ np.array([[0.1, 0.3], [-0.2, 0.05]])
-    read = StrainReader.at(problem.mesh, np.array([[10.0, 20.0], [0.0, 200.0]]), ()).strain(u)
-    assert read[0] == pytest.approx([0.1, 0.05, 0.05], abs=1e-12)
-    assert np.isnan(read[1]).all()

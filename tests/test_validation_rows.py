@@ -28,9 +28,9 @@ def test_the_error_is_what_its_measure_says(measure: str, wanted: float, got: fl
     assert row.passed == (error <= 0.1)
 
 
-@pytest.mark.parametrize("measure", ["relative", "absolute", "at most", "at least"])
-def test_nan_never_passes(measure: str) -> None:
-    assert not Row("w", "r", 1.0, float("nan"), 1e9, "so", measure=measure).passed
+def test_nan_never_passes() -> None:
+    for measure in ("relative", "absolute", "at most", "at least"):
+        assert not Row("w", "r", 1.0, float("nan"), 1e9, "so", measure=measure).passed  # type: ignore[arg-type]
 
 
 def test_a_statement_that_does_not_hold_fails_nothing() -> None:
