@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import subprocess
 import sys
 import time
@@ -268,17 +269,18 @@ def follow(*arguments: object, **options: object) -> subprocess.Popen:
 
 
 def test_readings_are_answered_as_they_are_written(tmp_path: Path) -> None:
-    kept = save(curve(straight), tmp_path / "calibration.json")
-    child = follow(kept, "--follow", "-", stdin=subprocess.PIPE, bufsize=1)
+    kept, readings = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    readings.write_text("time,strain\n")
+    child = follow(kept, "--follow", readings)
     try:
         assert child.stdout.readline().startswith("g,mu,std,low,high,status,")
-        child.stdin.write("time,strain\n")
         for mu in (0.2, 0.4):
             text = f"1,{straight(mu)!r}\n"
-            child.stdin.write(text[:7])
-            child.stdin.flush()
-            time.sleep(0.1)  # half a line is no reading
-            child.stdin.write(text[7:])
+            with readings.open("a") as stream:
+                stream.write(text[:7])
+                stream.flush()
+                time.sleep(0.1)  # half a line is no reading
+                stream.write(text[7:])
             assert float(child.stdout.readline().split(",")[1]) == pytest.approx(mu, abs=0.02)
     finally:
         child.send_signal(2)
@@ -320,6 +322,28 @@ def test_standard_input_is_answered_until_it_ends(tmp_path: Path) -> None:
     rows = list(csv.DictReader(out.splitlines()))
     assert float(rows[0]["mu"]) == pytest.approx(0.3, abs=2e-3)
     assert rows[1]["status"] == "outside"
+
+
+@pytest.mark.parametrize("how", ["rotated", "truncated without names"])
+def test_a_file_that_is_replaced_or_cut_is_followed_from_its_start(tmp_path: Path, how: str) -> None:
+    kept, readings = save(curve(straight), tmp_path / "calibration.json"), tmp_path / "readings.csv"
+    readings.write_text(f"time,strain\n0,{straight(0.2)!r}\n1,{straight(0.2)!r}\n")
+    child = follow(kept, "--follow", readings)
+    try:
+        assert len([child.stdout.readline() for _ in range(3)]) == 3
+        names = "" if "without" in how else "time,strain\n"
+        text = f"{names}0,{straight(0.7)!r}\n"
+        if how == "rotated":
+            readings.rename(tmp_path / "readings.1.csv")
+            readings.write_text(text)
+        else:
+            os.truncate(readings, 0)
+            time.sleep(0.3)
+            readings.write_text(text)
+        assert float(child.stdout.readline().split(",")[1]) == pytest.approx(0.7, abs=0.02)
+    finally:
+        child.send_signal(2)
+        assert child.wait(timeout=60) == 130
 
 
 # --- command ``identify``: what is refused ---------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -30,8 +29,8 @@ def estimate(
 
     Example: finger3d estimate cal/calibration.json --strain 0.052
 
-    With --follow - an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A
-    line that is no reading has the status invalid and the reason.
+    With --follow an estimate is printed as soon as its reading is written, until standard input ends or Ctrl-C. A line
+    that is no reading has the status invalid and the reason; a file that is replaced or cut is read from its start.
 
     Parameters
     ----------
@@ -44,9 +43,7 @@ def estimate(
     """
     given = given or ReadingOptions()
     if sum(source is not None for source in (given.strain, given.csv, given.follow)) != 1:
-        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow -")
-    if given.follow not in (None, "-"):
-        raise Finger3dError(f"--follow {given.follow}: must be -, standard input; tail -F FILE writes a file to it")
+        raise Finger3dError("estimate: give either --strain NUMBER, --csv FILE or --follow FILE")
     if out is not None and given.csv is None:
         raise Finger3dError("estimate: --out goes with --csv")
     from finger3d.io import write_csv
@@ -56,7 +53,7 @@ def estimate(
     read = load(calibration)
     estimator = Estimator(read, named_numbers(read, "--std", given.std or (), plain_for_all=True), tolerances)
     if given.follow is not None:
-        for line in estimator.followed(sys.stdin.buffer):
+        for line in estimator.followed(given.follow):
             print(line, flush=True)
     elif given.csv is None:
         (result,) = estimator.estimates(named_numbers(read, "--strain", given.strain or ()), {})

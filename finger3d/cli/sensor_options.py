@@ -55,7 +55,7 @@ class ReadingOptions:
         CSV file of readings: a column for each, NAME, and optionally NAME_std; of a single reading strain and
         std will do.
     follow
-        The same from standard input, -, line by line as it is written, for instance by tail -F readings.csv.
+        The same, with lines still being written: a file, or - for standard input.
     """
 
     strain: Annotated[list[str] | None, Parameter(negative=(), allow_leading_hyphen=True)] = None

@@ -1,10 +1,13 @@
-"""Readings given as text: options of a command, a CSV file, and lines that are still being written."""
+"""Readings given as text: options of a command, a CSV file, and a CSV file that is still being written."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
+import os
+import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +21,9 @@ from finger3d.errors import Finger3dError
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.estimate import estimate
 from finger3d.sensor.likelihood import Estimate
+
+_POLL_S = 0.02
+"""Time between two looks at a file that is followed."""
 
 _OF_MU = ("mu", "std", "low", "high", "status", "chi_square", "p_value", "verdict")
 """Columns of an estimate that follow those of its readings."""
@@ -100,18 +106,19 @@ class Estimator:
         except Finger3dError as error:
             raise Finger3dError(f"{path}: {error}") from None
 
-    def followed(self, lines: Iterable[bytes]) -> Iterator[str]:
-        """Yield a line of names, and a line for each reading of a CSV file as soon as its line is there.
+    def followed(self, source: str) -> Iterator[str]:
+        """Yield a line of names, and a line for each reading of a CSV file, or of ``-``, as soon as it is written.
 
         A line that is no reading is answered with the reason, so that it does not stop a robot.
         """
         yield csv_line(self.columns)
-        head, table = list[str](), None
-        for number, content in enumerate(lines, start=1):
+        head, table, number = list[str](), None, 0
+        for content in _written_lines(source):
+            number, head = (number + 1, head) if content else (0, [])
             try:
-                line = decoded("-", content)
-                found, _ = with_names("-", [*head, line], self._is_column)
-                if set(self.calibration.names) <= set(self._columns_in(found)):  # also of a file that replaced another
+                line = decoded(source, content)
+                found, _ = with_names(source, [*head, line], self._is_column)
+                if set(self.calibration.names) <= set(self._columns_in(found)):  # also in a file that replaced another
                     head, table = [], found
                 elif table is None:
                     head.append(line)
@@ -169,3 +176,39 @@ def csv_line(cells: Iterable[object]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return text.getvalue()
+
+
+def _written_lines(source: str) -> Iterator[bytes]:
+    """Yield the lines of a file as they are written, without end; those of standard input until it ends.
+
+    An empty line says that the file was replaced by another, or cut: what follows is from the start.
+    """
+    if source == "-":
+        yield from sys.stdin.buffer
+        return
+    while True:
+        try:
+            stream = Path(source).open("rb")
+        except OSError as error:
+            raise Finger3dError(f"{source}: cannot be read: {error.strerror}") from None
+        with stream:
+            begun = b""
+            while True:
+                begun += stream.readline()
+                if begun.endswith(b"\n"):
+                    yield begun
+                    begun = b""
+                elif _is_replaced(stream.fileno(), stream.tell(), source):
+                    break
+                else:
+                    time.sleep(_POLL_S)
+        yield b""
+
+
+def _is_replaced(descriptor: int, position: int, source: str) -> bool:
+    """Return whether the file of this name is another one than that which is read, or is shorter than what was read."""
+    try:
+        now, read = os.stat(source), os.fstat(descriptor)
+    except FileNotFoundError:
+        return False  # between the removal of the old file and the creation of the new one
+    return (now.st_dev, now.st_ino) != (read.st_dev, read.st_ino) or now.st_size < position
