@@ -13,7 +13,7 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.errors import Outcome
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings.columns import strain_columns
 from finger3d.plotting import solid as render
@@ -22,6 +22,7 @@ from finger3d.plotting.comparison import draw as draw_comparison
 from finger3d.plotting.figures import (
     contact_figure,
     force_figure,
+    map_figure,
     marker_figure,
     zones,
 )
@@ -389,3 +390,21 @@ def test_a_map_for_each_gauge_and_the_standard_deviations(count: int, tmp_path: 
     drawn = {one.get_label(): one.get_ydata() for one in last.get_lines()}
     assert ("together" in drawn) == (count > 1)
     assert [*drawn["g1 alone"]] == [0.1, 0.2, 0.3]
+
+
+def test_a_flat_map_shows_the_status_of_the_contact_face(tmp_path: Path) -> None:
+    x, z = (v.ravel() for v in np.meshgrid(np.linspace(-3.0, 3.0, 13), np.linspace(-2.0, 2.0, 9)))
+    near = np.hypot(x, z)
+    top, wall = FREE_FACES[CONTACT], FREE_FACES[CONTACT + 1]
+    shown = {}
+    for name, largest in (("open", 0.0), ("touching", 0.2)):
+        status = np.select([largest * (near < 0.8) > 0.0, largest * (near < 1.6) > 0.0], ["stick", "slip"], "open")
+        pressure = largest * np.maximum(1.0 - (near / 1.6) ** 2, 0.0)
+        table = {
+            "face": [top] * len(x) + [wall], "x_mm": [*x, 9.0], "z_mm": [*z, 0.0], "pressure_MPa": [*pressure, 9.0],
+            "shear_x_MPa": [*(0.3 * pressure), 0.0], "shear_z_MPa": [0.0] * (len(x) + 1), "status": [*status, "slip"],
+        }  # fmt: skip
+        map_figure(tmp_path / f"{name}.png", table)
+        shown[name] = [share(tmp_path / f"{name}.png", render.COLOURS[s], within=0.05) for s in (STICK, SLIP)]
+    legend, both = np.array(shown["open"]), np.array(shown["touching"])
+    assert (both > 1.3 * legend).all()

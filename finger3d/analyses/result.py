@@ -206,6 +206,21 @@ class PressResult:
         self._contact()
         return _picture(force_figure, [step for step in self._numbers["steps"] if step["outcome"] == "converged"])
 
+    def plot_map(self) -> Picture:
+        """Draw a flat map of the contact face in the last good increment: pressure, friction, and stick and slip.
+
+        Raises
+        ------
+        Finger3dError
+            If the press is that of a section.
+        """
+        from finger3d.plotting.figures import map_figure
+
+        table = self._contact()
+        if not table["z_mm"].any():
+            raise Finger3dError("plot_map(): a section has no map; plot_contact() draws it along x")
+        return _picture(map_figure, table)
+
     def to_pyvista(self, step: int | None = None) -> pyvista.UnstructuredGrid:
         """Return the finger at rest with its fields; ``warp_by_vector("displacement")`` deforms it.
 

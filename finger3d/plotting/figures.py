@@ -13,7 +13,7 @@ from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
 from finger3d.plotting.layout import WIDEST, finish, sheet
-from finger3d.plotting.panels import patches
+from finger3d.plotting.panels import CMAP, patches
 from finger3d.plotting.solid import COLOURS
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ _ON_LINE = 1e-6
 """Distance from a line z = const, in half widths, below which a point lies on it."""
 
 _NO_FORCE = 1e-6  # share of the normal force below which a force is not drawn: round-off
+
+_MAP_MARGINS, _MOST_ASPECT = (0.8, 1.1, 0.55, 0.45), 1.6  # of a flat map: inches; height over width, or the inverse
 
 _SHADES = {STICK: "#c9d9ee", SLIP: "#fde3c4"}
 
@@ -153,6 +155,55 @@ def force_figure(path: str | Path, steps: Sequence[Mapping[str, object]]) -> Non
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 0.0), 1.25 * high)  # room for the legend
         finish(axes, names[name], unit, loc="upper left", ncols=2)
+    made.save(path)
+
+
+def map_figure(path: str | Path, table: Mapping[str, ArrayLike]) -> None:
+    """Draw the contact of a solid along the press axis: pressure with arrows of the friction, and stick and slip.
+
+    Parameters
+    ----------
+    path : PNG file to write
+    table : columns of contact.csv
+    """
+    from matplotlib.tri import Triangulation
+
+    top = _on_contact_face(table)
+    x, z, pressure, shear_x, shear_z = (
+        _column(table, name)[top] for name in ("x_mm", "z_mm", "pressure_MPa", "shear_x_MPa", "shear_z_MPa")
+    )
+    status, spacing = _status(table)[top], _spacing(x, z)
+    touches = status != OPEN if np.any(status != OPEN) else np.ones(len(x), dtype=bool)
+    (x0, x1), (z0, z1) = ((v[touches].min(), v[touches].max()) for v in (x, z))
+    wide, tall = x1 - x0 + 3.0 * spacing, z1 - z0 + 3.0 * spacing
+    wide, tall = max(wide, tall / _MOST_ASPECT), max(tall, wide / _MOST_ASPECT)
+    left, right, below, above = _MAP_MARGINS
+    height = (WIDEST - left - right) * tall / wide
+    made = sheet(2, 2, (WIDEST, height + below + above), _MAP_MARGINS)
+    for axes, title in zip(made.axes, ("pressure, and friction on the finger", "stick and slip"), strict=True):
+        axes.set_aspect("equal")
+        axes.set(xlim=(x0 + x1 + np.array([-wide, wide])) / 2.0, ylim=(z0 + z1 + np.array([-tall, tall])) / 2.0)
+        axes.set_title(title, fontsize=11, loc="left")
+        finish(axes, "x at rest (mm)", "z at rest (mm)")
+    first, second = made.axes
+    mesh = Triangulation(x, z)
+    mesh.set_mask(~touches[mesh.triangles].any(axis=1))
+    colours = first.tripcolor(mesh, pressure, shading="gouraud", cmap=CMAP, vmin=0.0)
+    bar = first.inset_axes((1.03, 0.0, 0.04, 1.0))
+    made.figure.colorbar(colours, cax=bar).set_label("contact pressure (MPa)")
+    largest = float(np.hypot(shear_x, shear_z).max())
+    if largest > 0.0:
+        at = np.flatnonzero(touches)
+        arrows = first.quiver(
+            x[at], z[at], shear_x[at], shear_z[at], color="#c0392b", scale=12.0 * largest, width=0.004
+        )
+        value = _round(largest)
+        first.quiverkey(arrows, 0.82, 1.0 + 0.13 / height, value, f"{value:g} MPa", labelpos="E")
+    for state in (OPEN, STICK, SLIP):
+        mine = status == state
+        second.plot(x[mine], z[mine], "o", ms=4, color=COLOURS[state])
+    second.legend(handles=patches(COLOURS, (STICK, SLIP, OPEN)), loc="lower right", bbox_to_anchor=(1.0, 1.0),
+                  ncols=3, frameon=False, borderaxespad=0.0, borderpad=0.2)  # fmt: skip
     made.save(path)
 
 
