@@ -199,10 +199,10 @@ class SharedBody(PressedBody):
         left = deque(variants)
         while left:
             with closing(map_parallel(self.problem, self._march, tuple(left), most)) as runs:
-                for steps, seconds in runs:
+                for problem, steps, seconds in runs:
                     result: VariantResult | Exception | None
                     try:
-                        if (result := self._result(left[0], steps, seconds)) is None:
+                        if (result := self._result(problem, steps, seconds)) is None:
                             self.widen()
                             break  # and press the variants that are left on the new body
                     except FAILURES as error:
@@ -211,21 +211,19 @@ class SharedBody(PressedBody):
 
     def _march(
         self, variant: Variant, before: object, workspace: Workspace, cancel: Event
-    ) -> tuple[tuple[StepResult, ...] | Exception, float]:
-        """Return the increments of a variant, or why they failed, and the seconds that they took."""
-        start = time.perf_counter()
+    ) -> tuple[Problem, tuple[StepResult, ...] | Exception, float]:
+        """Return the problem of a variant, its increments, or why they failed, and the seconds that they took."""
+        start, problem = time.perf_counter(), self.problem
         steps: tuple[StepResult, ...] | Exception
         try:
-            steps = march_automatic(self._under(variant), workspace, cancel)[0]
+            problem = under(problem, variant.friction, variant.legs, variant.rule, variant.object)
+            steps = march_automatic(problem, workspace, cancel)[0]
         except FAILURES as error:
             steps = error.with_traceback(None)
-        return steps, time.perf_counter() - start
-
-    def _under(self, variant: Variant) -> Problem:
-        return under(self.problem, variant.friction, variant.legs, variant.rule, variant.object)
+        return problem, steps, time.perf_counter() - start
 
     def _result(
-        self, variant: Variant, steps: tuple[StepResult, ...] | Exception, seconds: float
+        self, problem: Problem, steps: tuple[StepResult, ...] | Exception, seconds: float
     ) -> VariantResult | None:
         """Return the quantities of the last step; None if contact reached beyond the candidate points.
 
@@ -238,7 +236,6 @@ class SharedBody(PressedBody):
             if not step.outcome.ok:
                 at = f"increment {number} (depth {step.target.depth_mm:.4g} mm)"
                 return VariantResult(f"{at}: {step.outcome}", residual, {}, {}, seconds)
-        problem = self._under(variant)
         (check,) = check_surface(problem, steps[-1:])
         if not check.within_candidates:
             return None

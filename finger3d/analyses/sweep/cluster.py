@@ -119,7 +119,7 @@ class Cluster:
         future = self.client.submit(
             worker.batch,
             body.spec,
-            body.left,
+            body.next,
             body.size,
             pure=False,
             workers=address and [address],

@@ -41,7 +41,7 @@ class _Worker:
 
     def submit(self, body: BodyPoints) -> Future[list[Row]]:
         """Press the next batch of a body."""
-        future: Future[list[Row]] = self.pool.submit(worker.batch, body.spec, tuple(body.left), body.size)
+        future: Future[list[Row]] = self.pool.submit(worker.batch, body.spec, body.next, body.size)
         return future
 
     def replace(self) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import FreeKey, check_distinct
-from finger3d.analyses.shared_body import Variant, body_key, finest
+from finger3d.analyses.shared_body import Variant, body_key, finest, may_touch_anywhere
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
@@ -110,7 +110,8 @@ class BodySpec:
     Attributes
     ----------
     key : hash of everything that shapes the body
-    variants : of all its points, also of those that are finished: the mesh is graded for the union of their paths
+    variants : of all its points, also of those that are finished: the mesh is graded for the union of their paths;
+        one for each set of gauges where objects may touch anywhere
     mesh : with the smallest sizes of the points
     given : the scene of one of the points
     grid : markers of its grid
@@ -207,7 +208,7 @@ def checked_points(
     shared = {
         key: BodySpec(
             key=key,
-            variants=tuple(variant for _, variant in of),
+            variants=_shaping([variant for _, variant in of], may_touch_anywhere(of[0][0])),
             mesh=finest([scene.model() for scene, _ in of]),
             given=of[0][0].given,
             grid=grids[key],
@@ -216,6 +217,11 @@ def checked_points(
         for key, of in members.items()
     }
     return Sweep(bodies.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
+
+
+def _shaping(variants: Sequence[Variant], anywhere: bool) -> tuple[Variant, ...]:
+    """Return the variants that shape a body."""
+    return tuple({variant.gauges: variant for variant in variants}.values()) if anywhere else tuple(variants)
 
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:

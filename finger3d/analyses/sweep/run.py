@@ -126,7 +126,7 @@ def _as_toml(value: Value) -> str:
 
 def _press(store: ResultStore, scheduler: str | None, workers: int | None, progress: SweepProgress) -> None:
     """Press the points that are left: on a cluster, in processes of this machine, or in this process."""
-    bodies = _bodies(store)
+    bodies = _bodies(store, _MOST_PARTS if scheduler else workers or cores())
     if bodies and scheduler is not None:
         from finger3d.analyses.sweep import cluster
 
@@ -145,10 +145,21 @@ def _press(store: ResultStore, scheduler: str | None, workers: int | None, progr
                 progress.add(row)
 
 
-def _bodies(store: ResultStore) -> list[BodyPoints]:
-    """Return the bodies with unfinished points, those with most points first."""
+_MOST_PARTS, _PART = 64, 20
+"""Most parts that the points of a body with labels are pressed in on a cluster, and least points of a part."""
+
+
+def _bodies(store: ResultStore, parts: int) -> list[BodyPoints]:
+    """Return the bodies with unfinished points, those with most points first.
+
+    A body with labels has many points; they are divided among workers, each of which condenses it.
+    """
     members: dict[str, list[Point]] = {}
     for point in store.left():
         members.setdefault(point.body, []).append(point)
-    found = [BodyPoints(store.sweep.bodies[key], points) for key, points in members.items()]
+    found = []
+    for key, points in members.items():
+        spec = store.sweep.bodies[key]
+        count = max(1, min(parts, len(points) // _PART)) if spec.labels else 1
+        found += [BodyPoints(spec, points[k::count]) for k in range(count)]
     return sorted(found, key=lambda body: -len(body.left))

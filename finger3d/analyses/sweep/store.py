@@ -202,6 +202,10 @@ _BATCH_S = 2.0
 """Time that the points sent to a worker at once should take; so much work is repeated if the worker dies."""
 
 
+_MOST_SENT = 1000
+"""Points that are sent to a worker at once, so that it can tell of all why their body cannot be built."""
+
+
 @dataclass
 class BodyPoints:
     """The points of a body that are not pressed yet, and how many of them the next batch has."""
@@ -209,6 +213,11 @@ class BodyPoints:
     spec: BodySpec
     left: list[Point]
     size: int = 1
+
+    @property
+    def next(self) -> tuple[Point, ...]:
+        """Points that are sent to a worker at once, of which it presses the first `size`."""
+        return tuple(self.left[: max(self.size, _MOST_SENT)])
 
     def advance(self, rows: Sequence[Row]) -> None:
         """Remove the points that have a row now, and let the next batch take `_BATCH_S`."""
