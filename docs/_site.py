@@ -174,17 +174,16 @@ def commands() -> str:
 def studies() -> str:
     """Return the index of validation/, its links relative to docs/."""
     text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
-    return _part_of(text, "\n- *Verification*", "\n## All rows")
+    return _linked_from_docs(text[text.index("\n- *Verification*") :])
 
 
 def verdict() -> str:
     """Return the table of the paper's claims from the index of validation/, its links relative to docs/."""
     text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
-    return _part_of(text, "\nEvery cell", "\n## Studies")
+    return _linked_from_docs(text[text.index("\nEvery cell") : text.index("\n## Studies")])
 
 
-def _part_of(text: str, first: str, last: str) -> str:
-    part = text[text.index(first) : text.index(last)]
+def _linked_from_docs(part: str) -> str:
     return re.sub(r"\]\((?!https?:|#)", "](../validation/", part) + "\n"
 
 
