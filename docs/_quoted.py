@@ -5,6 +5,7 @@ A table stands between ``<!-- from SOURCE ... -->`` and ``<!-- end -->``.
 
 from __future__ import annotations
 
+import itertools
 import re
 import typing
 from collections.abc import Callable, Iterator
@@ -64,14 +65,15 @@ def cost_table() -> str:
 
 
 def keys() -> str:
-    """Return the table of all keys of a scene: key, what is allowed, default, meaning."""
-    lines = ["| key | allowed | default | meaning |", "|---|---|---|---|"]
+    """Return a table for every table of a scene: keys, what is allowed, default, meaning."""
+    lines = []
     for title, rows in _tables():
-        lines.append(f"| **`{title}`** | | | |")
-        lines += [
-            f"| {key and f'`{key}`'} | {allowed} | {default} | {meaning} |" for key, allowed, default, meaning in rows
-        ]
-    return "\n".join(lines) + "\n"
+        lines += [f"### `{title}`", "", "| key | allowed | default | meaning |", "|---|---|---|---|"]
+        for said, alike in itertools.groupby(rows, key=lambda row: row[1:]):
+            names = ", ".join(f"`{key}`" for key, *_ in alike if key)
+            lines.append(f"| {names} | {' | '.join(said)} |")
+        lines.append("")
+    return "\n".join(lines)
 
 
 _Row = tuple[str, str, str, str]

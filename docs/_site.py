@@ -1,7 +1,7 @@
 """Pages of the site that come from the code, and what Sphinx lacks for the others.
 
-Key tables come from the JSON schema of a scene, tables of outputs from docstrings and from a press, the verification
-index from validation/.  A formula becomes MathML, which browsers set without a script or a font from elsewhere.
+Tables of outputs come from docstrings and from a press, the verification index from validation/.  A formula becomes
+MathML, which browsers set without a script or a font from elsewhere.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import dataclasses
 import hashlib
 import os
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +20,11 @@ from sphinx.transforms import SphinxTransform
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
 ROOT = Path(__file__).resolve().parent.parent
-UNITS = {
-    "_mm2": "mm²", "_mm3": "mm³", "_Nmm": "N mm", "_mJ": "mJ", "_MPa": "MPa", "_mm": "mm", "_deg": "degrees", "_N": "N",
-    "_seconds": "s", "_s": "s", "_MB": "MB", "_kg_m3": "kg/m³", "_g": "g",
-}  # fmt: skip
+UNITS = {"_mm2": "mm²", "_Nmm": "N mm", "_mJ": "mJ", "_mm": "mm", "_deg": "degrees", "_N": "N", "_s": "s"}
 
 
 def unit(key: str) -> str:
-    """Return the unit that the name of a key ends in."""
+    """Return the unit that the name of a number ends in."""
     return next((text for suffix, text in UNITS.items() if key.endswith(suffix)), "")
 
 
@@ -44,7 +40,7 @@ def write_generated(docs: Path) -> None:
     """Write the generated parts of pages into docs/_generated; files that stay the same are left alone."""
     folder = docs / "_generated"
     folder.mkdir(exist_ok=True)
-    pages = {"keys": keys(), "outputs": outputs(), "commands": commands(), "studies": studies(), "verdict": verdict()}
+    pages = {"outputs": outputs(), "commands": commands(), "studies": studies(), "verdict": verdict()}
     for name, text in pages.items():
         _write(folder / f"{name}.md", text)
 
@@ -64,83 +60,6 @@ def write_notebooks(folder: Path) -> None:
 def _write(path: Path, text: str) -> None:
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
-
-
-def keys() -> str:
-    """Return a section for every table of a scene, from the JSON schema."""
-    from finger3d.scene.schema import schema
-
-    lines = []
-    for title, table in _scene_tables(schema()):
-        lines += [f"## `{title}`", "", "| key | allowed | unit | default | meaning |", "|---|---|---|---|---|"]
-        required = table.get("required", ())
-        for key, node in table["properties"].items():
-            default = "required" if key in required else f"`{_toml(node['default'])}`" if "default" in node else ""
-            cells = (f"`{key}`", _allowed(node), unit(key), default, node.get("description", ""))
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-        if not table["properties"]:
-            lines.append("| | | | | no keys |")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def _scene_tables(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    top = schema["properties"]
-    yield "title", {"properties": {"title": top["title"]}}
-    for name, node in top.items():
-        if name == "title":
-            continue
-        if name == "press":
-            legs = node["oneOf"][1]["properties"]["leg"]["items"]
-            yield "[press] or [[press.leg]]", legs
-        elif "oneOf" in node and "properties" not in node:
-            for choice in node["oneOf"]:
-                kind = next(iter(choice["properties"]))
-                told = choice["properties"][kind].get("const", choice.get("title"))
-                yield f'[{name}] {kind} = "{told}"', choice
-        elif name == "effects":
-            # true and false stand for a table, too
-            tables = {key: table["oneOf"][1] for key, table in node["properties"].items() if "oneOf" in table}
-            own = {key: value for key, value in node["properties"].items() if key not in tables}
-            yield "[effects]", {"properties": own}
-            yield from ((f"[effects.{effect}]", table) for effect, table in tables.items())
-        elif node["type"] == "array":
-            yield f"[[{name}]]", node["items"]
-        elif isinstance(node.get("additionalProperties"), dict):
-            yield f"[{name}.LABEL]", node["additionalProperties"]
-        else:
-            yield f"[{name}]", node
-
-
-def _allowed(node: dict[str, Any]) -> str:
-    from finger3d._ranges import number
-
-    if "const" in node:
-        return f"`{_toml(node['const'])}`"
-    if "enum" in node:
-        return ", ".join(f"`{_toml(value)}`" for value in node["enum"])
-    if "anyOf" in node:
-        return " or ".join(_allowed(choice) for choice in node["anyOf"])
-    if node["type"] == "array":
-        if "prefixItems" in node:
-            low, *others = (_allowed(choice) for choice in node["prefixItems"])
-            assert {*others} == {low}
-            return f"list of {len(others) + 1}, each a {low}"
-        inner = node["items"]
-        return f"list of {_allowed(inner)}" if "prefixItems" not in inner else "list of pairs"
-    low, high = node.get("minimum", node.get("exclusiveMinimum")), node.get("maximum", node.get("exclusiveMaximum"))
-    if low is not None and low == high:
-        return number(low)
-    names = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
-    bounds = "" if low is None or high is None else f", {number(low)} to {number(high)}"
-    ends = " (ends excluded)" if "exclusiveMinimum" in node or "exclusiveMaximum" in node else ""
-    return names[node["type"]] + bounds + ends
-
-
-def _toml(value: object) -> str:
-    from finger3d.scene.messages import shown
-
-    return shown(value)
 
 
 def outputs() -> str:
@@ -174,17 +93,16 @@ def commands() -> str:
 def studies() -> str:
     """Return the index of validation/, its links relative to docs/."""
     text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
-    return _part_of(text, "\n- *Verification*", "\n## All rows")
+    return _linked_from_docs(text[text.index("\n- *Verification*") :])
 
 
 def verdict() -> str:
     """Return the table of the paper's claims from the index of validation/, its links relative to docs/."""
     text = (ROOT / "validation" / "README.md").read_text(encoding="utf-8")
-    return _part_of(text, "\nEvery cell", "\n## Studies")
+    return _linked_from_docs(text[text.index("\nEvery cell") : text.index("\n## Studies")])
 
 
-def _part_of(text: str, first: str, last: str) -> str:
-    part = text[text.index(first) : text.index(last)]
+def _linked_from_docs(part: str) -> str:
     return re.sub(r"\]\((?!https?:|#)", "](../validation/", part) + "\n"
 
 

@@ -48,6 +48,11 @@ def commands_of(pages: list[Path]) -> list[str]:
     return list(dict.fromkeys(line for line in lines if line.startswith("finger3d ")))
 
 
+def scenes(page: Path) -> dict[str, str]:
+    """The scenes that a page asks to be saved, by the names of their files."""
+    return dict(re.findall(r"`(\w+\.toml)`:\n\n```toml\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL))
+
+
 def python(root: Path, heading: str, page: str = "README.md") -> list[str]:
     text = (root / page).read_text(encoding="utf-8")
     part = text[text.index(f"\n## {heading}\n") :].split("\n## ", 2)[1]
@@ -75,10 +80,14 @@ def test_every_command_is_run(
     assert {c.split()[1] for c in commands(root)} >= set(
         "new plan cost press compare calibrate estimate identify optimise sweep export show".split()
     )
+    quick = {name: text for page in root.glob("docs/*.md") for name, text in scenes(page).items()}
+    for name, text in quick.items():
+        Path(name).write_text(text, encoding="utf-8")
     for command in shown(root):
         words = shlex.split(command.split(" > ")[0])[1:]  # what a shell redirects is printed
-        for key in COARSE["gear" if "gear" in command else words[0]].split() if words[0] in COARSE else ():
-            words += ["--set", key]
+        if not quick.keys() & set(words):
+            for key in COARSE.get("gear" if "gear" in command else words[0], "").split():
+                words += ["--set", key]
         if words[0] == "identify":
             rows = list(csv.DictReader(Path("out/mine/history.csv").open()))
             lines = [f"{row['depth_mm']},{row['normal_force_N']}" for row in rows]
@@ -112,6 +121,22 @@ def test_the_scene_of_the_readme_is_that_of_its_command(root: Path) -> None:
     scene = tomllib.loads((root / "geometries" / "fig9.toml").read_text(encoding="utf-8"))
     assert shown
     assert {"title": scene["title"]} | tomllib.loads(shown[1]) == scene
+
+
+def test_the_first_scene_gives_what_its_page_shows(root: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    page = root / "docs" / "start.md"
+    text = page.read_text(encoding="utf-8")
+    for name, scene in scenes(page).items():
+        Path(name).write_text(scene, encoding="utf-8")
+    (command,) = (c for c in commands_of([page]) if "first.toml" in c)
+    assert main([*shlex.split(command)[1:], "--no-figures"]) == 0
+    found = {line.strip() for line in capsys.readouterr().out.splitlines()}
+    (shown,) = re.findall(r"```text\n(.*?)```", text, flags=re.DOTALL)
+    assert len(shown.splitlines()) > 5
+    assert set(shown.splitlines()) <= found
+    *_, last = csv.DictReader(Path("out/first/history.csv").open(encoding="utf-8"))
+    forces = dict(re.findall(r"^\| `(\w+_force_x_N|force_x_N)` \| ([\d.]+) \|", text, flags=re.MULTILINE))
+    assert forces == {key: f"{float(last[key]):.3f}" for key in ("tangential_force_x_N", "force_x_N")}
 
 
 @pytest.mark.slow

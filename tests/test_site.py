@@ -157,7 +157,7 @@ def test_pages_open_without_complaint_request_or_sideways_scrolling(site: Path, 
     page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: requests.append(request.url))
-    names = ["index", "start", "scenes", "gallery", "verification", "reference/keys", "reference/python"]
+    names = ["index", "start", "scenes", "gallery", "verification", "reference/outputs", "reference/python"]
     for name in [*names, "theory/errors", *(f"tutorials/{tutorial}" for tutorial in TUTORIALS)]:
         page.goto((site / f"{name}.html").as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") <= width, name

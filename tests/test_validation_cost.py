@@ -1,4 +1,4 @@
-"""What an error costs beyond the runs of cost_of_accuracy, and the table of docs/accuracy.md."""
+"""What an error costs beyond the runs of cost_of_accuracy, and the table of docs/cost.md."""
 
 from __future__ import annotations
 
@@ -69,11 +69,9 @@ def test_the_table_says_what_is_extrapolated_and_what_is_the_same() -> None:
             for b in ("section", "solid", "section, large deformation", "solid, large deformation")
             for q in ("force", "friction_sum", "gauge_strain", "contact_length", "stick_length")
             for more in ({}, {}, {k: far[k] for k in ("seconds", "peak_MB", "extrapolated")})]  # fmt: skip
-    assert markdown(kept)[2] == (
-        "| section: force | M 0.12 mm, 10: 0.5 s, 1.5 GB | the same | *M 0.12 mm, 10: over a year, over 1 TB* |"
-    )
+    assert markdown(kept)[2] == "| section: force | M 0.12 mm, 10: 0.5 s, 1.5 GB | the same | over a day |"
 
 
 def test_the_table_of_the_page_is_made_from_the_kept_results() -> None:
-    page = Path(__file__).parents[1] / "docs" / "accuracy.md"
+    page = Path(__file__).parents[1] / "docs" / "cost.md"
     assert "\n".join(markdown(committed("cost_of_accuracy"))) in page.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The table of docs/accuracy.md, from the results of cost_of_accuracy: `python -m validation._cost_table` prints it."""
+"""The table of docs/cost.md, from the results of cost_of_accuracy: `python -m validation._cost_table` prints it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ NUMBERS = {
     "force": "force", "friction_sum": "friction sum", "gauge_strain": "gauge strain",
     "contact_length": "extent of contact", "stick_length": "extent of the stick zone",
 }  # fmt: skip
-UNITS = (("days", 86_400.0), ("h", 3600.0), ("min", 60.0))
-YEAR_S, TERABYTE_MB = 3.156e7, 1e6
+UNITS = (("h", 3600.0), ("min", 60.0))
+DAY_S = 86_400.0
 
 
 def markdown(lines: Sequence[Mapping[str, str]]) -> list[str]:
@@ -40,24 +40,22 @@ def _without_repeats(row: Sequence[str]) -> list[str]:
 
 
 def _cell(line: Mapping[str, str]) -> str:
-    """Return mesh, increments, time and memory; in italics if they are extrapolated."""
+    """Return mesh, increments, time and memory of less than a day; in italics if they are extrapolated."""
     if not line["element"]:
         return "truth too uncertain"
+    if float(line["seconds"]) > DAY_S:
+        return "over a day"
     mesh = f"{line['element'][0].upper()} {float(line['size_mm']):.2g} mm, {line['steps']}"
     text = f"{mesh}: {_time(float(line['seconds']))}, {_memory(float(line['peak_MB']))}"
     return f"*{text}*" if line.get("extrapolated") else text
 
 
 def _time(seconds: float) -> str:
-    if seconds > YEAR_S:
-        return "over a year"
     unit, scale = next(((unit, scale) for unit, scale in UNITS if seconds >= 2.0 * scale), ("s", 1.0))
     return f"{_short(seconds / scale)} {unit}"
 
 
 def _memory(megabytes: float) -> str:
-    if megabytes > TERABYTE_MB:
-        return "over 1 TB"
     return f"{_short(1e-3 * megabytes)} GB" if megabytes >= 1e3 else f"{_short(megabytes)} MB"
 
 

@@ -29,7 +29,7 @@ from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 
 from . import _verdict
-from ._rows import COLUMNS, Result, Row, Settled, score, table
+from ._rows import COLUMNS, Result, Row, Settled, score
 
 NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
@@ -295,9 +295,9 @@ _HEAD = """
 - *Statement*: what the paper says of its sensor, or what a goal or an estimate of this project says. Whether it holds
   is a finding about the statement; a statement that does not hold is no failure of the program.
 
-The error is relative to the wanted value, unless that is a bound or the error is a plain number.  References such as
-*REFERENCES.md, 2.1* are sections of [REFERENCES.md](REFERENCES.md).  Run all studies with
-`python -m validation`, one with `python -m validation NAME`.
+The *rows* of a study are a CSV file: what was compared, the wanted value and its reference, the value that was found,
+the error, the tolerance and its reason.  References such as *REFERENCES.md, 2.1* are sections of
+[REFERENCES.md](REFERENCES.md).  Run all studies with `python -m validation`, one with `python -m validation NAME`.
 """
 
 
@@ -320,19 +320,9 @@ def write_index(out: Path, known: Mapping[str, Study]) -> None:
             about = _about(out, known[name])
             picture = f", [figure](figures/{name}.png)" if (out / "figures" / f"{name}.png").is_file() else ""
             more = f", [table](results/{name}_table.csv)" if (out / "results" / f"{name}_table.csv").is_file() else ""
-            links = f"[{name}]({name}.py){picture}{more}"
-            lines.append(f"| {links} | {_cell(known[name].question)} | {score(rows)} | {about.get('seconds', '')} |")
-    lines += [
-        "",
-        "## All rows",
-        "",
-        "| study | what | kind | reference | wanted | got | error | tolerance and its reason | verdict |",
-    ]
-    lines.append("|---|---|---|---|---|---|---|---|---|")
-    lines += ["| " + " | ".join(map(_cell, line)) + " |" for line in table(kept)]
+            links = f"[{name}]({name}.py), [rows](results/{name}.csv){picture}{more}"
+            found = score(rows) + ("" if all(row.passed for row in rows) else ", **FAIL**")
+            question = known[name].question.replace("|", "\\|")
+            lines.append(f"| {links} | {question} | {found} | {about.get('seconds', '')} |")
     with atomic(out / "README.md") as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")

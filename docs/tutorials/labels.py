@@ -17,8 +17,9 @@
 # random, reads the file in three lines, and looks at one sample. Download this page as a script:
 # {download}`labels.py`.
 #
-# All objects, friction coefficients and paths of the samples share one condensed pad, whose edges are as short
-# everywhere on its contact face; a sample then costs its increments only.
+# All samples share one pad, whatever their object, friction coefficient and path: it is meshed and condensed
+# ([glossary](../glossary.md#condensation)) once, with edges of one length all over its contact face. A sample then
+# costs only its increments.
 
 # %%
 from pathlib import Path
@@ -89,9 +90,9 @@ print(
 # It may be stopped at any time, even killed: the same command continues, and `labels.h5` has all samples that were
 # finished. With `--scheduler ADDRESS` it runs on a Dask cluster.
 #
-# `labels.h5` has a group for each body, here one. The first axis of every array is the sample, the second the
-# increment, here the last alone; `increments = "all"` in `[labels]` keeps every one. The numbers of each sample, with
-# the keys that were drawn, are in `numbers`.
+# `labels.h5` has a group for each body; here there is one. The first axis of every array is the sample, the second the
+# increment. Only the last increment is there, unless `[labels]` has `increments = "all"`. The numbers of each sample,
+# with the keys that were drawn, are in `numbers`.
 
 # %%
 with h5py.File("out/labels/labels.h5") as file:

@@ -16,8 +16,8 @@
 # far it sinks, and finds the smallest grip that holds it for three coefficients of friction. Download this page as a
 # script: {download}`pinch.py`.
 #
-# `[grip]` takes the place of `[press]`. The scene describes the lower finger; the upper one is its mirror image, and
-# faces it along y across the ball. Here this is `geometries/pinch.toml` with longer edges and in small strain.
+# `[grip]` takes the place of `[press]`. The scene describes the lower finger; the upper one is its mirror image and
+# faces it along y across the ball. This scene is `geometries/pinch.toml` on a coarser mesh and in small strain.
 
 # %%
 from pathlib import Path
@@ -60,9 +60,10 @@ held = finger3d.press("pinch.toml", "out/pinch", error=False)
 print(held.outcome)
 
 # %% [markdown]
-# The closing moves the ball along y only. Then its weight acts in three increments, in which the ball may move and
-# turn in every direction, but for those that the symmetry of fingers, ball and weight about x excludes. `object_pose`
-# says where its centre of mass is at the end, from where it was at first touch.
+# While the fingers close, the ball moves along y only. Then its weight acts in three increments
+# ([glossary](../glossary.md#increment)), in which the ball may move and turn in every direction except those that the
+# symmetry of fingers, ball and weight about x excludes. `object_pose` says how far its centre of mass has moved since
+# first touch.
 
 # %%
 summary = held.summary()
@@ -72,8 +73,8 @@ print(f"each finger closes by {pose['closing_mm']:.3f} mm")
 print(f"the ball sinks by {-pose['z_mm']:.3f} mm")
 
 # %% [markdown]
-# `fingers` has the increments of both fingers, and how near each is to slipping: `slip_margin` is what is left of the
-# largest tangential load that it holds.
+# `fingers` has the increments of both fingers. Their `slip_margin` says how near each is to slipping: it is the share of
+# the largest tangential load that is still left.
 
 # %%
 for finger in summary["fingers"]:
@@ -98,9 +99,9 @@ plt.show()
 #
 # Coulomb's law asks for $N \ge m g / (2 \mu)$ where all friction acts along the weight. `least_grip=True`, or
 # `--least-grip` on the command line, finds the smallest force that holds the ball, within 1 %, by bisection: it closes
-# the fingers with each force in turn, and lets the weight act. Here it agrees with Coulomb's law within that 1 %, as
-# the contact is small beside the ball and nearly flat. Where an object also turns, or fingers reach around it, it need
-# not.
+# the fingers with each force in turn and lets the weight act. Here it agrees with Coulomb's law within that 1 %,
+# because the contact is small compared with the ball and nearly flat. It need not agree if an object also turns, or if
+# fingers reach around it.
 
 # %%
 WEIGHT = 36e-3 * 9.80665

@@ -36,9 +36,9 @@ class PressStep:
     turn_x_deg, turn_y_deg, turn_z_deg : turns of the object from where it touched first
     time_s : time at the end of the increment
     normal_force_N : sum of the contact forces along -y on the finger
-    tangential_force_x_N, tangential_force_z_N : net friction on the finger
+    tangential_force_x_N, tangential_force_z_N : sum of the friction on the finger, without the pressure
     friction_sum_N : sum of |friction| over the contact points
-    force_x_N, force_y_N, force_z_N : the whole contact force on the finger, pressure and friction
+    force_x_N, force_y_N, force_z_N : sum of pressure and friction on the finger, which a load cell reads
     moment_x_Nmm, moment_y_Nmm, moment_z_Nmm : its moment about the middle of the base
     outward_friction_x_N, outward_friction_z_N : sum of the friction away from the object's lowest point
     contact_area_mm2, stick_area_mm2 : area at rest of the zones of contact and of stick, which end between the points
