@@ -13,8 +13,8 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
-from finger3d.geometry.cad import cut_part
-from finger3d.geometry.files import read_step, read_surface, welded
+from finger3d.geometry.cad import cut_part, labelled_faces
+from finger3d.geometry.files import read_solid, read_step, read_surface, welded
 from finger3d.geometry.imported import imported
 from finger3d.geometry.parts import OUTSIDE, glue
 from finger3d.geometry.surface import Triangles
@@ -170,8 +170,51 @@ def test_a_finger_drawn_elsewhere_comes_onto_its_base(drawn: Path, name: str) ->
     assert body.mirrors() == (() if name == "finger.stl" else BOTH)
 
 
+def step_with_base(path: Path, solid: Any, *bases: Any) -> Path:
+    """A STEP file in which these faces of the solid are named base, as CAD programs write it."""
+    step_of(path, solid)
+    written = read_solid(path).faces()  # in the order of the file
+    numbers = {min(range(len(written)), key=lambda i: (written[i].center() - f.center()).length) for f in bases}
+    text, count = path.read_text(encoding="utf-8"), iter(range(99))
+    text = re.sub(r"ADVANCED_FACE\(''", lambda m: m[0][:-2] + ("'Base'" if next(count) in numbers else "''"), text)
+    assert text.count("'Base'") == len(bases)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("turn", [(90.0, 0.0, 0.0), (0.0, 0.0, 90.0), (0.0, 0.0, 180.0), (31.0, 0.0, 17.0), (0, 0, 0)])
+def test_the_face_named_base_is_turned_down(tmp_path: Path, turn: tuple[float, float, float]) -> None:
+    from build123d import Axis, Rot
+
+    solid = SMALL.solid()
+    base = solid.faces().sort_by(Axis.Y)[0]
+    body = imported(step_with_base(tmp_path / "finger.step", Rot(*turn) * solid, Rot(*turn) * base))
+    assert body.height_mm == pytest.approx(SMALL.height_mm, abs=1e-9)
+    assert body.surface.low[1] == 0.0
+    if turn[0] != 31.0:  # the shortest way down leaves that one turned about y
+        np.testing.assert_allclose([2.0 * body.half_length_mm, body.width_mm], [20.0, 8.0], atol=1e-9)
+    assert [f.label for f in labelled_faces(body.solid())].count("base") == 1
+    assert body.volume_mm3 == pytest.approx(SMALL.volume_mm3, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
+    from build123d import Axis, Box, Pos
+
+    solid = (Box(8.0, 8.0, 4.0) + Pos(4.0, 0.0, 0.0) * Box(4.0, 2.0, 4.0)).solids()[0]  # a ledge on one side
+    side = next(f for f in solid.faces() if f.normal_at(f.center()).X > 0.99 and abs(f.center().X - 4.0) < 1e-6)
+    with pytest.raises(Finger3dError, match="2 mm .*'base'"):
+        imported(step_with_base(tmp_path / "ledge.step", solid, side))
+    both = [solid.faces().sort_by(axis)[0] for axis in (Axis.X, Axis.Y)]
+    with pytest.raises(Finger3dError, match="2 .*'base'"):
+        imported(step_with_base(tmp_path / "two.step", solid, *both))
+    dome = next(f for f in SMALL.solid().faces() if not f.is_planar)
+    with pytest.raises(Finger3dError, match="'base'"):
+        imported(step_with_base(tmp_path / "round.step", SMALL.solid(), dome))
+
+
 def test_a_body_drawn_with_z_up_is_turned_about_x(tmp_path: Path) -> None:
-    from build123d import Rot
+    from build123d import Axis, Rot
 
     upright = imported(step_of(tmp_path / "y.step", SMALL.solid()))
     lying = Rot(90.0, 0.0, 0.0) * SMALL.solid()
@@ -186,6 +229,9 @@ def test_a_body_drawn_with_z_up_is_turned_about_x(tmp_path: Path) -> None:
     assert body != imported(path)
     where = (options(1.0, 2.0), (-1.0, 1.0, -1.0, 1.0), ())
     assert cache.key(body, *where) != cache.key(imported(path), *where)
+    # a face named base agrees with it
+    based = imported(step_with_base(tmp_path / "base.step", lying, lying.faces().sort_by(Axis.Z)[0]), up="z")
+    np.testing.assert_allclose(based.surface.high, body.surface.high, atol=1e-9)
 
 
 def test_z_up_turns_y_to_minus_z_as_a_rotation_does(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def read(path: Array) -> Mapping[str, Array]:
     -------
     dict
         ``error``, a text, empty if solids were read: then ``shape``, bytes in OpenCASCADE's binary format, ``labels``
-        (s,) of the solids, and the ``unit`` of length.
+        (s,) of the solids, the names ``faces`` of their faces, one solid after the other, and the ``unit`` of length.
     """
     from OCP.BinTools import BinTools
     from OCP.BRepCheck import BRepCheck_Analyzer
@@ -62,11 +62,13 @@ def read(path: Array) -> Mapping[str, Array]:
     labels = [_label(_entity_name(solid, reader)) for solid in solids]
     if len(solids) > 1 and not all(labels):
         labels = [label or _label(name) for label, name in zip(labels, _product_names(str(path), solids), strict=True)]
+    faces = [_entity_name(face, reader) for solid in solids for face in _inside(solid, TopAbs_ShapeEnum.TopAbs_FACE)]
     stream = io.BytesIO()
     BinTools.Write_s(shape, stream)
     content = np.frombuffer(stream.getvalue(), dtype=np.uint8)
     return {
-        "error": np.array(""), "shape": content, "labels": np.array(labels), "unit": np.array(_unit(reader))
+        "error": np.array(""), "shape": content, "labels": np.array(labels), "faces": np.array(faces),
+        "unit": np.array(_unit(reader)),
     }  # fmt: skip
 
 
@@ -95,7 +97,7 @@ def _inside(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> Sequence[TopoDS_Shap
 
 
 def _entity_name(shape: TopoDS_Shape, reader: STEPControl_Reader) -> str:
-    """Return the name of the MANIFOLD_SOLID_BREP that a solid was read from."""
+    """Return the name of the ADVANCED_FACE or MANIFOLD_SOLID_BREP that a shape was read from."""
     from OCP.StepRepr import StepRepr_RepresentationItem
     from OCP.TopLoc import TopLoc_Location
 

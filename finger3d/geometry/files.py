@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import io
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from finger3d.geometry.surface import Triangles, connected
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
-    from build123d import Compound, Solid
+    from build123d import Compound, Face, Solid
 
 
 STL, STEP = (".stl",), (".step", ".stp")
@@ -205,11 +206,13 @@ class StepBody:
     ----------
     solids : in the order of the file
     labels : name of each solid, or else of its product; "" for none or one that only says what it is, like SOLID
+    faces : by their names in the file, in lower case
     unit : of length in the file; empty if it names none
     """
 
     solids: tuple[Solid, ...]
     labels: tuple[str, ...]
+    faces: Mapping[str, list[Face]]
     unit: str
 
 
@@ -240,7 +243,12 @@ def read_step(path: Path) -> StepBody:
         raise Finger3dError(f"{path}: {read['error']}")
     shape = TopoDS_Shape()
     BinTools.Read_s(shape, io.BytesIO(read["shape"].tobytes()))
-    return StepBody(tuple(Compound(shape).solids()), tuple(read["labels"].tolist()), str(read["unit"]))
+    solids = tuple(Compound(shape).solids())
+    faces: dict[str, list[Face]] = {}
+    for face, name in zip((f for solid in solids for f in solid.faces()), read["faces"].tolist(), strict=True):
+        if name:
+            faces.setdefault(name.lower(), []).append(face)
+    return StepBody(solids, tuple(read["labels"].tolist()), faces, str(read["unit"]))
 
 
 def tessellated(solid: Solid | Compound) -> Triangles:

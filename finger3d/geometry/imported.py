@@ -20,7 +20,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 
 if TYPE_CHECKING:
-    from build123d import Compound, Solid
+    from build123d import Compound, Face, Solid
 
     from finger3d.geometry.tessellate import Tessellation
 
@@ -29,6 +29,7 @@ Up: TypeAlias = Literal["y", "z"]
 
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 
+_BASE_NAME = "base"  # of a face in a STEP file
 _BASE_FLATNESS = 1e-5  # largest distance of the base from its plane, over the size
 _DOWNWARD = 1.0 - 1e-6  # least component along -y of the base's unit normal
 _LEAST_BASE_SHARE = 0.02  # of the footprint
@@ -101,7 +102,7 @@ def extent(design: Design) -> str:
 class Imported(FileDesign):
     """A body from a STEP or STL file, with the middle of its base at the origin.
 
-    The base is the lowest plane.
+    The base is the lowest plane, or the plane of the face named "base" in a STEP file, rotated to face down.
 
     Attributes
     ----------
@@ -109,6 +110,7 @@ class Imported(FileDesign):
     content : SHA-256 of the file
     scale : factor of the coordinates in the file
     upside_down : rotated about z by half a turn, so that the highest plane is the base
+    named_base : rotated so that the face named "base" faces down
     middle : (3,) middle of the base in the file's coordinates after the rotation, mm
     surface : closed triangles in the final position, mm
     cad : the build123d solid in the final position; None for STL
@@ -121,6 +123,7 @@ class Imported(FileDesign):
     content: str
     scale: float
     upside_down: bool
+    named_base: bool
     middle: Float = field(compare=False, repr=False)
     surface: Triangles = field(compare=False, repr=False)
     cad: Solid | None = field(compare=False, repr=False)
@@ -143,7 +146,7 @@ class Imported(FileDesign):
     @property
     def cache_fields(self) -> Mapping[str, object]:
         """Content of the file and how it was turned; the file's name does not matter."""
-        turned = {"up": "z"} if self.up == "z" else {}
+        turned = ({"named_base": "True"} if self.named_base else {}) | ({"up": "z"} if self.up == "z" else {})
         dimensions = {"content": self.content, "scale": repr(self.scale), "upside_down": repr(self.upside_down)}
         return {"design": "imported", "dimensions": {**dimensions, **turned}}
 
@@ -193,8 +196,8 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
     Parameters
     ----------
     path : .stl (mm) or .step
-        Solids of a STEP file are parts with their names as labels; those without a name are the main body. A body may
-        be hollow.
+        A plane face named "base" in a STEP file (the name of its ADVANCED_FACE) is turned down. Solids of a STEP file
+        are parts with their names as labels; those without a name are the main body. A body may be hollow.
     upside_down : turn it, so that its highest plane becomes the base
     scale : factor of the lengths, which are mm before
     up : axis of the file that becomes y; z does by a quarter turn about x, before anything else
@@ -211,6 +214,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
     """
     path = Path(path)
     solid = None
+    base: list[Face] = []
     parts: dict[str, list[Solid]] = {}
     if path.suffix.lower() in STEP:
         from build123d import Axis
@@ -223,9 +227,11 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
             read = _y_up(read)
         solid, parts = united(path, read)
         moves: list[Callable[[Solid], Solid]] = []
+        if base := read.faces.get(_BASE_NAME, []):
+            moves.append(_turn(path, solid, base))
         if scale != 1.0:
             moves.append(lambda shape: enlarged(shape, scale))
-        if upside_down:
+        if upside_down and not base:
             moves.append(lambda shape: shape.rotate(Axis.Z, 180.0))
         for move in moves:
             solid, parts = move(solid), {label: [move(s) for s in found] for label, found in parts.items()}
@@ -240,7 +246,7 @@ def imported(path: str | Path, upside_down: bool = False, scale: float = 1.0, up
         if upside_down:
             surface = Triangles(surface.points * [-1.0, -1.0, 1.0], surface.faces)
     found = _on_its_base(str(path), content(path), scale, upside_down, surface, solid)
-    return replace(found, parts=_moved(parts, found.middle), up=up, unit=unit)
+    return replace(found, named_base=bool(base), parts=_moved(parts, found.middle), up=up, unit=unit)
 
 
 def _y_up(read: StepBody) -> StepBody:
@@ -248,7 +254,8 @@ def _y_up(read: StepBody) -> StepBody:
     from build123d import Axis
 
     solids = tuple(solid.rotate(Axis.X, -90.0) for solid in read.solids)
-    return replace(read, solids=solids)
+    faces = {name: [face.rotate(Axis.X, -90.0) for face in found] for name, found in read.faces.items()}
+    return replace(read, solids=solids, faces=faces)
 
 
 def united(path: Path, read: StepBody) -> tuple[Solid, dict[str, list[Solid]]]:
@@ -310,7 +317,35 @@ def _on_its_base(
         raise Finger3dError(
             f'{path}: nothing of the body looks up; is it drawn with y up? A finger with z up takes up = "z"'
         )
-    return Imported(path, digest, scale, upside_down, middle, moved, solid)
+    return Imported(path, digest, scale, upside_down, False, middle, moved, solid)
+
+
+def _turn(path: Path, solid: Solid, base: list[Face]) -> Callable[[Solid], Solid]:
+    """Return the rotation by the smallest angle (about z, if by 180 degrees) that turns the named faces down."""
+    normals = np.array([[*face.normal_at(face.center())] for face in base])
+    out = normals[0]
+    if not all(face.is_planar for face in base) or (normals @ out).min() < _DOWNWARD:
+        raise Finger3dError(
+            f"{path}: the {len(base)} faces named '{_BASE_NAME}' are not one plane; name one plane face so"
+        )
+
+    def turned(shape: Solid) -> Solid:
+        if out[1] <= -_DOWNWARD:
+            return shape
+        from build123d import Axis
+
+        around = np.cross(out, [0.0, -1.0, 0.0])
+        axis = around / np.linalg.norm(around) if out[1] < _DOWNWARD else np.array([0.0, 0.0, 1.0])
+        return shape.rotate(Axis((0, 0, 0), tuple(axis)), float(np.degrees(np.arccos(np.clip(-out[1], -1.0, 1.0)))))
+
+    surface = tessellated(turned(solid))
+    level = -out @ np.array([*base[0].center()])
+    if abs(surface.low[1] - level) > _BASE_FLATNESS * surface.size:
+        raise Finger3dError(
+            f"{path}: the body reaches {level - surface.low[1]:.4g} mm beyond the face named '{_BASE_NAME}'; the base "
+            "must be its outermost plane"
+        )
+    return turned
 
 
 def _check_size(path: str, surface: Triangles) -> None:
