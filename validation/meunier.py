@@ -3,8 +3,8 @@
 Source: Meunier et al. 2008, validation/REFERENCES.md, 9.3: nominal stress against stretch of an unfilled silicone in
 tension, compression, pure shear and equibiaxial tension (a bulge test), as digitised, stretches to 0.01.  `finger3d
 identify` fits four laws, Ogden's with two terms, to tension alone, to tension and compression, and to all four tests.
-The band of a prediction is two standard deviations of three errors together: those of the constants, the scatter of the
-tension test about its fit, and half a hundredth in the stretch.
+The band of a prediction is two standard deviations of three errors together: those of the constants, to first order and
+without their bounds, the scatter of the tension test about its fit, and half a hundredth in the stretch.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
                     axes.fill_between(at, curve - band, curve + band, color=f"C{i}", alpha=0.15, lw=0)
             axes.plot(test.stretch, test.stress, "ko", ms=3.5, label="measured")
             axes.set(xlabel="stretch", ylabel="nominal stress (MPa)")
-            kind = "fitted" if mode in FITS[own] else "predicted"
+            kind = "fitted" if mode in FITS[own] else "predicted, with bands"
             axes.set_title(f"{MODES[mode]}, {kind}\nlaws fitted to {own}", fontsize=9)
         line[0].legend(frameon=False, fontsize=8)
     figure.subplots_adjust(left=0.05, right=0.99, bottom=0.07, top=0.94, wspace=0.25, hspace=0.36)
