@@ -179,4 +179,3 @@ def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
             kind = "fitted" if mode in FITS[own] else "predicted, with bands"
             axes.set_title(f"{MODES[mode]}, {kind}\nlaws fitted to {own}", fontsize=9)
         line[0].legend(frameon=False, fontsize=8)
-    figure.subplots_adjust(left=0.05, right=0.99, bottom=0.07, top=0.94, wspace=0.25, hspace=0.36)
