@@ -16,6 +16,7 @@ import pytest
 import finger3d
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.emulator import Emulator
+from finger3d.analyses.identify.material_tests import LawInTests
 from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
 from finger3d.analyses.identify.simulated import Simulation
@@ -162,7 +163,8 @@ def emulator(tmp_path: Path, free: tuple[FreeKey, ...] = SPACE, fails: Callable[
             found = {name: v.tolist() for name, v in curve(*point[:2]).items()}
             return {"values": list(point), "outcome": "converged", "curve": found}
 
-    return Emulator(Known(SCENE, None, free, Journal(tmp_path / "presses.jsonl", [])), data)
+    known = Known(SCENE, None, free, Journal(tmp_path / "presses.jsonl", []))
+    return Emulator(known, data, LawInTests(SCENE, scene(), free, {}))
 
 
 def test_numbers_between_presses_converge_to_those_of_presses(tmp_path: Path) -> None:

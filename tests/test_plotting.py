@@ -336,13 +336,16 @@ def test_residuals_are_shown_in_standard_deviations(tmp_path: Path, figures: lis
     at, curve_at = np.array([0.2, 0.5, 0.9]), np.linspace(0.0, 1.0, 5)
     measured = 3.0 * at + [0.1, -0.2, 0.0]
     panels = [
-        Panel("normal_force_N", measured, np.full(3, 0.1), 3.0 * at, 3.0 * curve_at),
-        Panel("gauge_g", -at, np.full(3, 0.02), -at, -curve_at),
+        Panel("normal_force_N", measured, np.full(3, 0.1), 3.0 * at, 3.0 * curve_at, "depth_mm", at, curve_at),
+        Panel("gauge_g", -at, np.full(3, 0.02), -at, -curve_at, "depth_mm", at, curve_at),
+        Panel("stress_MPa", at, np.full(3, 0.1), at - 0.1, curve_at, "stretch", 1.0 + at, 1.0 + curve_at),
     ]
-    draw_fit(tmp_path / "a.png", "depth_mm", at, curve_at, panels)
+    draw_fit(tmp_path / "a.png", panels)
     (figure,) = figures
-    force, gauge, last = figure.axes[:3]
+    force, gauge, _, last, of_tests = figure.axes[:5]
     assert (force.get_ylabel(), gauge.get_ylabel()) == ("normal_force_N", "gauge_g")
+    assert (last.get_xlabel(), of_tests.get_xlabel()) == ("depth_mm", "stretch")
+    assert of_tests.get_lines()[0].get_ydata() == pytest.approx(np.ones(3))
     simulated = next(one for one in force.get_lines() if one.get_label() == "simulated")
     assert simulated.get_ydata() == pytest.approx(3.0 * simulated.get_xdata())
     residuals = {one.get_label(): one.get_ydata() for one in last.get_lines()}

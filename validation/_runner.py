@@ -121,7 +121,7 @@ def _with_helpers(path: Path) -> list[Path]:
         imports = re.findall(r"^from \.(\w*) import (.*)", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
         names = [name for module, what in imports for name in ([module] if module else what.split(", "))]
         found += [p for n in names if (p := path.with_name(f"{n}.py")) not in found and p.is_file()]
-    return found + [data for file in found if (data := file.with_suffix(".toml")).is_file()]
+    return found + [data for file in found for end in (".toml", ".csv") if (data := file.with_suffix(end)).is_file()]
 
 
 def studies(folder: Path | None = None) -> dict[str, Study]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from finger3d.scene.material import modulus_of
 from finger3d.scene.messages import shown
 
 _DECADE = 10.0
+
+Number = TypeVar("Number", float, Float)
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,11 @@ class FreeKey:
         """Whether shares are those of the logarithm: of positive bounds that differ by more than a decade."""
         return self.low > 0.0 and self.high / self.low > _DECADE
 
-    def value(self, share: float) -> float:
-        """Return the value at a share of the range, from 0 to 1."""
+    def value(self, share: Number) -> Number:
+        """Return the value at a share of the range, from 0 to 1; of several shares (n,) the values (n,)."""
         if self.is_logarithmic:
-            return self.low * math.pow(self.high / self.low, share)
+            logarithmic: Number = self.low * (self.high / self.low) ** share
+            return logarithmic
         return self.low + (self.high - self.low) * share
 
     def share(self, value: float) -> float:

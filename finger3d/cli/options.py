@@ -13,6 +13,9 @@ Flag = Annotated[bool, Parameter(negative=())]
 Texts = Annotated[list[str], Parameter(negative=())]
 """An option that may be repeated."""
 
+Paths = Annotated[list[Path], Parameter(negative=())]
+"""Files; the option may be repeated."""
+
 Set = Annotated[
     list[str] | None,
     Parameter(name="--set", negative=(), help="Override a key, for instance friction.mu=0.5; may be repeated."),

@@ -16,7 +16,7 @@ from finger3d.mechanics.model import Model
 
 _TABLE = "effects.large_deformation"
 
-_CONSTANTS = {
+CONSTANTS = {
     "neo-hookean": (),
     "mooney-rivlin": ("c01_share",),
     "yeoh": ("c2_over_c1", "c3_over_c1"),
@@ -57,25 +57,25 @@ class Effect:
 
     def apply(self, model: Model) -> Model:
         """Set the hyperelastic law of the model."""
-        law = self._isochoric_law()
+        law = self.isochoric_law()
         for mode, strain in {} if law.is_stable else unstable_from(law).items():
             if abs(strain) < _LEAST_STABLE_STRAIN:
-                keys = " and ".join(f"{_TABLE}.{key}" for key in _CONSTANTS[self.law])
+                keys = " and ".join(f"{_TABLE}.{key}" for key in CONSTANTS[self.law])
                 raise Finger3dError(
                     f"{keys}: with these constants the stress falls from a nominal strain of {strain:.2g} in {mode}; "
                     "choose constants that are stable further"
                 )
         return fill(model, "hyperelastic_law", law, "large_deformation")
 
-    def _isochoric_law(self) -> IsochoricLaw:
+    def isochoric_law(self) -> IsochoricLaw:
         """Return the law with a shear modulus of 1 MPa; a key that is missing, or of another law, is refused."""
-        given = {key: getattr(self, key) for keys in _CONSTANTS.values() for key in keys}
+        given = {key: getattr(self, key) for keys in CONSTANTS.values() for key in keys}
         for key, value in given.items():
-            own = key in _CONSTANTS[self.law]
+            own = key in CONSTANTS[self.law]
             if own and value is None:
                 raise Finger3dError(f'{_TABLE}.{key} is missing: law = "{self.law}" needs it')
             if not own and value is not None:
-                law = next(name for name, keys in _CONSTANTS.items() if key in keys)
+                law = next(name for name, keys in CONSTANTS.items() if key in keys)
                 raise Finger3dError(f'{_TABLE}.{key}: only for law = "{law}"; take it out, or change the law')
         match self.law:
             case "mooney-rivlin":

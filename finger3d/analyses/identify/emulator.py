@@ -19,6 +19,7 @@ from scipy.interpolate import RBFInterpolator
 
 from finger3d._types import Float
 from finger3d.analyses.free_keys import FreeKey, values_at
+from finger3d.analyses.identify.material_tests import LawInTests
 from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress
 from finger3d.analyses.identify.simulated import MODULI, OFFSET, Simulation
 from finger3d.errors import Finger3dError
@@ -37,11 +38,13 @@ class Emulator:
     Parameters
     ----------
     simulation : makes the presses
-    data : the measured press
+    data : the measured press; `NO_PRESS` without one
+    tested : law that gives the numbers of material tests, after those of the press, and without presses
     """
 
     simulation: Simulation
     data: MeasuredPress
+    tested: LawInTests
     _presses: dict[tuple[float, ...], Float] = field(default_factory=dict)
     _failures: dict[tuple[float, ...], Finger3dError] = field(default_factory=dict)
 
@@ -53,12 +56,14 @@ class Emulator:
     @cached_property
     def pressed(self) -> list[int]:
         """Numbers of the shares whose change needs a press."""
+        if not self.data.columns:
+            return []
         return [i for i, f in enumerate(self.free) if f.key != OFFSET and i not in self._modulus]
 
     @cached_property
     def _modulus(self) -> list[int]:
         """Number of the share of Young's modulus, if all stresses are proportional to it."""
-        if not self.simulation.scales_with_modulus:
+        if not self.data.columns or not self.simulation.scales_with_modulus:
             return []
         return [i for i, f in enumerate(self.free) if f.key in MODULI]
 
@@ -141,6 +146,9 @@ class Emulator:
 
     def __call__(self, shares: Float, kernel: str = "cubic") -> Float:
         """Return the numbers (s, n) at shares (s, k)."""
+        tested = self.tested.stress(shares)
+        if not self.data.columns:
+            return tested
         (first, *_) = self._presses.values()
         if self.pressed:
             found = self._interpolated[kernel](shares[:, self.pressed]).reshape(len(shares), *first.shape)
@@ -155,11 +163,22 @@ class Emulator:
             free, modulus = self.free[i], MODULI[self.free[i].key]
             factor = [modulus(free.value(float(share))) / modulus(free.middle) for share in shares[:, i]]
             found = np.where(self._is_stress, np.array(factor)[:, None] * found, found)
-        return np.asarray(found)
+        return np.concatenate([found, tested], axis=1)
+
+    @cached_property
+    def measured(self) -> dict[str, Float]:
+        """Every measured column, and the stresses of every material test, by name."""
+        return {**self.data.columns, **self.tested.columns}
+
+    @cached_property
+    def stds(self) -> dict[str, Float]:
+        """Standard deviations by column, of those that have them."""
+        return {**self.data.stds, **self.tested.stds}
 
     def columns(self, shares: Float) -> dict[str, Float]:
         """Return the numbers of every measured column at its rows, for shares (k,)."""
-        return dict(zip(self.data.columns, self(shares[None])[0].reshape(len(self.data.columns), -1), strict=True))
+        ends = np.cumsum([len(values) for values in self.measured.values()])[:-1]
+        return dict(zip(self.measured, np.split(self(shares[None])[0], ends), strict=True))
 
     @cached_property
     def _is_stress(self) -> NDArray[np.bool_]:
@@ -169,5 +188,5 @@ class Emulator:
     def error(self, shares: Float) -> Float:
         """Return the error (s, n) at shares (s, k): half of the difference to another interpolation."""
         if not self.pressed:
-            return np.zeros((len(shares), len(self._size)))
+            return np.zeros((len(shares), sum(map(len, self.measured.values()))))
         return 0.5 * (self(shares) - self(shares, "linear"))

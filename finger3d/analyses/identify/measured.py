@@ -139,13 +139,22 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
         raise Finger3dError(f"{path}: has {len(at)} rows; at least {_FEWEST} are needed")
     stds = {n: values[n + STD] for n in columns if n + STD in values}
     for name, own in stds.items():
-        bad = np.flatnonzero((own < _LEAST_STD) | (own > _LARGEST_STD))
-        if len(bad):
-            line = table.lines[int(bad[0])]
-            raise Finger3dError(
-                f"{path}: line {line}: {name}{STD} = {own[bad[0]]:g}: must be from {_LEAST_STD:g} to {_LARGEST_STD:g}"
-            )
+        check_stds(path, table.lines, name, own)
     return MeasuredPress(path, index, at, {n: values[n] for n in columns}, stds, table.lines)
+
+
+NO_PRESS = MeasuredPress(Path(), "", np.empty(0), {}, {}, ())
+"""Where material tests alone are given."""
+
+
+def check_stds(path: Path, lines: Sequence[int], name: str, stds: Float) -> None:
+    """Raise an error for the first standard deviation (n,) of a column that is out of range."""
+    bad = np.flatnonzero((stds < _LEAST_STD) | (stds > _LARGEST_STD))
+    if len(bad):
+        raise Finger3dError(
+            f"{path}: line {lines[int(bad[0])]}: {name}{STD} = {stds[bad[0]]:g}: must be from {_LEAST_STD:g} to "
+            f"{_LARGEST_STD:g}"
+        )
 
 
 def _direction(index: str, at: Float) -> float:

@@ -1,4 +1,4 @@
-"""Identification: the values of free keys with which a scene reproduces a measured press."""
+"""Identification: the values of free keys with which a scene reproduces a measured press and material tests."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ import numpy as np
 from scipy import optimize
 from scipy.linalg import block_diag, solve_triangular
 
-from finger3d._types import Float, Tree, TreeView
+from finger3d._types import Float, TreeView
 from finger3d.analyses.effects_by_need import settled_tables
 from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
 from finger3d.analyses.identify.emulator import Emulator
-from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress, read_measured
-from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
+from finger3d.analyses.identify.material_tests import (
+    CONSTANT_KEYS,
+    LawInTests,
+    is_material_test,
+    read_material_tests,
+)
+from finger3d.analyses.identify.measured import NO_PRESS, SHARPEST, MeasuredPress, read_measured
+from finger3d.analyses.identify.posterior import Samples, fitted_values, sampled
+from finger3d.analyses.identify.result import Identification, write
 from finger3d.analyses.identify.simulated import (
     OFFSET,
-    Curve,
     Simulation,
     check_rows,
     fitted_scene,
-    moving_part,
     names_of,
 )
 from finger3d.errors import Finger3dError
-from finger3d.io import claimed, write_csv, write_json, write_text
-from finger3d.plotting.identify import Panel, draw
+from finger3d.io import claimed
 from finger3d.progress import Progress
-from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
-from finger3d.scene import Scene, Source, files, parse, tree
-
-DEVIATIONS = "of the noise of the data, and of the errors of mesh and increments"
-"""What the standard deviations of an identification contain."""
+from finger3d.scene import Source, files, parse, tables_of, tree
 
 _BAR = 1.645
 """Error bar over the standard deviation of the error: nine of ten errors are within a bar."""
@@ -52,79 +52,22 @@ _IMPOSSIBLE, _INSIDE = 1e12, 1e-9  # misfit where a press fails; distance of a f
 _MISFIT = 2.0  # residuals over their stated standard deviation beyond which the scene does not explain the data
 
 
-@dataclass(frozen=True)
-class Identification:
-    """Result of an identification.
-
-    Attributes
-    ----------
-    scene : with the values that were found
-    keys : the free keys (k)
-    fitted : their values, standard deviations and correlation
-    measured : the data
-    simulated : values by column at the measured rows
-    stds : standard deviations by column (n,): those of the file, or those that the residuals have
-    curve : the simulated press
-    reduced_chi_square : of the columns with standard deviations of their own; NaN without any
-    notes : remarks on values that the data do not determine, and on a poor fit
-    presses : number of presses that were solved
-    """
-
-    scene: Scene
-    keys: tuple[str, ...]
-    fitted: FittedValues
-    measured: MeasuredPress
-    simulated: Mapping[str, Float]
-    stds: Mapping[str, Float]
-    curve: Curve
-    reduced_chi_square: float
-    notes: tuple[str, ...]
-    presses: int
-
-    def as_dict(self) -> Tree:
-        """Return the content of identify.json."""
-        fitted, names = self.fitted, ("value", "std", "std_numerical", "low", "high")
-        rows = np.column_stack([fitted.values, fitted.stds, fitted.numerical, fitted.low, fitted.high]).tolist()
-        tables = zip(self.keys, rows, fitted.correlation.tolist(), strict=True)
-        values, correlation = {}, {}
-        for key, row, correlated in tables:
-            values[key] = dict(zip(names, row, strict=True))
-            correlation[key] = dict(zip(self.keys, correlated, strict=True))
-        return {
-            "scene": self.scene.as_dict(),
-            "measured": str(self.measured.path),
-            "index": self.measured.index,
-            "values": values,
-            "correlation": correlation,
-            "reduced_chi_square": self.reduced_chi_square,
-            "residual_rms": {
-                name: float(np.sqrt(np.mean((values - self.simulated[name]) ** 2)))
-                for name, values in self.measured.columns.items()
-            },
-            "std_of_columns": {
-                name: {"from": "file" if name in self.measured.stds else "residuals", "rms": _rms(std)}
-                for name, std in self.stds.items()
-            },
-            "deviations": DEVIATIONS,
-            "notes": list(self.notes),
-            "presses": self.presses,
-        }
-
-
 def identify(
     scene: Source,
-    measured: str | Path,
+    measured: str | Path | Sequence[str | Path],
     free: Bounds,
     out: str | Path,
     overrides: Sequence[str] = (),
     report: Progress | None = None,
 ) -> Identification:
-    """Find the values of free keys with which a scene reproduces a measured press, by weighted least squares.
+    """Find the values of free keys with which a scene reproduces measurements, by weighted least squares.
 
     Parameters
     ----------
     scene : path of a TOML file, a dict with its tables, or a loaded scene
-    measured : CSV file with columns named as in history.csv, and optionally their standard deviations, ``..._std``
+    measured : CSV file with columns named as in history.csv, and optionally their standard deviations, ``..._std``; or
+        material tests, with ``stretch``, ``stress_MPa`` (nominal), ``mode`` (tension, compression, shear or
+        equibiaxial) and optionally ``stress_MPa_std``; or several files, of which one at most is a press
     free : key -> lower and upper bound, for instance ``{"material.E_MPa": (0.05, 5.0)}``, or texts such as
         ``"material.E_MPa=0.05:5"``; ``depth_offset_mm`` is added to the measured depths
     out : folder for presses.jsonl (every press once it is solved), identify.json, identify.csv, identified.toml,
@@ -143,31 +86,66 @@ def identify(
         For a mistake in the file or in the free keys, or if the press fails at the start.
     """
     report = report or Progress()
-    given, path = settled_tables(scene, overrides, report)
     keys = free_keys(free)
+    files_of_tests, files_of_press = _sorted(measured)
+    given, _ = tables_of(scene, overrides)
+    absent = [f"{f.key}={f.middle!r}" for f in keys if f.key in CONSTANT_KEYS and tree.value_at(given, f.key) is None]
+    given, path = tables_of(scene, [*overrides, *absent])
+    if files_of_press:
+        given, path = settled_tables(scene, [*overrides, *absent], report)
     start = _checked_start(given, keys, path)
-    model = parse(given, path).model()
-    data = read_measured(Path(measured), names_of(model))
-    if OFFSET in (f.key for f in keys) and data.index != "depth_mm":
-        raise Finger3dError(f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm")
-    if data.count <= len(keys):
-        raise Finger3dError(f"{data.path}: {data.count} measured values for {len(keys)} free keys; give more rows")
+    loaded, data = parse(given, path), NO_PRESS
+    tested = LawInTests.of(given, loaded, keys, [test for file in files_of_tests for test in read_material_tests(file)])
+    if files_of_press:
+        data = read_measured(files_of_press[0], names_of(loaded.model()))
+    _check_told(keys, data, tested)
     for values in (start, [f.low for f in keys], [f.high for f in keys]):
-        check_rows(fitted_scene(given, keys, values, path).model().legs, keys, data)
+        bound = fitted_scene(given, keys, values, path)
+        if files_of_press:
+            check_rows(bound.model().legs, keys, data)
     task = {
         "scene": tree.plain(given),
         "files": files.contents(given, path),
         "free": [[f.key, f.low, f.high] for f in keys],
-        "measured": hashlib.sha256(data.path.read_bytes()).hexdigest()[:16],
+        "measured": [hashlib.sha256(file.read_bytes()).hexdigest()[:16] for file in (*files_of_press, *files_of_tests)],
     }
     with (
         claimed(out, "identify") as folder,
         opened(folder / "presses.jsonl", folder / "task.json", task) as journal,
     ):
         simulation = Simulation(given, path, keys, journal, data)
-        found = _fitted(simulation, data, start, report)
-        _write(folder, found)
+        found = _fitted(Emulator(simulation, data, tested), start, report)
+        write(folder, found)
         return found
+
+
+def _sorted(measured: str | Path | Sequence[str | Path]) -> tuple[list[Path], list[Path]]:
+    """Return the files of material tests, and that of a press if there is one."""
+    paths = [Path(path) for path in ([measured] if isinstance(measured, str | Path) else measured)]
+    check_distinct([str(path) for path in paths], "--measured")
+    tests = [path for path in paths if is_material_test(path)]
+    presses = [path for path in paths if path not in tests]
+    if len(presses) > 1:
+        raise Finger3dError(f"--measured {presses[1]}: is a second press beside {presses[0]}; give one, and any tests")
+    return tests, presses
+
+
+def _check_told(keys: Sequence[FreeKey], data: MeasuredPress, tested: LawInTests) -> None:
+    """Raise an error for free keys of which the measurements tell nothing, and for more keys than measured values."""
+    for free in keys:
+        if free.key == OFFSET and data.columns and data.index != "depth_mm":
+            raise Finger3dError(
+                f"--free {OFFSET}: the rows of {data.path} are ordered by {data.index}, not by depth_mm"
+            )
+        if not data.columns and not tested.tells(free.key):
+            raise Finger3dError(
+                f"--free {free.key}: material tests tell only Young's modulus and the constants of "
+                "effects.large_deformation; give a press, too"
+            )
+    count = data.count + sum(len(test.stress) for test in tested.tests.values())
+    if count <= len(keys):
+        path = next((test.path for test in tested.tests.values()), data.path)
+        raise Finger3dError(f"{path}: {count} measured values for {len(keys)} free keys; give more rows")
 
 
 def _checked_start(given: TreeView, free: Sequence[FreeKey], path: Path | None) -> Float:
@@ -199,19 +177,17 @@ class _Misfit:
     @classmethod
     def of(cls, emulator: Emulator, start: Float) -> _Misfit:
         """Return the misfit by the noise alone; that of columns without standard deviations is a share of them."""
-        data = emulator.data
         stds = {
-            n: data.stds.get(n, np.full(len(data.at), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
-            for n, v in data.columns.items()
+            n: emulator.stds.get(n, np.full(len(v), max(_SHARE * float(np.abs(v).max()), SHARPEST)))
+            for n, v in emulator.measured.items()
         }
         shares = np.array([key.share(v) for key, v in zip(emulator.free, start, strict=True)])
-        return cls(emulator, shares, stds, np.eye(data.count))
+        return cls(emulator, shares, stds, np.eye(sum(map(len, stds.values()))))
 
     def with_errors(self, known: Mapping[str, Float]) -> _Misfit:
         """Return the misfit with independent errors (m, r) of the simulation at the rows of each column."""
-        zero = np.zeros((1, len(self.emulator.data.at)))
         # a row of zeros for all columns but the one that the error is of
-        plain = block_diag(*(known.get(name, zero) / (_BAR * std) for name, std in self.stds.items()))
+        plain = block_diag(*(known.get(n, np.zeros((1, len(std)))) / (_BAR * std) for n, std in self.stds.items()))
         return replace(self, root=np.linalg.cholesky(np.eye(plain.shape[1]) + plain.T @ plain))
 
     @property
@@ -228,7 +204,7 @@ class _Misfit:
 
     def residuals(self, shares: Float) -> Float:
         """Return the residuals (s, n) at shares (s, k)."""
-        return self.whitened(self.emulator(shares) - np.concatenate([*self.emulator.data.columns.values()]))
+        return self.whitened(self.emulator(shares) - np.concatenate([*self.emulator.measured.values()]))
 
     def log_likelihood(self, shares: Float) -> Float:
         """Return the logarithm of the likelihood (s,) at shares (s, k), which is very small where presses fail.
@@ -289,33 +265,35 @@ class _Misfit:
 
     def by_residuals(self, shares: Float) -> _Misfit:
         """Return the misfit with columns weighted by their residuals that have no standard deviations in the file."""
-        data, simulated, stds = self.emulator.data, self.emulator.columns(shares), {**self.stds}
-        left = 1.0 - min(len(shares) / data.count, 0.5)  # share of the degrees of freedom that the fit leaves
-        for name, values in data.columns.items():
-            if name not in data.stds:
+        simulated, stds = self.emulator.columns(shares), {**self.stds}
+        left = 1.0 - min(len(shares) / len(self.root), 0.5)  # share of the degrees of freedom that the fit leaves
+        for name, values in self.emulator.measured.items():
+            if name not in self.emulator.stds:
                 least = max(_LEAST_SHARE * float(np.abs(values).max()), SHARPEST)
                 std = max(_rms(values - simulated[name]) / math.sqrt(left), least)
                 stds[name] = np.full(len(values), std)
         return replace(self, stds=stds)
 
 
-def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: Progress) -> Identification:
+def _fitted(emulator: Emulator, start: Float, report: Progress) -> Identification:
     """Fit by the noise, then by the noise and the errors of the simulation."""
-    report.stage("first presses")
-    emulator = Emulator(simulation, data)
-    designed = emulator.design()
-    for shares in designed:
-        emulator.press(shares)
-    emulator.check()
-    tried = [shares for shares in emulator.ends(designed) if not emulator.fails(shares[None])[0]]
-    data.check_against([emulator.columns(shares) for shares in tried])
+    simulation, data, tested = emulator.simulation, emulator.data, emulator.tested
+    if data.columns:
+        report.stage("first presses")
+        designed = emulator.design()
+        for shares in designed:
+            emulator.press(shares)
+        emulator.check()
+        tried = [shares for shares in emulator.ends(designed) if not emulator.fails(shares[None])[0]]
+        data.check_against([emulator.columns(shares) for shares in tried])
     misfit = _Misfit.of(emulator, start)
-    shares = misfit.explored(report, 2)
-    report.stage("errors of mesh and increments")
-    known = simulation.errors(values_at(emulator.free, shares), data)
-    misfit = misfit.with_errors(known)
-    shares = misfit.explored(report)
-    if set(data.stds) != set(data.columns):
+    shares, known = misfit.explored(report, 2), {}
+    if data.columns:
+        report.stage("errors of mesh and increments")
+        known = simulation.errors(values_at(emulator.free, shares), data)
+        misfit = misfit.with_errors(known)
+        shares = misfit.explored(report)
+    if set(emulator.stds) != set(emulator.measured):
         misfit = misfit.by_residuals(shares).with_errors(known)
         shares = misfit.explored(report)
         misfit = misfit.by_residuals(shares).with_errors(known)
@@ -324,11 +302,11 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
     shares = misfit.best(samples)
     fitted = fitted_values(emulator.free, shares, samples, misfit.derivative(shares), part)
     values = fitted.values
-    simulated = simulation.at(values, data)
-    reduced = _reduced_chi_square(data, simulated, len(values))
+    simulated = emulator.columns(shares) | (simulation.at(values, data) if data.columns else {})
+    reduced = _reduced_chi_square(emulator, simulated, len(values))
     unknown = sorted(set(data.columns) - set(known))
     missing = [f"the error of the mesh is not known: {', '.join(unknown)}"] if unknown else []
-    notes, ratio = [*fitted.untold, *missing], math.sqrt(reduced)
+    notes, ratio = [*fitted.untold, *missing, *tested.instability(values)], math.sqrt(reduced)
     if ratio > _MISFIT:
         notes.append(
             f"the residuals are {ratio:.2g} times their standard deviations: the scene does not explain the data"
@@ -338,18 +316,19 @@ def _fitted(simulation: Simulation, data: MeasuredPress, start: Float, report: P
         keys=tuple(f.key for f in simulation.free),
         fitted=fitted,
         measured=data,
+        tested=tested,
         simulated=simulated,
         stds=misfit.stds,
-        curve=simulation.curve(values),
+        curve=simulation.curve(values) if data.columns else {},
         reduced_chi_square=reduced,
         notes=tuple(notes),
         presses=simulation.solved,
     )
 
 
-def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], keys: int) -> float:
+def _reduced_chi_square(emulator: Emulator, simulated: Mapping[str, Float], keys: int) -> float:
     """Return chi-square over its degrees of freedom, of the columns with standard deviations of their own."""
-    squares = [((simulated[n] - data.columns[n]) / std) ** 2 for n, std in data.stds.items()]
+    squares = [((simulated[n] - emulator.measured[n]) / std) ** 2 for n, std in emulator.stds.items()]
     if not squares:
         return math.nan
     every = np.concatenate(squares)
@@ -358,24 +337,3 @@ def _reduced_chi_square(data: MeasuredPress, simulated: Mapping[str, Float], key
 
 def _rms(values: Float) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def _write(folder: Path, found: Identification) -> None:
-    """Write the results, the figure and the page."""
-    write_json(folder / "identify.json", found.as_dict())
-    data = found.measured
-    columns: Tree = {data.index: data.at}
-    for name, values in data.columns.items():
-        columns |= {
-            name: values,
-            f"{name}_std": found.stds[name],
-            f"{name}_simulated": found.simulated[name],
-        }
-    write_csv(folder / "identify.csv", columns)
-    write_text(folder / "identified.toml", found.scene.to_toml())
-    offset = dict(zip(found.keys, found.fitted.values, strict=True)).get(OFFSET, 0.0)
-    part = moving_part(found.curve[data.index], data)
-    curve = {name: values[part] for name, values in found.curve.items()}
-    panels = [Panel(n, values, found.stds[n], found.simulated[n], curve[n]) for n, values in data.columns.items()]
-    draw(folder / "identify.png", data.index, data.at + float(offset), curve[data.index], panels)
-    identify_page(folder).write(folder)

@@ -31,7 +31,7 @@ from finger3d.mechanics.readings.columns import by_key, in_order, in_space
 from finger3d.mechanics.readings.quantities import OF_INCREMENT, ORDER, kinds_of, quantities
 from finger3d.mechanics.results.history import StepResult, table_row
 from finger3d.results.journal import Journal
-from finger3d.scene import Scene
+from finger3d.scene import Scene, tree
 
 OFFSET = "depth_offset_mm"
 """Key that is added to the measured depth; it needs no solution of its own."""
@@ -42,6 +42,8 @@ MODULI: dict[str, Callable[[float], float]] = {
     "material.shore_00": modulus_of_shore_00,
 }
 """Young's modulus, MPa, by the keys that give it; forces scale with it, so that they need no solution of their own."""
+
+_TERMS = "effects.large_deformation.terms"
 
 _SHORTEST = 1.0 / 30.0
 """Measured part of the path of a scene below which the unit of the depths is in doubt."""
@@ -253,7 +255,19 @@ def _at_rows(curve: Curve, measured: MeasuredPress, offset: float) -> dict[str, 
 def fitted_scene(given: TreeView, free: Sequence[FreeKey], values: Sequence[float] | Float, path: Path | None) -> Scene:
     """Return the scene with values of the free keys; the offset of the depth is none of its keys."""
     pairs = [(f.numbered(given), v) for f, v in zip(free, values, strict=True) if f.key != OFFSET]
+    pairs = with_last_share(given, pairs)
     return scene_with(given, [key for key, _ in pairs], [value for _, value in pairs], path)
+
+
+def with_last_share(given: TreeView, pairs: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:
+    """Return keys and values with the share of the last of Ogden's terms, if shares are free: it is what they leave."""
+    terms, known = tree.value_at(given, _TERMS), dict(pairs)
+    if not isinstance(terms, tuple) or not (shares := [f"{_TERMS}.{i}.0" for i in range(len(terms))]):
+        return [*pairs]
+    *others, last = shares
+    if not known.keys() & {*others}:
+        return [*pairs]
+    return [*pairs, (last, 1.0 - sum(known.get(key, tree.value_at(given, key)) for key in others))]
 
 
 def check_rows(legs: tuple[Leg, ...], free: Sequence[FreeKey], measured: MeasuredPress) -> None:

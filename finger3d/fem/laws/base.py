@@ -33,6 +33,13 @@ class IsochoricLaw(Protocol):
         """Return the stress and its derivative d2W/dF dF (..., 3, 3, 3, 3) MPa."""
         ...
 
+    def kirchhoff(self, stretches: Float) -> Float:
+        """Return principal Kirchhoff stresses (..., 3) MPa of isochoric principal stretches (..., 3), up to a pressure.
+
+        Here constants of the law may be arrays that broadcast with the points (...,).
+        """
+        ...
+
     def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
         """Return principal Kirchhoff stresses of isochoric principal stretches (..., 3), and their derivative.
 
@@ -87,6 +94,10 @@ class Inhomogeneous:
         """Return the stress and its derivative (m, 3, 3, 3, 3) MPa."""
         stress, tangent = self.law.stress_and_tangent(f)
         return self.relative[:, None, None] * stress, self.relative[:, None, None, None, None] * tangent
+
+    def kirchhoff(self, stretches: Float) -> Float:
+        """Return principal Kirchhoff stresses (m, 3) MPa."""
+        return self.relative[:, None] * self.law.kirchhoff(stretches)
 
     def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
         """Return principal Kirchhoff stresses (m, 3) and their derivative (m, 3, 3), MPa."""

@@ -75,12 +75,24 @@ class InvariantLaw(ABC):
             stress, tangent = stress + _wide(by.w2) * g2, tangent + _wide4(by.w2) * _hessian_2(f, inverse, x2)
         return stress, tangent
 
-    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
-        """Return principal Kirchhoff stresses and their derivative; X2 is the sum of 1/lambda^2 of isochoric ones."""
+    def kirchhoff(self, stretches: Float) -> Float:
+        """Return principal Kirchhoff stresses."""
+        by, g1, g2 = self._by_logs(stretches)
+        stress = by.w1[..., None] * g1
+        return stress if by.w2 is None else stress + by.w2[..., None] * g2
+
+    def _by_logs(self, stretches: Float) -> tuple[Derivatives, Float, Float]:
+        """Return the derivatives of the energy, and those of X1 and X2 (..., 3) by the logarithms of the stretches.
+
+        X2 is the sum of 1/lambda^2 of isochoric stretches.
+        """
         square = stretches**2
         inverse = 1.0 / square
-        by = self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1))
-        g1, g2 = 2.0 * square, -2.0 * inverse
+        return self.derivatives(square.sum(axis=-1), inverse.sum(axis=-1)), 2.0 * square, -2.0 * inverse
+
+    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
+        """Return principal Kirchhoff stresses and their derivative."""
+        by, g1, g2 = self._by_logs(stretches)
         stress, diagonal = by.w1[..., None] * g1, by.w1[..., None] * 2.0 * g1
         if by.w2 is not None:
             stress, diagonal = stress + by.w2[..., None] * g2, diagonal - by.w2[..., None] * 2.0 * g2
@@ -181,7 +193,7 @@ class NeoHooke(InvariantLaw):
 
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return the derivative G/2."""
-        return Derivatives(np.full_like(x1, 0.5 * self.shear))
+        return Derivatives(np.asarray(0.5 * self.shear + np.zeros_like(x1)))
 
 
 @dataclass(frozen=True)
@@ -202,8 +214,8 @@ class MooneyRivlin(InvariantLaw):
 
     def derivatives(self, x1: Float, x2: Float) -> Derivatives:
         """Return c10 and c01."""
-        half = 0.5 * self.shear
-        return Derivatives(np.full_like(x1, half * (1.0 - self.c01_share)), np.full_like(x1, half * self.c01_share))
+        half = 0.5 * self.shear + np.zeros_like(x1)
+        return Derivatives(np.asarray(half * (1.0 - self.c01_share)), np.asarray(half * self.c01_share))
 
 
 @dataclass(frozen=True)

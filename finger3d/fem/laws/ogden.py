@@ -33,11 +33,11 @@ class Ogden:
     def __post_init__(self) -> None:
         """Raise an error if the shares do not sum to 1 or an exponent is 0."""
         total = sum(share for share, _ in self.terms)
-        if abs(total - 1.0) > 1e-9:
+        if np.any(abs(total - 1.0) > 1e-9):
             raise Finger3dError(
                 f"effects.large_deformation.terms: the shares of the shear modulus sum to {total:.6g}; must be 1"
             )
-        if any(alpha == 0.0 for _, alpha in self.terms):
+        if any(np.any(alpha == 0.0) for _, alpha in self.terms):
             raise Finger3dError("effects.large_deformation.terms: an exponent alpha is 0; must not be")
 
     @property
@@ -53,13 +53,18 @@ class Ogden:
         """Pairs (mu, alpha)."""
         return [(2.0 * share * self.shear / alpha, alpha) for share, alpha in self.terms]
 
-    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
-        """Return the sum of mu (l^alpha - 1), and that of mu alpha l^alpha on the diagonal.
+    def kirchhoff(self, stretches: Float) -> Float:
+        """Return the sum of mu (l^alpha - 1).
 
         The power less 1 is a pressure that keeps the digits which a large mu = 2 share G / alpha would lose.
         """
         logs = np.log(stretches)
-        stress = np.asarray(sum(mu * np.expm1(a * logs) for mu, a in self._constants()))
+        constants = [(np.asarray(mu)[..., None], np.asarray(a)[..., None]) for mu, a in self._constants()]
+        return np.asarray(sum(mu * np.expm1(a * logs) for mu, a in constants))
+
+    def principal_stress(self, stretches: Float) -> tuple[Float, Float]:
+        """Return the principal Kirchhoff stresses, and the sum of mu alpha l^alpha on the diagonal."""
+        logs, stress = np.log(stretches), self.kirchhoff(stretches)
         slope = np.asarray(sum(mu * a * np.exp(a * logs) for mu, a in self._constants()))
         return stress, slope[..., None] * np.eye(3)
 

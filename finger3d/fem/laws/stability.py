@@ -16,9 +16,9 @@ MODES = {
     "uniaxial tension": (1.0, -0.5, -0.5),
     "uniaxial compression": (-1.0, 0.5, 0.5),
     "equibiaxial tension": (0.5, 0.5, -1.0),
-    "planar tension": (1.0, -1.0, 0.0),
+    "planar tension": (1.0, 0.0, -1.0),
 }
-"""Logarithmic strains of the usual tests, the first of them the one along which the sample is loaded."""
+"""Logarithmic strains of the usual tests: first that along which the sample is loaded, last one of a free face."""
 
 _ISOCHORIC = np.array([[1.0, 1.0], [-1.0, 1.0], [0.0, -2.0]]) / np.sqrt([2.0, 6.0])
 """Orthonormal basis (3, 2) of the principal strains that keep the volume."""
