@@ -15,6 +15,7 @@ from finger3d.errors import UnresolvedError
 from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import surface
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.contact_geometry import MARGIN
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
@@ -35,7 +36,9 @@ def test_all_presses_are_of_the_body_that_is_wide_enough(monkeypatch: pytest.Mon
     )
     wide, said = pressing.PressedBody(model), Log()
     ends, steps = wide.ends(mus), wide.steps()
-    monkeypatch.setattr(pressing, "build", lambda m, report, margin=NARROW: build(m, report, margin))
+    monkeypatch.setattr(
+        pressing, "build", lambda m, report, margin, _: build(m, report, NARROW if margin == MARGIN else margin)
+    )
     narrow = pressing.PressedBody(model, said)
     few = len(narrow.problem.surface.nodes)
     again = narrow.ends(mus)
@@ -251,7 +254,8 @@ NARROWEST = -0.98
 
 def narrowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "finger3d.analyses.pressed_body.build", lambda m, report, margin=NARROWEST: build(m, report, margin)
+        "finger3d.analyses.pressed_body.build",
+        lambda m, report, margin, _: build(m, report, NARROWEST if margin == MARGIN else margin),
     )
 
 
@@ -301,10 +305,10 @@ def test_a_body_that_cannot_be_widened_fails_those_that_need_it_only(monkeypatch
     models = [scene(change).model() for change in ("friction.mu=0.1", "press.depth_mm=0.03", "friction.mu=1.0")]
     variants = [Variant.of(m) for m in models]
 
-    def once(model, report, margin=NARROWEST):
+    def once(model, report, margin, _):
         if margin == math.inf:
             raise MemoryError
-        return build(model, report, margin)
+        return build(model, report, NARROWEST)
 
     monkeypatch.setattr("finger3d.analyses.pressed_body.build", once)
     found = list(SharedBody(models[0], variants).presses(variants))

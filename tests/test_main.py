@@ -199,7 +199,7 @@ def test_an_interruption_in_a_callback_of_a_weak_reference_is_raised_again(capfd
 @pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
 def test_an_interruption_after_the_work_ends_the_process_with_130(name: str) -> None:
     code = (
-        "import signal, sys, time; import finger3d.__main__ as m; sys.argv = ['finger3d', 'schema']; "
+        "import signal, sys, time; import finger3d.__main__ as m; sys.argv = ['finger3d', 'new', '--schema']; "
         "signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # under nohup, the child would inherit that it is ignored
         f"m.main(); signal.raise_signal(signal.{name}); time.sleep(20)"
     )

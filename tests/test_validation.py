@@ -19,7 +19,8 @@ SLOW = (
     "meshers", "readings_within_tolerances", "friction_in_3d", "scaling", "advice_against_truth", "cost_of_accuracy",
     "hertz", "bonded", "wide_finger_claims", "gelsight_mini", "effects_by_need",
     "cost_forecast", "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does",
-    "default_bars", "identify_z_scores", "truth_cube", "random_presses", "effects_of_keys",
+    "default_bars", "identify_z_scores", "truth_cube", "random_presses", "effects_of_keys", "slip_warning",
+    "solids4foam",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 
