@@ -7,7 +7,7 @@ conditions to 1e-8, and every number has the error bar of its mesh and increment
 
 Not published, and inferred: the static friction of the plane, for which its kinetic one is taken; the radius and the
 modulus of the half cylinder, R = 2 mm and E = 1 MPa, per millimetre of width.  The pad that tapers, .469 N at 1 mm,
-is left out: its walls are not described.
+is left out: its walls are not described.  "Overnight" is drawn as 12 hours.
 
 Tangential forces of spheres exceed mu N where the contact leans: the friction of a tilted facet and the sideways push
 of its pressure both count.  `force_x_N` is the whole of it, as a load cell reads it, and `tangential_force_x_N` the
@@ -203,7 +203,7 @@ def _draw(figure: Any, times: list[tuple[str, float, float | None]], curves: dic
     left.set(xscale="log", xlabel="time (s)", xlim=(1.0, 1e6))
     names = [name.replace(", slid", ",\nslid").replace(", pressed", ",\npressed") for name, *_ in known]
     left.set_yticks(place, names, fontsize=8)
-    left.invert_yaxis()
+    left.set_ylim(len(known) + 0.6, -0.6)
     left.legend(frameon=False, fontsize=8, loc="lower right")
     left.set_title("time of a press or a slide")
     name = SCENES[-1].name
