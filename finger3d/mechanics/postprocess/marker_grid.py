@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +18,8 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.readings.columns import Column, displacement_columns
 from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.results.history import StepResult, pose_entry
 from finger3d.meshing.given.given import GivenMesh
-from finger3d.objects import ObjectPose
-
-_POSE: dict[str, Callable[[ObjectPose], float]] = {
-    "depth_mm": lambda pose: pose.depth_mm,
-    "slide_x_mm": lambda pose: pose.slide_x_mm,
-    "slide_z_mm": lambda pose: pose.slide_z_mm,
-    "turn_x_deg": lambda pose: math.degrees(pose.turn_x),
-    "turn_y_deg": lambda pose: math.degrees(pose.turn_y),
-    "turn_z_deg": lambda pose: math.degrees(pose.turn_z),
-}
-"""Columns of the pose of the object, as in history.csv."""
 
 _INWARD = 1e-9
 """Share of the way to the middle of a facet by which a point on its border is moved: its line then meets the facet."""
@@ -127,9 +115,10 @@ def marker_table(
         unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps])
         fields = (grid.displacements(displacement(problem.mesh, x)) for x in unknowns)
         moved = [np.vstack(pair) for pair in zip(moved, fields, strict=True)]
+    poses = [pose_entry(step.target) for step in steps]
     columns: Tree = {
         "step": np.repeat(np.arange(1, len(steps) + 1), len(markers)),
-        **{key: np.repeat([value(step.target) for step in steps], len(markers)) for key, value in _POSE.items()},
+        **{key: np.repeat([pose[key] for pose in poses], len(markers)) for key in poses[0] if key != "time_s"},
         "marker": [m.name for m in markers] * len(steps),
     }
     places, displacements = np.tile([m.place for m in markers], (len(steps), 1)), _in_space(np.vstack(moved))

@@ -22,7 +22,7 @@ from finger3d.mechanics.results.slip_margin import limits, margins, slip_margin
 from finger3d.objects import Move, ObjectPose
 from finger3d.objects.placed import TIME
 
-Region = NDArray[np.bool_]
+Mask = NDArray[np.bool_]
 
 ROUND_OFF = 1e-9
 """Motion, mm and rad, that is round-off."""
@@ -34,7 +34,7 @@ It is that of a ball (Mindlin 1949); the margin of a flat contact and of a secti
 """
 
 
-def regions_of(points: ContactPoints, readings: Sequence[Reading]) -> dict[str, Region]:
+def regions_of(points: ContactPoints, readings: Sequence[Reading]) -> dict[str, Mask]:
     """Return the points (m,) of each region: the whole contact, those above each taxel's patch, and each face."""
     x, z = points.points[:, 0], points.points[:, 2]
     regions = {"whole": np.ones(len(x), dtype=bool)}
@@ -74,14 +74,14 @@ def slip_events(
     }
 
 
-def _margin(points: ContactPoints, steps: Sequence[StepResult], region: Region) -> float | None:
+def _margin(points: ContactPoints, steps: Sequence[StepResult], region: Mask) -> float | None:
     if not steps or not (steps[-1].state.status[region] != OPEN).any():
         return None
     return slip_margin(points, steps[-1].state, steps[-1].friction, region)
 
 
 def _first_slips(
-    points: ContactPoints, steps: Sequence[StepResult], regions: Mapping[str, Region]
+    points: ContactPoints, steps: Sequence[StepResult], regions: Mapping[str, Mask]
 ) -> dict[str, Tree | None]:
     """Return the first slip of every region."""
     found: dict[str, Tree | None] = dict.fromkeys(regions)
@@ -123,7 +123,7 @@ def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Floa
     return None
 
 
-def _left(points: ContactPoints, step: StepResult) -> tuple[Float, Region]:
+def _left(points: ContactPoints, step: StepResult) -> tuple[Float, Mask]:
     """Return what is left (m,) until a point slips, its margin or, mm, its gap; and whether it is open."""
     is_open = step.state.status == OPEN
     return np.where(is_open, step.state.gap, margins(points, step.state, step.friction)), is_open
