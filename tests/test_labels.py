@@ -112,3 +112,9 @@ def test_all_increments_at_large_deformation(tmp_path: Path) -> None:
 def test_a_grid_that_is_too_fine_is_refused() -> None:
     with pytest.raises(finger3d.Finger3dError, match=r"labels\.grid_mm = 1e-05: must be a number from"):
         finger3d.plan(PAD, overrides=["labels.grid_mm=1e-5"])
+
+
+def test_labels_of_an_elastic_object_are_refused(tmp_path: Path) -> None:
+    soft = PAD | {"effects": {"auto": False, "elastic_object": {"E_MPa": 1.0, "nu": 0.4}}}
+    with pytest.raises(finger3d.Finger3dError, match=r"\[labels\]: only of rigid objects"):
+        sweep(soft, {"friction.mu": [0.2, 0.5]}, tmp_path)

@@ -93,7 +93,7 @@ def body_key(scene: Scene) -> str:
     """Return a hash of everything that changes the condensed body; scenes of one family have the same."""
     tree = scene.as_dict()
     effects = {k: v for k, v in tree["effects"].items() if k in scene.effects and scene.effects[k].slot != "friction"}
-    free = (*_FREE, "object") if may_touch_anywhere(scene) else _FREE
+    free = _FREE if scene.tables.labels is None else (*_FREE, "object")
     kept = {k: v for k, v in tree.items() if k not in free} | {"effects": effects}
     if "embedded_gauge" in effects:
         kept["gauge"] = tree["gauge"]
@@ -101,11 +101,6 @@ def body_key(scene: Scene) -> str:
     # Default sizes depend on the depth; a family takes the smallest.
     kept["mesh"] = {k: v for k, v in tree["mesh"].items() if k not in _SIZES or k in given}
     return checksum({**kept, "files": contents(tree), "made_with": made_with()})
-
-
-def may_touch_anywhere(scene: Scene) -> bool:
-    """Whether all rigid objects of a family share a body, whose contact face may be touched anywhere: with labels."""
-    return scene.tables.labels is not None and "elastic_object" not in scene.effects
 
 
 def finest(models: Sequence[Model]) -> MeshOptions:
@@ -123,7 +118,8 @@ class SharedBody(PressedBody):
     variants : all variants that will be pressed
     report : receives the messages
     grid : markers of a grid, whose displacements are among the numbers
-    labels : what is asked for of every sample; the variants may then have different rigid objects
+    labels : what is asked for of every sample; the variants may then have different rigid objects, which may touch the
+        contact face anywhere
 
     Attributes
     ----------
@@ -146,11 +142,8 @@ class SharedBody(PressedBody):
             gauges = tuple(replace(place, name=str(i)) for i, place in enumerate(places))
         self._names = {replace(g, name=""): g.name for g in gauges}
         self._gauges_are_inclusions, self._grid = model.inclusions is not None, grid
-        model = replace(model, gauges=gauges)
-        if labels is None:
-            super().__init__(replace(model, legs=shared_legs(variants)), report)
-        else:
-            super().__init__(replace(model, symmetry=()), report, anywhere=model.object_compliance is None)
+        shared = {"symmetry": ()} if labels else {"legs": shared_legs(variants)}
+        super().__init__(replace(model, gauges=gauges, **shared), report, anywhere=labels is not None)
         self._labels, self._made = labels, cast("LabelGrid | None", None)
         self._results: dict[Variant, VariantResult | Exception] = {}
 

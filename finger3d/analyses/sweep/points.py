@@ -14,7 +14,7 @@ import numpy as np
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import FreeKey, check_distinct
-from finger3d.analyses.shared_body import Variant, body_key, finest, may_touch_anywhere
+from finger3d.analyses.shared_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
@@ -111,7 +111,7 @@ class BodySpec:
     ----------
     key : hash of everything that shapes the body
     variants : of all its points, also of those that are finished: the mesh is graded for the union of their paths;
-        one for each set of gauges where objects may touch anywhere
+        with labels, where objects may touch anywhere, one for each set of gauges
     mesh : with the smallest sizes of the points
     given : the scene of one of the points
     grid : markers of its grid
@@ -197,6 +197,8 @@ def checked_points(
             )
         scenes.append(scene)
     scenes = _with_effects(scenes, report)
+    if any(scene.tables.labels and "elastic_object" in scene.effects for scene in scenes):
+        raise Finger3dError("[labels]: only of rigid objects; leave out effects.elastic_object")
     values = joined(*(v.values for v in vary))
     checked, members = list[Point](), dict[str, list[tuple[Scene, Variant]]]()
     for number, (scene, here) in enumerate(zip(scenes, values, strict=True)):
@@ -208,7 +210,7 @@ def checked_points(
     shared = {
         key: BodySpec(
             key=key,
-            variants=_shaping([variant for _, variant in of], may_touch_anywhere(of[0][0])),
+            variants=_shaping([variant for _, variant in of], of[0][0].tables.labels),
             mesh=finest([scene.model() for scene, _ in of]),
             given=of[0][0].given,
             grid=grids[key],
@@ -219,9 +221,9 @@ def checked_points(
     return Sweep(bodies.absolute(base, path), vary, tuple(checked), shared, scenes[0].title, is_list)
 
 
-def _shaping(variants: Sequence[Variant], anywhere: bool) -> tuple[Variant, ...]:
+def _shaping(variants: Sequence[Variant], labels: LabelsTable | None) -> tuple[Variant, ...]:
     """Return the variants that shape a body."""
-    return tuple({variant.gauges: variant for variant in variants}.values()) if anywhere else tuple(variants)
+    return tuple({variant.gauges: variant for variant in variants}.values()) if labels else tuple(variants)
 
 
 def _grids(scenes: Mapping[str, Scene]) -> dict[str, tuple[Marker, ...]]:
