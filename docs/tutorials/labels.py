@@ -19,7 +19,8 @@
 #
 # All samples share one pad, whatever their object, friction coefficient and path: it is meshed and condensed
 # ([glossary](../glossary.md#condensation)) once, with edges of one length all over its contact face. A sample then
-# costs only its increments.
+# costs only its increments. On edges of 0.7 mm of a pad of 20 x 16 mm a sample takes 0.4 s on two cores, 100 000 take
+# eleven hours, and forces are 1.5 to 6 % off ([label_rate](../../validation/label_rate.py)).
 
 # %%
 from pathlib import Path
