@@ -43,7 +43,7 @@ def of_readme(root: Path) -> list[str]:
 def commands_of(pages: list[Path]) -> list[str]:
     """Every command that some pages show, once."""
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
-    blocks = re.findall(r"```sh\n(.*?)```", text, flags=re.DOTALL)
+    blocks = re.findall(r"```sh\n(.*?)```", text.replace(" \\\n", ""), flags=re.DOTALL)
     lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
     return list(dict.fromkeys(line for line in lines if line.startswith("finger3d ")))
 
@@ -83,6 +83,8 @@ def test_every_command_is_run(
     quick = {name: text for page in root.glob("docs/*.md") for name, text in scenes(page).items()}
     for name, text in quick.items():
         Path(name).write_text(text, encoding="utf-8")
+    tests = [f"{1 + k / 10},{0.3 * (1 + k / 10 - (1 + k / 10) ** -2):.5f},tension" for k in range(1, 11)]  # neo-Hookean
+    Path("tests.csv").write_text("\n".join(["stretch,stress_MPa,mode", *tests]) + "\n", encoding="utf-8")
     for command in shown(root):
         words = shlex.split(command.split(" > ")[0])[1:]  # what a shell redirects is printed
         if not quick.keys() & set(words):
