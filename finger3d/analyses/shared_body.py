@@ -21,13 +21,13 @@ from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.problem import Problem, free_surface
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.postprocess.penetration import check_surface
+from finger3d.mechanics.postprocess.penetration import check_surface, displacements
 from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
 from finger3d.mechanics.readings.gauges import Gauge
 from finger3d.mechanics.readings.reading import Marker
@@ -144,7 +144,8 @@ class SharedBody(PressedBody):
         self._gauges_are_inclusions, self._grid = model.inclusions is not None, grid
         shared = {"symmetry": ()} if labels else {"legs": shared_legs(variants)}
         super().__init__(replace(model, gauges=gauges, **shared), report, anywhere=labels is not None)
-        self._labels, self._made = labels, cast("LabelGrid | None", None)
+        self._labels = labels
+        self._prepare()
         self._results: dict[Variant, VariantResult | Exception] = {}
 
     def presses(self, variants: Sequence[Variant], most: int | None = None) -> Iterator[VariantResult | Exception]:
@@ -229,7 +230,9 @@ class SharedBody(PressedBody):
             if not step.outcome.ok:
                 at = f"increment {number} (depth {step.target.depth_mm:.4g} mm)"
                 return VariantResult(f"{at}: {step.outcome}", residual, {}, {}, seconds)
-        (check,) = check_surface(problem, steps[-1:])
+        grid = self._label_grid
+        moved = list(displacements(problem, grid.chosen(steps) if grid else steps[-1:]))
+        (check,) = check_surface(problem, steps[-1:], self._free, moved[-1:])
         if not check.within_candidates:
             return None
         seconds += time.perf_counter() - start
@@ -240,18 +243,21 @@ class SharedBody(PressedBody):
         readings = last.readings
         if self._grid:
             readings = readings | MarkerGrid.at(self.problem, self._grid).readings(self.problem, last)
-        sample = grid.sample(problem, steps) if (grid := self._label_grid()) else None
+        sample = grid.sample(steps, moved) if grid else None
         return VariantResult(str(Outcome.CONVERGED), residual, numbers, in_space(readings), seconds, sample)
 
-    def _label_grid(self) -> LabelGrid | None:
-        """Return the grid of the labels on the present body, if the scene asks for any."""
-        if self._labels is None:
-            return None
-        from finger3d.mechanics.postprocess.labels import LabelGrid  # other sweeps need none of it
+    def widen(self) -> None:
+        super().widen()
+        self._prepare()
 
-        if self._made is None or self._made.problem is not self.problem:
-            self._made = LabelGrid(self.problem, self._labels.grid_mm, self._labels.increments == "last")
-        return self._made
+    def _prepare(self) -> None:
+        """Set what all variants on the present body have in common."""
+        problem, self._label_grid = self.problem, cast("LabelGrid | None", None)
+        self._free = free_surface(problem.model, problem.mesh, problem.body.thickness)
+        if self._labels is not None:
+            from finger3d.mechanics.postprocess.labels import LabelGrid  # other sweeps need none of it
+
+            self._label_grid = LabelGrid(problem, self._labels.grid_mm, self._labels.increments == "last")
 
 
 def shared_legs(variants: Sequence[Variant]) -> tuple[Leg, ...]:

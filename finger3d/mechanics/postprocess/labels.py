@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.friction import STATUS_NAMES
 from finger3d.fem.mesh.simplex import CONTACT, Mesh
-from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import values_over
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid, grid_markers
 from finger3d.mechanics.readings.reading import Marker
 from finger3d.mechanics.results.history import StepResult, pose_entry
@@ -85,6 +83,11 @@ class LabelGrid:
         """Interpolation (k, m) between the contact points at rest."""
         return self._over(self.problem.points.points)[0]
 
+    @cached_property
+    def _nearest(self) -> NDArray[np.int64]:
+        """Contact point (k,) nearest to each place."""
+        return np.asarray(self._rows.argmax(axis=1)).ravel()
+
     def _over(self, points: Float) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
         """Return the interpolation (k, m) on the contact face with its points (m, 3) above the grid's places."""
         dim = self.problem.dim
@@ -101,7 +104,6 @@ class LabelGrid:
         now[:, :dim] += u[points.nodes]
         above, there = self._over(now)
         lowered = np.where(there, self._rows @ at_rest[:, 1] - above @ now[:, 1], np.nan)
-        nearest = np.asarray(self._rows.argmax(axis=1)).ravel()
         displaced = np.zeros((len(self.markers), 3))
         displaced[:, :dim] = self._displacements.displacements(u)
         return {
@@ -109,8 +111,12 @@ class LabelGrid:
             "depth_mm": lowered,
             "pressure_MPa": self._rows @ traction[0],
             "shear_MPa": self._rows @ shear,
-            "status": state.status[nearest],
+            "status": state.status[self._nearest],
         }
+
+    def chosen(self, steps: Sequence[StepResult]) -> Sequence[StepResult]:
+        """Return the increments whose fields are asked for; the last is among them."""
+        return steps[-1:] if self.last_only else steps
 
     def _on_grid(self, values: Sequence[NDArray[Any]]) -> NDArray[Any]:
         stacked = np.stack(values)
@@ -120,17 +126,15 @@ class LabelGrid:
         out[:, self._flat] = stacked
         return out.reshape(len(stacked), len(self.x_mm), len(self.z_mm), *stacked.shape[2:])
 
-    def sample(self, problem: Problem, steps: Sequence[StepResult]) -> dict[str, NDArray[Any]]:
+    def sample(self, steps: Sequence[StepResult], moved: Iterable[Float]) -> dict[str, NDArray[Any]]:
         """Return the arrays of a sample; fields are NaN, and a status is -1, beside the contact face.
 
         Parameters
         ----------
-        problem : the body under an object
-        steps : its increments, all converged
+        steps : increments of the body under an object, all converged
+        moved : nodal displacements (n, d) mm after the increments that are asked for
         """
-        chosen = steps[-1:] if self.last_only else steps
-        unknowns = formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in chosen])
-        moved = (displacement(problem.mesh, own) for own in unknowns)
+        chosen = self.chosen(steps)
         each = [self._fields(step, u) for step, u in zip(chosen, moved, strict=True)]
         fields = {name: self._on_grid([one[name] for one in each]) for name in FIELDS}
         poses = [pose_entry(step.target) for step in chosen]

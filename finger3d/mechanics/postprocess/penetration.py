@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,14 +64,23 @@ class SurfaceCheck:
     depth_mm: float
 
 
-def check_surface(problem: Problem, steps: Sequence[StepResult]) -> list[SurfaceCheck]:
-    """Check the free surface after each step; in small strain by one back-substitution for all of them."""
+def check_surface(
+    problem: Problem, steps: Sequence[StepResult], free: BoundarySurface | None = None, moved: Iterable[Float] = ()
+) -> list[SurfaceCheck]:
+    """Check the free surface after each step; in small strain by one back-substitution for all of them.
+
+    Parameters
+    ----------
+    free : the free surface, if it is known
+    moved : nodal displacements (n, d) mm after each step, if they are known
+    """
     tracker, rigid = DistanceTracker(), problem.model.object_compliance is None
-    free, others = _surfaces(problem, steps)
+    free = free or free_surface(problem.model, problem.body.mesh, problem.body.thickness)
+    others = _others(problem, steps, free)
     hats, at_edge = free.hats.tocsc(), np.bincount(free.nodes)[free.nodes] > 1
     creased = hats @ (hats.T @ at_edge.astype(float)) > 0.0
     out, largest = [], reached_depth(problem.model, steps)
-    for u, step in zip(_displacements(problem, steps), steps, strict=True):
+    for u, step in zip(moved or displacements(problem, steps), steps, strict=True):
         within = _stays_out(problem, u, step.target, others)
         samples = free.samples + free.interpolate @ u
         value, _ = tracker.distance(problem.placed(step.target), samples, 0.0)
@@ -126,7 +135,7 @@ def _penetration(problem: Problem, checks: Sequence[SurfaceCheck], above: float,
     ]
 
 
-def _displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
+def displacements(problem: Problem, steps: Sequence[StepResult]) -> Iterator[Float]:
     """Yield the nodal displacement (n, d) mm after each step."""
     for unknowns in formulation_of(problem.model).unknowns(problem, [step.meshed_state for step in steps]):
         yield displacement(problem.mesh, unknowns)
@@ -138,15 +147,14 @@ def beyond_candidates(problem: Problem, free: BoundarySurface | None = None) -> 
     return restrict(free, np.flatnonzero(~np.isin(_key(free), _key(problem.system.surface))))
 
 
-def _surfaces(problem: Problem, steps: Sequence[StepResult]) -> tuple[BoundarySurface, BoundarySurface]:
-    """Return the free surface, and those of its points that are no candidates and could touch after some step."""
-    free = free_surface(problem.model, problem.body.mesh, problem.body.thickness)
+def _others(problem: Problem, steps: Sequence[StepResult], free: BoundarySurface) -> BoundarySurface:
+    """Return the points of the free surface that are no candidates and could touch after some step."""
     others = beyond_candidates(problem, free)
     if problem.model.object.is_flat and steps:  # its normal is known everywhere
         normals = [problem.placed(step.target).distance(others.points)[1] for step in steps]
         finite = problem.model.finite_strain
         others = restrict(others, np.any([may_touch(others, normal, finite) for normal in normals], axis=0))
-    return free, others
+    return others
 
 
 def _key(points: BoundarySurface) -> NDArray[np.int64]:
