@@ -30,6 +30,11 @@ settings.register_profile("shared machine", settings(), deadline=None, print_blo
 settings.load_profile("shared machine")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the environments of wheels, which take minutes each: the last tests are short, and share the cores."""
+    items.sort(key=lambda item: item.path.stem != "test_wheel")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Meshes made by tests live in a folder of their own, shared by one run."""
