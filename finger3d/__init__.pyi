@@ -23,7 +23,7 @@ from finger3d.geometry.registry import designs as designs
 from finger3d.mechanics.model import Leg as Leg
 from finger3d.mechanics.model import MeshOptions as MeshOptions
 from finger3d.mechanics.model import Model as Model
-from finger3d.mechanics.readings.gauges import Gauge as Gauge
+from finger3d.mechanics.readings import Gauge as Gauge
 from finger3d.mold.export import export as export
 from finger3d.mold.options import MoldOptions as MoldOptions
 from finger3d.objects import Cylinder as Cylinder

@@ -26,14 +26,12 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import RESULTANTS, SLIP, by_key
-from finger3d.mechanics.readings.quantities import ORDER
-from finger3d.mechanics.readings.reading import Taxel
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import ORDER, RESULTANTS, SLIP, Taxel, by_key
 from finger3d.objects import Cylinder
 from finger3d.scene import load
 from tests.models import half_cylinder, run, swept_fig9

@@ -23,7 +23,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Sphere
 from finger3d.report.press import press_page
 from tests.models import ended, half_cylinder

@@ -20,9 +20,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.scene import load, scene_of
 from tests.logs import Log
 from tests.models import half_cylinder, swept_fig9

@@ -24,7 +24,7 @@ from finger3d.io import claimed
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import ORDER
+from finger3d.mechanics.readings import ORDER
 from finger3d.objects import Move
 from finger3d.progress import QUIET
 from finger3d.scene import load as load_scene

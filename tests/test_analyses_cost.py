@@ -14,7 +14,7 @@ from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.cost import ERRORS, CostRow, Forecasts, _scaled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings import kinds_of
 from finger3d.scene import scene_of
 from tests.scenes import SECTION, written
 from tests.sensor_cases import scene

@@ -24,9 +24,9 @@ from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import table_row
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.results.history import table_row
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, PRESS, TRUE, bench

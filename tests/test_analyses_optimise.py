@@ -26,7 +26,7 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 from finger3d.progress import QUIET
 from finger3d.scene import load, tree
 from finger3d.sensor.likelihood import ReadingEffects, prior

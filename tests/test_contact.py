@@ -20,9 +20,9 @@ from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Sphere
 from tests.contact_cases import half_plane, problem_of, random_compliance, random_problem, violation
 

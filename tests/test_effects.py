@@ -31,10 +31,10 @@ from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import ElasticObject, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 from finger3d.scene import parse
 from tests.foil_cases import FOIL, FOIL_TABLE, GOOD, MIDDLE

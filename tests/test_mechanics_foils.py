@@ -27,9 +27,9 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.foils import discretised_foils
 from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from tests.foil_cases import FOIL, LEGS, MIDDLE, block
 from tests.models import marched

@@ -19,6 +19,7 @@ from finger3d.fem.mesh.simplex import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
@@ -32,7 +33,6 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Cylinder, Plane
 from tests.models import block, fig9, last, run
 from validation import increment_errors

@@ -23,7 +23,7 @@ from finger3d.fem.mesh.simplex import quadratic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Taxel
+from finger3d.mechanics.readings import Taxel
 from tests.meshes import full, grid
 from tests.models import last, marched
 from validation._common import side_load

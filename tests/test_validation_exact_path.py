@@ -15,9 +15,9 @@ from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from tests.contact_cases import half_plane, violation
 from tests.models import fig9, half_cylinder

@@ -23,7 +23,7 @@ from finger3d.fem.mesh.elements import quadrature
 from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry
+from finger3d.mechanics.discretise.contact_points import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose, vertical_frame
 

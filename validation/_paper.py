@@ -22,8 +22,8 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, contact_table
 
 from ._press import fig9_finger
 from ._rows import listed

@@ -18,7 +18,7 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.recovery.strain_reader import StrainReader
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.history import StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

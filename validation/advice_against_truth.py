@@ -28,9 +28,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn

@@ -28,8 +28,8 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, scene_of
 
 from ._ccx import printed_forces, program, solve

@@ -32,7 +32,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings import kinds_of
 
 from ._drawn import drawn, drawn_solids
 from ._press import in_edges

@@ -17,8 +17,8 @@ import numpy as np
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.press import press
-from finger3d.mechanics.readings.quantities import kinds_of
-from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.history import table_row
+from finger3d.mechanics.readings import kinds_of
 
 from ._rows import Result, Row, at_most, columns
 

@@ -27,7 +27,7 @@ from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Marker
+from finger3d.mechanics.readings import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 

@@ -19,9 +19,9 @@ from finger3d.geometry.files import read_surface
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import contact_table, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.results.history import contact_table, measure
 from finger3d.objects import MeshObject
 
 from ._press import converged

@@ -28,8 +28,8 @@ from finger3d.fem.mesh.simplex import Mesh
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import (
     ContactPath,

@@ -29,8 +29,8 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.elastic_object import ObjectBody
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, vertical_frame
 from finger3d.progress import QUIET
 

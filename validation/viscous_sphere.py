@@ -38,8 +38,8 @@ from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, s
 from finger3d.mechanics.discretise.problem import scatter_to_points
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.small_strain.elastic import SmallStrain
-from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.mechanics.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _halfspace, _rings

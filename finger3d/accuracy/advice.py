@@ -7,7 +7,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.accuracy.changes import Change, ChangeEstimate, two_digits
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import of_kind
+from finger3d.mechanics.readings import of_kind
 
 _LARGE_STRAIN = 0.1
 """Principal strain from which large deformation is advised without an estimate."""

@@ -17,10 +17,10 @@ from finger3d.contact.friction import SLIP, STICK
 from finger3d.fem.mesh.simplex import axis_numbers
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.progress import QUIET, Progress
 

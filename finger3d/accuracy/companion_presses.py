@@ -12,8 +12,8 @@ from finger3d.contact.acceleration import one_thread
 from finger3d.errors import FAILURES
 from finger3d.mechanics.discretise.companions import coarse_companions, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import FEW_CUTS, StepEstimate, last_step, rough_workspace
-from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import QUIET, Progress
 
 

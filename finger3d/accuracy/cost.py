@@ -38,10 +38,10 @@ from finger3d._cost import (
     tets_of_ftetwild,
 )
 from finger3d._types import Tree
+from finger3d.mechanics.discretise.body_mesh import face_near_gauge, locally_refined
 from finger3d.mechanics.discretise.build import WHOLE_FACE, candidate_points, poses
 from finger3d.mechanics.discretise.companions import LEAST_IN_SOLID
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
-from finger3d.mechanics.discretise.gauge_refinement import face_near_gauge, locally_refined
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.step_halving import automatic, limits

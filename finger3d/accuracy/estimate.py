@@ -20,6 +20,7 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.accuracy.richardson import spacing, spread_error
 from finger3d.errors import FAILURES, Finger3dError
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.step_halving import (
     StepEstimate,
     errors_of_runs,
@@ -29,8 +30,7 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, SLIP, by_key, in_space
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.readings import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, SLIP, by_key, in_space
 from finger3d.meshing.given.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 

@@ -16,12 +16,11 @@ from finger3d.errors import FAILURES, MissingError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import MEASURED
-from finger3d.mechanics.readings.quantities import quantities
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import MEASURED, quantities
 
 _ROUND_OFF = 1e-9
 """Relative error of a number that does not depend on the modulus, such as the prescribed force."""

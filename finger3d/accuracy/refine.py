@@ -24,7 +24,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.readings.quantities import Kind, kinds_of
+from finger3d.mechanics.readings import Kind, kinds_of
 from finger3d.progress import QUIET, Progress
 
 MAX_ROUNDS = 8

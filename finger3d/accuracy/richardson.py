@@ -22,9 +22,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.quantities import ORDER, Kind, kinds_of
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.readings import ORDER, Column, Kind, kinds_of
 
 _LEAST = 0.002
 """Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""

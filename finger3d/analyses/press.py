@@ -18,7 +18,7 @@ from finger3d.analyses.result import PressResult, result_in
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
@@ -227,9 +227,12 @@ def _remark(problem: Problem, step: StepResult) -> str:
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> States | None:
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
     from finger3d.accuracy.advice import largest_principal_strain
-    from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
-    from finger3d.mechanics.postprocess.penetration import increments_without_contact, penetration_warnings
-    from finger3d.mechanics.results.cavity import cavity_warnings
+    from finger3d.mechanics.finite_strain.increment import fold_warnings, snap_warnings
+    from finger3d.mechanics.postprocess.penetration import (
+        cavity_warnings,
+        increments_without_contact,
+        penetration_warnings,
+    )
 
     begin = time.perf_counter()
     report.stage("writing fields")

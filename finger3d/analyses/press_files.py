@@ -19,9 +19,9 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.io import write_csv, write_json, write_text
 from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.history import StepResult, contact_table, row_of_entry
 from finger3d.mechanics.march.grip import FINGERS, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
-from finger3d.mechanics.results.history import StepResult, contact_table, row_of_entry
 from finger3d.results.states import States, facing, states_of, write_states
 from finger3d.results.vtu import write_vtu
 

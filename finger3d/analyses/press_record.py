@@ -15,11 +15,10 @@ from finger3d._types import Tree
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Outcome
 from finger3d.geometry.imported import extent
-from finger3d.mechanics.discretise.size_advice import size_advice
+from finger3d.mechanics.discretise.resolution import size_advice
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import History, StepResult, measure, slip_events
 from finger3d.mechanics.march.grip import FINGERS, Grip
-from finger3d.mechanics.results.history import History, StepResult, measure
-from finger3d.mechanics.results.slip_events import slip_events
 from finger3d.objects import ObjectPose
 
 if TYPE_CHECKING:

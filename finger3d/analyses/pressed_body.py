@@ -21,19 +21,19 @@ from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.rules import RuleName
 from finger3d.mechanics.discretise.build import build, changed
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.march.force_control import at_depth_reached
+from finger3d.mechanics.history import StepResult
+from finger3d.mechanics.march.equilibrium import at_depth_reached
 from finger3d.mechanics.march.grip import Grip
-from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import automatic, march_automatic
+from finger3d.mechanics.march.variants import map_parallel
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.postprocess.penetration import SurfaceCheck, check_surface
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects.rigid import RigidObject
 from finger3d.progress import QUIET, Progress
 

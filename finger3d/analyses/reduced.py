@@ -19,13 +19,13 @@ from finger3d.analyses.reduced_file import arrays_of, assembled, bare, read, wri
 from finger3d.errors import Finger3dError
 from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.geometry.design import DesignSummary
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
+from finger3d.mechanics.history import History
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.postprocess.penetration import beyond_candidates
-from finger3d.mechanics.results.history import History
 
 _PATH = ("depth_mm", "slide_x_mm", "slide_z_mm", "turn_x", "turn_y", "turn_z")
 

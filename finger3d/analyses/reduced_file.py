@@ -24,8 +24,7 @@ from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Gauge, Marker, Taxel
 from finger3d.objects import OBJECTS, MeshObject, RigidObject, vertical_frame
 
 Made = TypeVar("Made", RigidObject, FrictionLaw)

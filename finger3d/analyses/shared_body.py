@@ -23,15 +23,13 @@ from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
-from finger3d.mechanics.march.parallel import map_parallel
+from finger3d.mechanics.history import StepResult, table_row
 from finger3d.mechanics.march.step_halving import march_automatic
+from finger3d.mechanics.march.variants import map_parallel
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.readings.columns import Column, in_space, strain_columns
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.mechanics.readings import Column, Gauge, Marker, in_space, strain_columns
 from finger3d.objects.rigid import RigidObject
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene

@@ -15,7 +15,7 @@ from finger3d.fem.mesh.simplex import Mesh
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from finger3d.mechanics.readings.gauges import Gauge
+    from finger3d.mechanics.readings import Gauge
 
 
 COLOUR = "#b0006a"

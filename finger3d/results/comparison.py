@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.companions import FACTOR
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.quantities import named
+from finger3d.mechanics.readings import Column, named
 
 FORCE = "force_N_per_mm"
 

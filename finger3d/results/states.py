@@ -18,7 +18,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.io import check_arrays, read_arrays, write_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult, contact_table
+from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.objects import PlacedObject
 from finger3d.results.summary import without_round_off
 

@@ -11,7 +11,7 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree, TreeView
 from finger3d.geometry.design import Design, lacks_section
-from finger3d.mechanics.readings.columns import (
+from finger3d.mechanics.readings import (
     AREAS,
     GIVEN_BY_FORCE,
     MAIN,

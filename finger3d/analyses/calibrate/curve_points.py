@@ -11,7 +11,7 @@ from finger3d._types import Float
 from finger3d.analyses.calibrate.increments import Increments
 from finger3d.analyses.pressed_body import PressAtMu
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.history import StepResult
 
 
 @dataclass(frozen=True)

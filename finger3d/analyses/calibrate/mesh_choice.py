@@ -12,7 +12,7 @@ from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import ORDER
+from finger3d.mechanics.readings import ORDER
 from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
 

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.pressed_body import presses
 from finger3d.mechanics.discretise.companions import built_like
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Model
 

@@ -23,8 +23,8 @@ from finger3d.analyses.calibrate.tolerances import displaced_gauges, evaluate_to
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.io import claimed
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.progress import Progress
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import (

@@ -32,12 +32,10 @@ from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.quantities import Quantity
+from finger3d.mechanics.readings import Column, Gauge, Quantity
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance

@@ -14,10 +14,10 @@ from finger3d.fem.mesh.simplex import CONTACT
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Domain, Model
-from finger3d.mechanics.readings.columns import by_key, in_space, of_kind
-from finger3d.mechanics.results.history import StepResult, contact_table, measure
+from finger3d.mechanics.readings import by_key, in_space, of_kind
 from finger3d.objects import PlacedObject
 from finger3d.results.comparison import Case
 

@@ -12,7 +12,7 @@ from finger3d._types import Float
 from finger3d.accuracy.error_bars import with_error
 from finger3d.accuracy.richardson import gain
 from finger3d.mechanics.discretise.companions import FACTOR
-from finger3d.mechanics.readings.quantities import Quantity
+from finger3d.mechanics.readings import Quantity
 from finger3d.results.comparison import FORCE, SHOWN, Case
 
 WITHIN = 0.05

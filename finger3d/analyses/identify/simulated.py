@@ -24,12 +24,11 @@ from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00, modulus_of_shore_A
 from finger3d.mechanics.discretise.build import changed
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, table_row
 from finger3d.mechanics.march.step_halving import automatic, with_increments_of
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import ending_at, stations, targets
-from finger3d.mechanics.readings.columns import by_key, in_order, in_space
-from finger3d.mechanics.readings.quantities import OF_INCREMENT, ORDER, kinds_of, quantities
-from finger3d.mechanics.results.history import StepResult, table_row
+from finger3d.mechanics.readings import OF_INCREMENT, ORDER, by_key, in_order, in_space, kinds_of, quantities
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene, tree
 

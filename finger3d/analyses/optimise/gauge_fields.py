@@ -21,10 +21,10 @@ from finger3d.fem.recovery.strain_reader import StrainReader
 from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import Kind
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import Kind
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.likelihood import ReadingEffects

@@ -21,12 +21,11 @@ from finger3d.errors import Finger3dError
 from finger3d.io import write_csv
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
-from finger3d.mechanics.readings.columns import strain_columns
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import Gauge, strain_columns
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal
 from finger3d.scene import Scene

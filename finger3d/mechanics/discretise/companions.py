@@ -17,7 +17,7 @@ import numpy as np
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.fem.surface.traces import contact_face, surface
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import MeshOptions, Model

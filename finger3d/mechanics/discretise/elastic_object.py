@@ -25,7 +25,7 @@ from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.moved_mesh import stretched_object, with_points_of
+from finger3d.mechanics.discretise.body_mesh import stretched_object, with_points_of
 from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model

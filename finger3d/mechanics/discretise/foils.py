@@ -28,7 +28,7 @@ from finger3d.fem.solids.bars import AddedStiffness, Bars
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.surface.traces import displacement_rows
 from finger3d.mechanics.model import Foils, Model
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 
 _COINCIDENT = 1e-9  # mm, and radians
 

@@ -21,12 +21,10 @@ from finger3d.fem.recovery.recover import strain_and_stress
 from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface.traces import BoundarySurface, joined, surface
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
-from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.discretise.contact_points import ContactPoints, contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.reading import MeshedBody
+from finger3d.mechanics.readings import Column, MeshedBody
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import ObjectPose, PlacedObject, SecondFinger, vertical_frame
 

@@ -31,17 +31,17 @@ from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.finite_contact import DeformedContact
 from finger3d.fem.tensors import InvertedError, rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
-from finger3d.mechanics.finite_strain.body import FiniteBody
-from finger3d.mechanics.finite_strain.state import (
+from finger3d.mechanics.finite_strain.body import (
     DeformedBody,
+    FiniteBody,
     FiniteStrainWorkspace,
     Linearisation,
     contact_of,
     curvature_of,
 )
 from finger3d.mechanics.formulation import length_scale
-from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_object, motion_until_touch, transported
+from finger3d.mechanics.history import State
+from finger3d.mechanics.small_strain import advanced, carried_by_object, motion_until_touch, transported
 from finger3d.objects import Move, vertical_frame
 
 _NEGLIGIBLE = 1e-6

@@ -18,9 +18,9 @@ from finger3d.fem.recovery.recover import displacement
 from finger3d.fem.surface.traces import values_over
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult, pose_entry
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid, grid_markers
-from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult, pose_entry
+from finger3d.mechanics.readings import Marker
 
 Sample: TypeAlias = Mapping[str, NDArray[Any]]
 """Arrays of a sample by name: fields (s, nx, nz) or (s, nx, nz, k) after s increments, poses (s,), and the grid."""

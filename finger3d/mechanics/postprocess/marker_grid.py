@@ -16,9 +16,8 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.readings.columns import Column, displacement_columns
-from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult, pose_entry
+from finger3d.mechanics.history import StepResult, pose_entry
+from finger3d.mechanics.readings import Column, Marker, displacement_columns
 from finger3d.meshing.given.given import GivenMesh
 
 _INWARD = 1e-9

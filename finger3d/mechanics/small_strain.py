@@ -1,4 +1,4 @@
-"""One increment of contact between a linear body and an object, along the true normals of the object.
+"""Small strain: increments of contact between a linear body and an object, along the true normals of the object.
 
 The displacement U of the contact points is linear in their forces, U = W f + U_past, and the gap and the normal of each
 point follow from its present place.  Contact is solved with gaps linearised at a displacement, and the
@@ -10,6 +10,7 @@ normal between those of the adjacent faces is one of the edge (its generalised g
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -23,14 +24,17 @@ from finger3d.contact.resultants import solve_to_forces
 from finger3d.contact.rules import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
+from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.surface.traces import BoundarySurface
 from finger3d.fem.tensors import rotated_delassus
-from finger3d.mechanics.discretise.contact_geometry import ContactGeometry, contact_geometry
+from finger3d.mechanics.discretise.contact_points import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulation import Workspace, length_scale
+from finger3d.mechanics.formulation import Loads, Workspace, length_scale
 from finger3d.mechanics.generalised import GeneralisedForces, motions, resultants
+from finger3d.mechanics.history import B, State
 from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
-from finger3d.mechanics.results.state import B, State
-from finger3d.objects import DistanceTracker, Move, vertical_frame
+from finger3d.mechanics.readings import Column
+from finger3d.objects import DistanceTracker, Move, ObjectPose, vertical_frame
 
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
@@ -376,3 +380,71 @@ def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Floa
     points = np.zeros((len(displacement), 3))
     points[:, :d] = problem.surface.centroids + displacement
     return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]
+
+
+@dataclass(frozen=True)
+class SmallStrain:
+    """Linear elasticity over the condensed compliance.
+
+    The state of the body is the displacement (c, d) mm of the contact points, in x, y, z.
+    """
+
+    def workspace(self) -> Workspace:
+        """Return an empty workspace; the compliance is that of the build."""
+        return Workspace()
+
+    def start(self, problem: Problem) -> State[Float]:
+        """Return the state without forces, with the gaps at rest."""
+        return State(at_rest(problem), np.zeros_like(problem.surface.points))
+
+    def increment(
+        self,
+        problem: Problem,
+        state: State[Float],
+        move: Move,
+        guess: Float | None,
+        workspace: Workspace,
+        wanted: GeneralisedForces | None = None,
+    ) -> ContactSolution[State[Float]]:
+        """Solve contact along the normals of the object."""
+        body = LinearBody(problem.delassus, np.zeros_like(state.body))
+        return solve_increment(problem, state, move, body, guess, workspace, wanted)
+
+    def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
+        """Yield the unknowns from the forces, by one back-substitution for many states."""
+        return problem.unknowns_of([problem.upright_force(state.contact) for state in states])
+
+    def readings(self, problem: Problem, state: State[Float]) -> dict[Column, float]:
+        """Return the readings from the forces, by their rows."""
+        return problem.read(problem.upright_force(state.contact))
+
+    def loads(self, problem: Problem, state: State[Float], pose: ObjectPose) -> Loads:
+        """Return the forces of the points, at their centroids at rest."""
+        return linear_loads(problem, state.contact, state.body)
+
+    def gap(self, problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+        """Return gaps and normals at the displaced points."""
+        return linear_gap(problem, u, pose, surface)
+
+    def fields(self, problem: Problem, state: State[Float]) -> tuple[Float, Float, Float]:
+        """Return displacement, linear strain and stress; in a section also the out-of-plane components."""
+        unknowns = next(self.unknowns(problem, [state]))
+        return displacement(problem.mesh, unknowns), *problem.strain_and_stress(unknowns)
+
+
+def at_rest(problem: Problem) -> ContactState:
+    """Return the contact state without forces, with the gaps at rest."""
+    distance, object_share = problem.placed(problem.origin).distance, problem.system.object_share
+    geometry = contact_geometry(distance, problem.surface, axes=problem.axes, object_share=object_share)
+    return replace(ContactState.at_rest(geometry.gap, problem.dim), bases=geometry.bases)
+
+
+def linear_loads(problem: Problem, contact: ContactState, moved: Float) -> Loads:
+    """Return the forces of the contact points, which are displaced by `moved` (c, d), at their centroids at rest."""
+    return Loads(problem.surface.centroids, moved, contact.scene_force, at_rest=True)
+
+
+def linear_gap(problem: Problem, u: Float, pose: ObjectPose, surface: BoundarySurface) -> tuple[Float, Float]:
+    """Return gaps (c,) and normals (c, d) of the points of a surface at small nodal displacements u (n, d)."""
+    geometry = contact_geometry(problem.placed(pose).distance, surface, surface.trace @ u, problem.axes)
+    return geometry.gap, geometry.bases[:, 0]
