@@ -1,11 +1,11 @@
 """Public names and the modules that they come from; `finger3d` reads this table when it is imported."""
 
 from finger3d.analyses.calibrate.run import calibrate as calibrate
-from finger3d.analyses.compare.run import compare as compare
+from finger3d.analyses.compare import compare as compare
 from finger3d.analyses.cost import cost as cost
+from finger3d.analyses.gauge_places import place_gauges as place_gauges
 from finger3d.analyses.identify.run import identify as identify
-from finger3d.analyses.optimise.gauge_run import place_gauges as place_gauges
-from finger3d.analyses.optimise.run import optimise as optimise
+from finger3d.analyses.optimise import optimise as optimise
 from finger3d.analyses.plan import plan as plan
 from finger3d.analyses.press import press as press
 from finger3d.analyses.reduced import ReducedModel as ReducedModel

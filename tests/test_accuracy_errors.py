@@ -13,10 +13,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from finger3d.accuracy.error_bars import ErrorBars, with_error
-from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers
-from finger3d.accuracy.modulus import modulus_errors
-from finger3d.accuracy.richardson import spread_error
+from finger3d.accuracy.error_bars import ErrorBars, spread_error, with_error
+from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, modulus_errors, press_numbers
 from finger3d.cli import main
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
@@ -166,7 +164,7 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
     def none(*_: object) -> Problem:
         raise Finger3dError(reason)
 
-    monkeypatch.setattr("finger3d.accuracy.companion_presses.coarse_companions", none)
+    monkeypatch.setattr("finger3d.accuracy.estimate.coarse_companions", none)
     scene = tmp_path / "scene.toml"
     scene.write_text(changed(SCENE, size_mm=0.4), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.accuracy.borders import stick_borders, with_refined_borders
 from finger3d.accuracy.estimate import estimate, main_numbers, press_numbers
-from finger3d.accuracy.refine import Refinement, Round, refine_mesh
+from finger3d.accuracy.refine import Refinement, Round, refine_mesh, stick_borders, with_refined_borders
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finger3d.analyses import pressed_body as pressing
-from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest
+from finger3d.analyses.pressed_body import SharedBody, Variant, VariantResult, body_key, finest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import UnresolvedError
 from finger3d.fem.recovery.recover import displacement

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_share
+from finger3d.analyses.calibrate.curve_points import SHARE, choose_mesh, mesh_share
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.calculix.deck import (
+from finger3d.analyses.calculix import (
+    MOST_FACETS,
     OBJECT,
     Contact,
     Deck,
@@ -20,9 +21,9 @@ from finger3d.analyses.calculix.deck import (
     ObjectElements,
     facet_lines,
     law_cards,
+    object_elements,
+    press_deck,
 )
-from finger3d.analyses.calculix.objects import MOST_FACETS, object_elements
-from finger3d.analyses.calculix.press import press_deck
 from finger3d.analyses.export_model import export_mesh
 from finger3d.cli import main
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh

@@ -17,9 +17,8 @@ import finger3d
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.material_tests import LawInTests
-from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
-from finger3d.analyses.identify.simulated import Simulation
+from finger3d.analyses.identify.presses import MeasuredPress, Simulation, read_measured
 from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00

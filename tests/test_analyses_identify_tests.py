@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.identify.result import Identification
+from finger3d.analyses.identify.run import Identification
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh

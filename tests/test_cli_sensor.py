@@ -19,7 +19,7 @@ from finger3d.analyses import pressed_body as pressing
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.identify.simulated import Simulation
+from finger3d.analyses.identify.presses import Simulation
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main
 from finger3d.cli.tolerances import parsed_tolerances

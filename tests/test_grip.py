@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.least_grip import least_grip
+from finger3d.analyses.press import least_grip
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.app.live_body import LiveBody
 from finger3d.cli import main

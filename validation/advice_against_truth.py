@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.accuracy.advice import largest_principal_strain
 from finger3d.accuracy.changes import Change, changing_numbers
-from finger3d.accuracy.model_error import Judgement, at_large_deformation
+from finger3d.accuracy.model_error import Judgement, at_large_deformation, largest_principal_strain
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation

@@ -20,8 +20,7 @@ import numpy as np
 
 import finger3d
 from finger3d._types import Tree
-from finger3d.analyses.calculix.deck import Contact
-from finger3d.analyses.calculix.press import press_deck
+from finger3d.analyses.calculix import Contact, press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.cost import CostRow, Forecasts
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.effects.large_deformation import Effect as LargeDeformation

@@ -21,8 +21,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import with_defaults
-from finger3d.analyses.optimise.gauge_fields import GaugeFields
-from finger3d.analyses.optimise.gauge_search import Region, search
+from finger3d.analyses.gauge_places import GaugeFields, Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from finger3d._types import Tree
-from finger3d.accuracy.richardson import largest, spacing
+from finger3d.accuracy.error_bars import largest, spacing
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Model

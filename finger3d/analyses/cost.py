@@ -18,11 +18,10 @@ from typing import Self
 from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
-from finger3d.accuracy.companion_presses import companion_presses
 from finger3d.accuracy.cost import forecast, without_output_s
-from finger3d.accuracy.estimate import estimate, press_numbers
+from finger3d.accuracy.error_bars import relative_error
+from finger3d.accuracy.estimate import companion_presses, estimate, press_numbers
 from finger3d.accuracy.refine import ALL
-from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError

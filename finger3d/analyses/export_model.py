@@ -99,7 +99,7 @@ def export_deck(
     Finger3dError
         If CalculiX has no equal of what the scene asks for; the line names it.
     """
-    from finger3d.analyses.calculix.press import press_deck
+    from finger3d.analyses.calculix import press_deck
     from finger3d.analyses.effects_by_need import settled
 
     out, report = Path(out), report or Progress()

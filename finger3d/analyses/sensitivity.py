@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Tree, TreeView
+from finger3d.accuracy.error_bars import spread_error
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.richardson import spread_error
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with

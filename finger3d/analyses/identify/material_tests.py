@@ -12,8 +12,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.identify.measured import INDEX, STD, check_stds
-from finger3d.analyses.identify.simulated import MODULI, with_last_share
+from finger3d.analyses.identify.presses import INDEX, MODULI, STD, check_stds, with_last_share
 from finger3d.csv_table import CsvTable, read_table
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import CONSTANTS, Effect

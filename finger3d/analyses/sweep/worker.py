@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from finger3d.analyses.shared_body import SharedBody, VariantResult, body_key
+from finger3d.analyses.pressed_body import SharedBody, VariantResult, body_key
 from finger3d.analyses.sweep.labels import SAMPLE
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import FAILURES, Finger3dError
