@@ -18,7 +18,7 @@ from finger3d.errors import Finger3dError as Finger3dError
 from finger3d.errors import MissingError as MissingError
 from finger3d.errors import Outcome as Outcome
 from finger3d.fem.laws.material import Isotropic as Isotropic
-from finger3d.fem.mesh.simplex import Mesh as Mesh
+from finger3d.fem.mesh import Mesh as Mesh
 from finger3d.geometry.registry import designs as designs
 from finger3d.mechanics.model import Leg as Leg
 from finger3d.mechanics.model import MeshOptions as MeshOptions

@@ -12,8 +12,8 @@ from finger3d.analyses import pressed_body as pressing
 from finger3d.analyses.pressed_body import SharedBody, Variant, VariantResult, body_key, finest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import UnresolvedError
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import surface
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import surface
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.formulations import formulation_of

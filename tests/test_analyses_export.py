@@ -28,7 +28,7 @@ from finger3d.analyses.export_model import export_mesh
 from finger3d.cli import main
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FACETS, quadratic
+from finger3d.fem.mesh import FACETS, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.meshing.given.given import given_mesh
 from finger3d.meshing.given.mesh_output import write_mesh_vtu

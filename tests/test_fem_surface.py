@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.fem.mesh.simplex import Mesh, quadratic, reflected, signed_volumes
-from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
-from finger3d.fem.surface.traces import (
+from finger3d.fem.mesh import Mesh, quadratic, reflected, signed_volumes
+from finger3d.fem.surface import (
     BoundarySurface,
+    DeformedContact,
+    deformed_contact,
     displacement_row,
     facing_trace,
     strain_row,

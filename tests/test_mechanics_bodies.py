@@ -11,9 +11,8 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.surface.traces import BoundarySurface, surface
+from finger3d.fem.mesh import Mesh, curved_volume, quadratic
+from finger3d.fem.surface import BoundarySurface, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.body_mesh import stretched
 from finger3d.mechanics.discretise.build import build, mesh_part

@@ -16,8 +16,8 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws import NeoHooke, Yeoh
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.quality import most_distorted
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import most_distorted
+from finger3d.fem.recovery import displacement
 from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles

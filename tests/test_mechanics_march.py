@@ -11,11 +11,11 @@ import scipy.sparse as sp
 
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb, TwoCoefficients
-from finger3d.contact.rules import RULES
+from finger3d.contact.solve import RULES
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.mesh import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

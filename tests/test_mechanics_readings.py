@@ -19,8 +19,8 @@ from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import displacement_row
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

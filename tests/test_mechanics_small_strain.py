@@ -199,7 +199,7 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
 
 
 def _nodal_volume(problem: Problem) -> np.ndarray:
-    from finger3d.fem.mesh.elements import quadrature
+    from finger3d.fem.mesh import quadrature
 
     mesh = problem.mesh
     bary, w = quadrature(mesh.dim, 2)

@@ -11,9 +11,16 @@ import pytest
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.elements import EDGES
-from finger3d.fem.mesh.quality import curved_jacobians, curved_volume, min_angle_deg
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.mesh import (
+    EDGES,
+    Mesh,
+    boundary,
+    curved_jacobians,
+    curved_volume,
+    min_angle_deg,
+    quadratic,
+    signed_volumes,
+)
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.imported import imported
 from finger3d.geometry.registry import designs

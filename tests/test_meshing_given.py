@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, curved_volume, quadratic
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.given.given import GivenMesh, given_mesh

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import cell_angles_deg, curved_jacobians, curved_volume
-from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
+from finger3d.fem.mesh import Mesh, boundary, cell_angles_deg, curved_jacobians, curved_volume, signed_volumes, unfold
 from finger3d.geometry.cad import sound
 from finger3d.geometry.implicit import ImplicitCylinder, ImplicitPlane, ImplicitSphere
 from finger3d.geometry.registry import designs

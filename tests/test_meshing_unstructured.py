@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.fem.mesh.quality import curved_jacobians, curved_volume
-from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
+from finger3d.fem.mesh import Mesh, boundary, curved_jacobians, curved_volume, signed_volumes, unfold
 from finger3d.geometry.imported import imported
 from finger3d.geometry.parts import OUTSIDE, glue
 from finger3d.geometry.registry import designs

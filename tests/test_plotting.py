@@ -13,7 +13,7 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.errors import Outcome
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings import strain_columns
 from finger3d.plotting import solid as render

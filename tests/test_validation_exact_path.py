@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.laws.material import Isotropic

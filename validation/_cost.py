@@ -20,9 +20,9 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import local_rows
+from finger3d.fem.surface import local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import candidate_points, contact_rows, mesh_part
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.mesh.simplex import unfold
+from finger3d.fem.mesh import unfold
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 

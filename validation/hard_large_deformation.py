@@ -26,8 +26,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import quadrature
+from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.mesh import Mesh, boundary, quadratic, signed_volumes
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march

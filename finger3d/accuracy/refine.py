@@ -26,7 +26,7 @@ from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import discretisation, press_numbers
 from finger3d.contact.friction import SLIP, STICK
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.fem.mesh.simplex import axis_numbers
+from finger3d.fem.mesh import axis_numbers
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult

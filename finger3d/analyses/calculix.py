@@ -23,7 +23,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
+from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.mechanics.discretise.build import mesh_part
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import Leg, Model

@@ -17,7 +17,7 @@ from finger3d._types import Float, Tree
 from finger3d.accuracy.error_bars import gain, with_error
 from finger3d.accuracy.estimate import estimate
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
-from finger3d.fem.mesh.simplex import CONTACT
+from finger3d.fem.mesh import CONTACT
 from finger3d.geometry.design import lacks_section
 from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.discretise.build import build

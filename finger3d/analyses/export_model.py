@@ -61,7 +61,7 @@ def export_mesh(
     Finger3dError
         If the scene is a section, or the folder holds the finger's own file.
     """
-    from finger3d.fem.mesh.simplex import axis_numbers, unfold
+    from finger3d.fem.mesh import axis_numbers, unfold
     from finger3d.mechanics.discretise.build import mesh_part
     from finger3d.mechanics.discretise.symmetry import symmetry
     from finger3d.meshing.given.mesh_output import write_mesh_vtu

@@ -26,8 +26,7 @@ from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
 from finger3d.analyses.optimise import MUS, check_readings
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.recovery.strain_reader import StrainReader
+from finger3d.fem.recovery import StrainReader, displacement
 from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
 from finger3d.mechanics.discretise.problem import Problem

@@ -18,7 +18,7 @@ from finger3d._machine import peak_memory_MB, versions
 from finger3d._types import Array, Float, Tree, TreeView
 from finger3d.contact.friction import OPEN, STICK
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
+from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
 from finger3d.geometry.imported import extent
 from finger3d.io import write_csv, write_json, write_text
 from finger3d.mechanics.discretise.contact_points import ContactPoints

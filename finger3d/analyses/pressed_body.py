@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from finger3d._machine import made_with
 from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
-from finger3d.contact.rules import RuleName
+from finger3d.contact.solve import RuleName
 from finger3d.errors import FAILURES, Outcome
 from finger3d.io import checksum
 from finger3d.mechanics.discretise.build import build, changed

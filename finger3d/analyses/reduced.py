@@ -22,10 +22,10 @@ from finger3d._machine import versions
 from finger3d._types import Array, Tree, TreeView
 from finger3d.analyses.pressed_body import under
 from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
-from finger3d.contact.rules import RuleName
+from finger3d.contact.solve import RuleName
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.surface import BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import check_arrays, read_arrays, write_arrays
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints

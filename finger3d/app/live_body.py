@@ -16,7 +16,7 @@ from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_o
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.recovery import displacement
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table, measure

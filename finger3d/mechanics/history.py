@@ -23,7 +23,7 @@ from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK, Coulomb, 
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import Zone, zone_area, zone_ends
 from finger3d.errors import MissingError, Outcome
-from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.mesh import FREE_FACES
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.readings import MEASURED, Column, Reading, Taxel, by_key, in_space, of_kind
 from finger3d.objects import Move, ObjectPose

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
+from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
+from finger3d.contact.solve import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation

@@ -20,9 +20,8 @@ from finger3d._ranges import Turn
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness, times
-from finger3d.fem.mesh.locate import cells_at
-from finger3d.fem.mesh.simplex import Mesh, reflect_into_part
-from finger3d.fem.surface.traces import displacement_row, displacement_rows, strain_row
+from finger3d.fem.mesh import Mesh, cells_at, reflect_into_part
+from finger3d.fem.surface import displacement_row, displacement_rows, strain_row
 
 MAIN = ("normal_force_N", "friction_sum_N", "contact_half_length_mm", "stick_half_length_mm")
 """The numbers of a press that short tables show, and that get an error bar, beside every gauge."""
@@ -241,7 +240,7 @@ class Taxel:
 
     def _weights(self, body: MeshedBody) -> Float:
         """Return the weights (n,) of the nodal forces along y."""
-        from finger3d.fem.recovery.reactions import mean_traction_weights
+        from finger3d.fem.recovery import mean_traction_weights
 
         sides = [("x", self.x_mm, self.length_mm)]
         if body.mesh.dim == 3:
@@ -333,7 +332,7 @@ class Gauge:
 
     def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
         """Return the relative elongation of the line under displacements u (n, d), mm, of a meshed part."""
-        from finger3d.fem.solids.deformed import stretch
+        from finger3d.fem.solids.hyperelastic import stretch
 
         if self.is_point:
             return stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))

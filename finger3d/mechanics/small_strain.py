@@ -21,11 +21,11 @@ from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem
 from finger3d.contact.friction import OPEN
 from finger3d.contact.resultants import solve_to_forces
-from finger3d.contact.rules import RULES
+from finger3d.contact.solve import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import BoundarySurface
 from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_points import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem

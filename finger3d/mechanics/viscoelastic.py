@@ -23,13 +23,12 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.contact.state import ContactSolution
 from finger3d.fem.assembly import Stiffness, stiffness, times
-from finger3d.fem.laws.material import Elasticity
+from finger3d.fem.laws.material import Elasticity, ElasticityByPart
 from finger3d.fem.laws.relaxation import InternalVariables, Prony, Relaxation, Step, relaxed
-from finger3d.fem.mesh.parts import ElasticityByPart
-from finger3d.fem.mesh.simplex import MeshPart
-from finger3d.fem.recovery.recover import averaged, displacement, nodal_pressure, nodal_strain
+from finger3d.fem.mesh import MeshPart
+from finger3d.fem.recovery import averaged, displacement, nodal_pressure, nodal_strain
 from finger3d.fem.solvers.condense import Condensation, spring_forces, stiffened
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.surface import BoundarySurface
 from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
 from finger3d.mechanics.formulation import Loads, Workspace
 from finger3d.mechanics.generalised import GeneralisedForces

@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from finger3d._cost import MAX_TETS
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
 from finger3d.meshing.given.given import GivenMesh, mesh_given

@@ -18,7 +18,7 @@ from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import CONSTANTS, Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.laws.material_tests import LARGEST_STRETCH, TESTS, nominal_stress, principal_stretches, rising_to
+from finger3d.fem.laws.base import LARGEST_STRETCH, TESTS, nominal_stress, principal_stretches, rising_to
 from finger3d.scene import Scene
 from finger3d.scene.messages import choose, listed
 

@@ -32,7 +32,7 @@ from finger3d.analyses.identify.presses import (
     read_measured,
 )
 from finger3d.errors import Finger3dError
-from finger3d.fem.laws.material_tests import nominal_stress, principal_stretches
+from finger3d.fem.laws.base import nominal_stress, principal_stretches
 from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.plotting.identify import Panel, draw
 from finger3d.progress import Progress

@@ -18,9 +18,7 @@ from scipy.spatial import cKDTree
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.locate import locate
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, reflect_into_part
+from finger3d.fem.mesh import Mesh, curved_volume, locate, reflect_into_part
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Gauge

@@ -17,10 +17,10 @@ from finger3d._cost import PressSize, duration
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.fem.mesh.simplex import CONTACT, Mesh
+from finger3d.fem.laws.material import elasticity_of, moduli_of
+from finger3d.fem.mesh import CONTACT, Mesh
 from finger3d.fem.solvers.condense import Condensation, condense, stiffened
-from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
+from finger3d.fem.surface import BoundarySurface, local_rows, restrict
 from finger3d.mechanics.discretise.body_mesh import locally_refined, stretched, with_points_of
 from finger3d.mechanics.discretise.contact_points import MARGIN, contact_geometry, may_touch
 from finger3d.mechanics.discretise.problem import (

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.fem.surface.traces import contact_face, surface
+from finger3d.fem.surface import contact_face, surface
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import Zone, edges_of, zones
-from finger3d.fem.mesh.simplex import CONTACT, in_symmetry_planes
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.mesh import CONTACT, in_symmetry_planes
+from finger3d.fem.surface import BoundarySurface
 from finger3d.fem.tensors import LEAST_SLOPE, bases_of, turned_towards, unit_normals
 from finger3d.objects import vertical_frame
 
@@ -41,7 +41,7 @@ class ContactPoints:
     Attributes
     ----------
     nodes : (m,) numbers in the whole mesh
-    face : (m,) number in `finger3d.fem.mesh.simplex.FREE_FACES` of the face that each point belongs to
+    face : (m,) number in `finger3d.fem.mesh.FREE_FACES` of the face that each point belongs to
     points : (m, 3) mm at rest, z = 0 in a section
     area : (m,) mm2
     basis : (d, d), or (m, d, d) where each point has its own: normal into the finger, then tangents

@@ -21,8 +21,8 @@ from scipy.spatial import KDTree
 
 from finger3d._types import Float
 from finger3d.errors import UnresolvedError
-from finger3d.fem.mesh.simplex import CONTACT
-from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
+from finger3d.fem.mesh import CONTACT
+from finger3d.fem.surface import BoundarySurface, contact_face, restrict
 from finger3d.geometry.design import DesignSummary
 from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap

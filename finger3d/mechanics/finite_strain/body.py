@@ -10,15 +10,13 @@ import scipy.sparse as sp
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.fem.assembly import Pattern, Stiffness
-from finger3d.fem.laws.base import Inhomogeneous
+from finger3d.fem.laws.base import Inhomogeneous, least_stiffness, unstable_from
 from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step
-from finger3d.fem.laws.stability import least_stiffness, unstable_from
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.recovery import displacement
 from finger3d.fem.solids.bars import BarRelaxation, Bars
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.fem.solvers.condense import Condensation
-from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.surface import BoundarySurface, DeformedContact, deformed_contact
 from finger3d.fem.tensors import bases_of
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace

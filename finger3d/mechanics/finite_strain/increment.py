@@ -22,12 +22,11 @@ from finger3d._types import Float
 from finger3d.contact.acceleration import one_thread
 from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.resultants import solve_to_forces
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.solve import STEP_DEPENDENT_RULES
 from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.mesh.quality import most_distorted
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import FREE_FACES, Mesh, most_distorted
+from finger3d.fem.recovery import displacement
 from finger3d.fem.tensors import InvertedError
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import unresolved_details

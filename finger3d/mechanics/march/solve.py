@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.solve import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem

@@ -26,7 +26,7 @@ from typing import TypeAlias, TypeVar
 
 from finger3d._cost import AUTOMATIC_S, PressSize
 from finger3d._types import Float
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.solve import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.companions import coarse_companions
 from finger3d.mechanics.discretise.problem import Problem

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import STATUS_NAMES
-from finger3d.fem.mesh.simplex import CONTACT, Mesh
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import values_over
+from finger3d.fem.mesh import CONTACT, Mesh
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import values_over
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, pose_entry

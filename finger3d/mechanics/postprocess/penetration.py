@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN
-from finger3d.fem.mesh.elements import TRIANGLES
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
+from finger3d.fem.mesh import CONTACT, FREE_FACES, TRIANGLES, Mesh
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import BoundarySurface, contact_face, restrict
 from finger3d.mechanics.discretise.contact_points import may_touch
 from finger3d.mechanics.discretise.problem import Problem, free_surface, rigid_gap
 from finger3d.mechanics.discretise.resolution import rounded_down, size_advice, vertical_overlap

@@ -13,9 +13,7 @@ import numpy as np
 from finger3d._ranges import four_digits
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.elements import EDGES
-from finger3d.fem.mesh.quality import curved_jacobians, curved_volume
-from finger3d.fem.mesh.simplex import FACETS, Mesh, quadratic, signed_volumes
+from finger3d.fem.mesh import EDGES, FACETS, Mesh, curved_jacobians, curved_volume, quadratic, signed_volumes
 from finger3d.geometry.files import content, welded
 from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
 from finger3d.geometry.surface import Triangles

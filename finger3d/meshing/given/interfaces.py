@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.simplex import FACETS
+from finger3d.fem.mesh import FACETS
 from finger3d.geometry.parts import OUTSIDE
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import Tessellation

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.io import atomic
 from finger3d.meshing.given.given import MAIN_BODY
 from finger3d.meshing.given.mesh_files import LABEL, PART

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.elements import EDGES
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import EDGES, Mesh, quadratic
 
 TOO_LONG = 1.8
 """Longest edge of a cell over the wanted edge length above which the cell is halved; the diagonal of a cube is 1.73."""

@@ -18,9 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.elements import TET4, TRI3
-from finger3d.fem.mesh.quality import cell_angles_deg, curved_jacobians
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import TET4, TRI3, Mesh, cell_angles_deg, curved_jacobians, quadratic
 from finger3d.geometry.faceted import Faceted, moved_onto
 from finger3d.geometry.implicit import ImplicitPlane
 from finger3d.geometry.parts import OUTSIDE

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, unfold
+from finger3d.fem.mesh import Mesh, boundary, quadratic, unfold
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.limits import check_count, check_sizes

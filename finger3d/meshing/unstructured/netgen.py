@@ -16,7 +16,7 @@ from finger3d._cost import netgen_limit_s
 from finger3d._extras import require
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import checked_tets
 from finger3d.meshing.options import MeshSizes, Zone

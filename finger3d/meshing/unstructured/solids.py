@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from finger3d._child import ChildError, in_child
 from finger3d._types import Array, Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, signed_volumes
+from finger3d.fem.mesh import Mesh, curved_volume, signed_volumes
 from finger3d.geometry.design import Design
 from finger3d.meshing.refinement.grading import Grading
 from finger3d.meshing.refinement.sizing import Sizing

@@ -17,7 +17,7 @@ from finger3d._extras import require
 from finger3d._ranges import at_least
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
