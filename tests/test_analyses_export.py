@@ -30,8 +30,8 @@ from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import FACETS, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
-from finger3d.meshing.given.given import given_mesh
-from finger3d.meshing.given.mesh_output import write_mesh_vtu
+from finger3d.meshing.given import given_mesh
+from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.objects import Cylinder, MeshObject, ObjectPose, PlacedObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene import load, parse
 from tests.bodies import ball, box

@@ -19,7 +19,7 @@ from finger3d.fem.surface import (
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from tests.meshes import grid
 
 

@@ -35,7 +35,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface, penetration_warnings
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import box
 from tests.models import ended, swept_fig9

@@ -26,12 +26,11 @@ from finger3d.geometry.imported import imported
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
+from finger3d.meshing.bisection import refined
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.refinement.bisection import refined
-from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.refinement.sizing import Sizing, count_cells, sizing
 from finger3d.meshing.report import mesh_report
-from finger3d.meshing.structured.swept import mesh_section, mesh_swept
+from finger3d.meshing.sizing import Grading, Sizing, count_cells, sizing
+from finger3d.meshing.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.meshing.unstructured.solids import box
 from tests.commands import loaded

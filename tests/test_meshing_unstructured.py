@@ -19,10 +19,9 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import tessellate_parts
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.given.interfaces import part_facets
-from finger3d.meshing.refinement.sizing import sizing
-from finger3d.meshing.structured.snap import UnusableMeshError, check_closed, snap
+from finger3d.meshing.sizing import sizing
 from finger3d.meshing.unstructured import netgen, tetwild
+from finger3d.meshing.unstructured.snap import UnusableMeshError, check_closed, part_facets, snap
 from finger3d.meshing.unstructured.solids import (
     box,
     check_volume,

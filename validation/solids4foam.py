@@ -35,7 +35,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.meshing.given.mesh_output import write_mesh_vtu
+from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.scene import scene_of
 
 from ._rows import Result, Row, Settled, at_least, at_most, columns, grouped, settled

@@ -55,7 +55,7 @@ from finger3d.mechanics.readings import (
     in_space,
     quantities,
 )
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 
 

@@ -34,7 +34,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Kind, kinds_of
-from finger3d.meshing.refinement.grading import SizedPlaces
+from finger3d.meshing.sizing import SizedPlaces
 from finger3d.progress import QUIET, Progress
 
 MOST_STICK_REFINEMENT = 16.0

@@ -29,7 +29,7 @@ from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings import AREAS, MAIN, ORDER, by_key, kinds_of
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Source, scene_of
 

@@ -64,7 +64,7 @@ def export_mesh(
     from finger3d.fem.mesh import axis_numbers, unfold
     from finger3d.mechanics.discretise.build import mesh_part
     from finger3d.mechanics.discretise.symmetry import symmetry
-    from finger3d.meshing.given.mesh_output import write_mesh_vtu
+    from finger3d.meshing.mesh_files import write_mesh_vtu
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     model = scene.model()

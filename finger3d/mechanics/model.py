@@ -15,8 +15,7 @@ from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.design import Design
 from finger3d.mechanics.readings import Column, Gauge, Marker, Reading, Taxel
-from finger3d.meshing.options import Mesher
-from finger3d.meshing.refinement.grading import SizedPlaces
+from finger3d.meshing.sizing import Mesher, SizedPlaces
 from finger3d.objects import (
     ContactPath,
     FirstTouch,

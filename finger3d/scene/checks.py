@@ -21,7 +21,7 @@ from finger3d.mechanics.readings import (
     pressure_column,
     strain_columns,
 )
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.scene.derived import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import Place, dotted, shown

@@ -36,7 +36,7 @@ from finger3d._types import Tree
 from finger3d.contact.solve import RuleName
 from finger3d.materials.elastic import MODULUS_KEYS, ElasticConstants, elastic_constants
 from finger3d.mechanics.model import Domain
-from finger3d.meshing.options import Mesher
+from finger3d.meshing.sizing import Mesher
 
 Record = TypeVar("Record")
 Steps = Count | Literal["auto"]

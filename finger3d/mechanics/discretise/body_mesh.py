@@ -22,11 +22,11 @@ from finger3d.fem.mesh import Mesh, curved_volume, locate, reflect_into_part
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Gauge
+from finger3d.meshing.bisection import refined
 from finger3d.meshing.limits import check_count
-from finger3d.meshing.refinement.bisection import refined
-from finger3d.meshing.refinement.grading import SizedPlaces
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.sizing import SizedPlaces
+from finger3d.meshing.swept import mesh_section
 
 _REACH = 2.5
 """Distance from a gauge up to which the contact face is refined, over the depth of the gauge under it."""

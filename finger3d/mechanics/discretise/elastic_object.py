@@ -30,8 +30,8 @@ from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.options import Mesher, Zone
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.sizing import Mesher, Zone
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress
 

@@ -18,7 +18,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, pose_entry
 from finger3d.mechanics.readings import Column, Marker, displacement_columns
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 
 _INWARD = 1e-9
 """Share of the way to the middle of a facet by which a point on its border is moved: its line then meets the facet."""

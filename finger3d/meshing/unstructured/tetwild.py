@@ -22,8 +22,7 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.meshing.limits import checked_tets
-from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.refinement.sizing import Sizing, sizing
+from finger3d.meshing.sizing import MeshSizes, Sizing, Zone, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,
@@ -57,7 +56,7 @@ def new_mesh(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     require('mesh.mesher = "ftetwild"', "build123d", "pytetwild", instead='set mesh.mesher = "swept"')
     start = time.perf_counter()

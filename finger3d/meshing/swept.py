@@ -14,10 +14,10 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh, boundary, quadratic, unfold
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.geometry.section import Arc, Flat, Section
+from finger3d.meshing.grid import GridLayout, Sizes, folded_zone, rows
 from finger3d.meshing.limits import check_count, check_sizes
-from finger3d.meshing.options import MeshSizes, Zone
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.grid import GridLayout, Sizes, folded_zone, rows
+from finger3d.meshing.sizing import MeshSizes, Zone
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh

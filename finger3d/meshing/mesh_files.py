@@ -25,7 +25,11 @@ from numpy.typing import NDArray
 from finger3d._ranges import printable
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
-from finger3d.io import text_of
+from finger3d.fem.mesh import Mesh
+from finger3d.io import atomic, text_of
+
+MAIN_BODY = "body"
+"""Name of the main body, beside cells without a name."""
 
 MSH, VTU = ".msh", ".vtu"
 MESH_SUFFIXES = (MSH, VTU)
@@ -321,3 +325,36 @@ def _texts(array: Any) -> NDArray[np.str_]:
     """Return the values (n,) of an array of VTK as texts; VTK gives bytes for what is no UTF-8."""
     values = map(array.GetValue, range(array.GetNumberOfValues()))
     return np.array([text_of(value) if isinstance(value, bytes) else str(value) for value in values])
+
+
+_VTK_TRIANGLE6, _VTK_TET10 = 22, 24
+
+
+def write_mesh_vtu(path: Path, mesh: Mesh) -> None:
+    """Write a quadratic mesh of tetrahedra and its facets as a .vtu file.
+
+    Cells are numbered by their part and facets by their label, which ParaView can colour by; the names that the numbers
+    stand for are field data.
+    """
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    labels = [label for label, facets in mesh.facets.items() if len(facets)]
+    facets = [mesh.facets[label] for label in labels]
+    part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
+    used = np.unique(part)
+    names = [(MAIN_BODY, *mesh.part_labels)[k] for k in used]
+    count = sum(map(len, facets))
+    cells = [np.insert(block, 0, block.shape[1], axis=1).ravel() for block in (mesh.cells, *facets)]
+    types = np.repeat([_VTK_TET10, _VTK_TRIANGLE6], [len(mesh.cells), count])
+    grid = pyvista.UnstructuredGrid(np.concatenate(cells), types.astype(np.uint8), np.ascontiguousarray(mesh.points))
+    grid.cell_data[PART] = np.concatenate([np.searchsorted(used, part), np.full(count, -1)])
+    grid.cell_data[LABEL] = np.repeat([-1, *range(len(labels))], [len(mesh.cells), *map(len, facets)])
+    for key, texts in ((PART, names), (LABEL, labels)):
+        array = vtkStringArray()  # PyVista refuses texts that are not ASCII
+        array.SetName(f"{key}_names")
+        for text in texts:
+            array.InsertNextValue(text)
+        grid.GetFieldData().AddArray(array)
+    with atomic(path) as temporary:
+        grid.save(temporary)

@@ -17,13 +17,11 @@ from finger3d.fem.mesh import EDGES, FACETS, Mesh, curved_jacobians, curved_volu
 from finger3d.geometry.files import content, welded
 from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
 from finger3d.geometry.surface import Triangles
-from finger3d.meshing.given.mesh_files import MeshContents, read_contents
+from finger3d.meshing.bisection import TOO_LONG, refined
 from finger3d.meshing.limits import check_count
-from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.refinement.bisection import TOO_LONG, refined
-from finger3d.meshing.refinement.grading import SizedPlaces
-from finger3d.meshing.refinement.sizing import RATE
+from finger3d.meshing.mesh_files import MAIN_BODY, MeshContents, read_contents
 from finger3d.meshing.report import MeshReport, mesh_report
+from finger3d.meshing.sizing import RATE, MeshSizes, SizedPlaces, Zone
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -31,9 +29,6 @@ if TYPE_CHECKING:
 
 NEEDED = ("contact", "base")
 """Facets that a file must name."""
-
-MAIN_BODY = "body"
-"""Name of the main body, beside cells without a name."""
 
 _KEPT = ("contact", "base", "walls", "ends")  # names of facets with a meaning; others are walls
 _CUTS = ("symmetry_x", "symmetry_z")
