@@ -1,11 +1,11 @@
 """Public names and the modules that they come from; `finger3d` reads this table when it is imported."""
 
 from finger3d.analyses.calibrate.run import calibrate as calibrate
-from finger3d.analyses.compare.run import compare as compare
+from finger3d.analyses.compare import compare as compare
 from finger3d.analyses.cost import cost as cost
+from finger3d.analyses.gauge_places import place_gauges as place_gauges
 from finger3d.analyses.identify.run import identify as identify
-from finger3d.analyses.optimise.gauge_run import place_gauges as place_gauges
-from finger3d.analyses.optimise.run import optimise as optimise
+from finger3d.analyses.optimise import optimise as optimise
 from finger3d.analyses.plan import plan as plan
 from finger3d.analyses.press import press as press
 from finger3d.analyses.reduced import ReducedModel as ReducedModel
@@ -18,12 +18,12 @@ from finger3d.errors import Finger3dError as Finger3dError
 from finger3d.errors import MissingError as MissingError
 from finger3d.errors import Outcome as Outcome
 from finger3d.fem.laws.material import Isotropic as Isotropic
-from finger3d.fem.mesh.simplex import Mesh as Mesh
+from finger3d.fem.mesh import Mesh as Mesh
 from finger3d.geometry.registry import designs as designs
 from finger3d.mechanics.model import Leg as Leg
 from finger3d.mechanics.model import MeshOptions as MeshOptions
 from finger3d.mechanics.model import Model as Model
-from finger3d.mechanics.readings.gauges import Gauge as Gauge
+from finger3d.mechanics.readings import Gauge as Gauge
 from finger3d.mold.export import export as export
 from finger3d.mold.options import MoldOptions as MoldOptions
 from finger3d.objects import Cylinder as Cylinder

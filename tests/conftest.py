@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
-    from finger3d.fem.mesh.simplex import Mesh
+    from finger3d.fem.mesh import Mesh
     from finger3d.geometry.design import Design
     from finger3d.mold.parts import Mold
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 
 

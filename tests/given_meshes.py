@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from tests.meshes import grid
 
 GMSH = Path(__file__).resolve().parent / "gmsh"

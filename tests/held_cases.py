@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, Model
-from finger3d.mechanics.results.history import StepResult, measure
 
 N, MU = 0.2, 0.25
 PRESS = Leg(0.2, steps=2, force_N=N, duration_s=1.0)

@@ -10,11 +10,9 @@ import scipy.sparse as sp
 from finger3d._types import Float
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.elements import Element
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Element, Mesh, curved_volume, quadratic
 from finger3d.fem.solvers.condense import is_installed
-from finger3d.fem.surface.traces import local_rows, strain_row, surface
+from finger3d.fem.surface import local_rows, strain_row, surface
 from finger3d.objects import vertical_frame
 from validation._common import box, shuffled
 from validation._common import mapped as mapped

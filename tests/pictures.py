@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.mesh.simplex import CONTACT, Mesh, quadratic
+from finger3d.fem.mesh import CONTACT, Mesh, quadratic
 from finger3d.objects import Plane
 from finger3d.plotting import solid as render
 from finger3d.plotting.deformed import draw_finger

@@ -13,10 +13,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from finger3d.accuracy.error_bars import ErrorBars, with_error
-from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, press_numbers
-from finger3d.accuracy.modulus import modulus_errors
-from finger3d.accuracy.richardson import spread_error
+from finger3d.accuracy.error_bars import ErrorBars, spread_error, with_error
+from finger3d.accuracy.estimate import estimate, estimate_with_grid, main_numbers, modulus_errors, press_numbers
 from finger3d.cli import main
 from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.embedded_gauge import Effect as Foil
@@ -26,14 +24,12 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import step_error
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import RESULTANTS, SLIP, by_key
-from finger3d.mechanics.readings.quantities import ORDER
-from finger3d.mechanics.readings.reading import Taxel
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import ORDER, RESULTANTS, SLIP, Taxel, by_key
 from finger3d.objects import Cylinder
 from finger3d.scene import load
 from tests.models import half_cylinder, run, swept_fig9
@@ -168,7 +164,7 @@ def test_an_estimate_that_fails_spoils_nothing_and_says_why(
     def none(*_: object) -> Problem:
         raise Finger3dError(reason)
 
-    monkeypatch.setattr("finger3d.accuracy.companion_presses.coarse_companions", none)
+    monkeypatch.setattr("finger3d.accuracy.estimate.coarse_companions", none)
     scene = tmp_path / "scene.toml"
     scene.write_text(changed(SCENE, size_mm=0.4), encoding="utf-8")
     assert main(["press", str(scene), "--out", str(tmp_path / "out"), "--no-figures"]) == 0

@@ -12,9 +12,8 @@ import pytest
 
 import finger3d
 from finger3d.accuracy import model_error as module
-from finger3d.accuracy.advice import advise, largest_principal_strain
 from finger3d.accuracy.changes import Change, ChangeEstimate, changing_numbers, natural_scales
-from finger3d.accuracy.model_error import Judged, Judgement, at_large_deformation
+from finger3d.accuracy.model_error import Judged, Judgement, advise, at_large_deformation, largest_principal_strain
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
@@ -23,7 +22,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Sphere
 from finger3d.report.press import press_page
 from tests.models import ended, half_cylinder

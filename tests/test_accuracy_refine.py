@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finger3d.accuracy.borders import stick_borders, with_refined_borders
 from finger3d.accuracy.estimate import estimate, main_numbers, press_numbers
-from finger3d.accuracy.refine import Refinement, Round, refine_mesh
+from finger3d.accuracy.refine import Refinement, Round, refine_mesh, stick_borders, with_refined_borders
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
@@ -20,9 +19,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.scene import load, scene_of
 from tests.logs import Log
 from tests.models import half_cylinder, swept_fig9

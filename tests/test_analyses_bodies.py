@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from finger3d.analyses import pressed_body as pressing
-from finger3d.analyses.shared_body import SharedBody, Variant, VariantResult, body_key, finest
+from finger3d.analyses.pressed_body import SharedBody, Variant, VariantResult, body_key, finest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import UnresolvedError
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import surface
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import surface
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.postprocess.penetration import beyond_candidates, check_surface
-from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, parse, tree
 from tests.logs import Log
 from tests.sensor_cases import scene as fig9_scene

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.mesh_choice import SHARE, choose_mesh, mesh_share
+from finger3d.analyses.calibrate.curve_points import SHARE, choose_mesh, mesh_share
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
@@ -24,7 +24,7 @@ from finger3d.io import claimed
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import ORDER
+from finger3d.mechanics.readings import ORDER
 from finger3d.objects import Move
 from finger3d.progress import QUIET
 from finger3d.scene import load as load_scene

@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.calibrate.increments import choose_increments, error_of_increments
-from finger3d.analyses.calibrate.reference import read
+from finger3d.analyses.calibrate.curve_points import choose_increments, error_of_increments
 from finger3d.analyses.calibrate.run import calibrate, calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of, with_defaults
-from finger3d.analyses.calibrate.variations import poisson_steps, with_modulus
+from finger3d.analyses.calibrate.tolerances import (
+    displaced_gauges,
+    poisson_steps,
+    read,
+    tolerance_of,
+    with_defaults,
+    with_modulus,
+)
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.run import find_best
-from finger3d.analyses.optimise.task import OptimisationProblem as Search
+from finger3d.analyses.optimise import OptimisationProblem as Search
+from finger3d.analyses.optimise import find_best
 from finger3d.analyses.press import press
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb

@@ -11,21 +11,23 @@ from pathlib import Path
 import pytest
 
 from finger3d.accuracy.estimate import estimate
-from finger3d.analyses.compare import cases
-from finger3d.analyses.compare.cases import press_with_errors, resized, widened
-from finger3d.analyses.compare.run import compare
-from finger3d.analyses.compare.verdict import (
+from finger3d.analyses.compare import (
     Deviation,
+    compare,
     crossing_width,
     force_deviation,
     numbers_table,
+    press_with_errors,
+    quantities,
+    resized,
     verdict,
+    widened,
 )
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.readings.columns import strain_columns
+from finger3d.mechanics.readings import strain_columns
 from finger3d.results.comparison import FORCE, Case
 from finger3d.scene import load
 from tests.comparison_cases import case
@@ -57,7 +59,7 @@ def test_a_case_has_the_bars_of_a_press_beside_its_companion_meshes(scene, domai
     problem = build(model)
     frames = tuple(march(problem))
     # the same problem but for the points that never touch: round-off apart, the error of the mesh is the very same
-    found = estimate(problem, frames, numbers=lambda p, f: cases.quantities(p.points, f))
+    found = estimate(problem, frames, numbers=lambda p, f: quantities(p.points, f))
     for key in (FORCE, "friction_sum_N_per_mm", "gauge_g36", "contact_length_mm", "stick_length_mm"):
         assert case.errors[key] >= 0.999999 * found.discretisation[key] > 0.0, key
     assert set(case.errors) == set(case.numbers)

@@ -9,12 +9,12 @@ import pytest
 
 import finger3d
 import finger3d.analyses.press
+from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.cost import ERRORS, CostRow, Forecasts, _scaled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings import kinds_of
 from finger3d.scene import scene_of
 from tests.scenes import SECTION, written
 from tests.sensor_cases import scene

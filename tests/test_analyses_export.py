@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.calculix.deck import (
+from finger3d.analyses.calculix import (
+    MOST_FACETS,
     OBJECT,
     Contact,
     Deck,
@@ -20,17 +21,17 @@ from finger3d.analyses.calculix.deck import (
     ObjectElements,
     facet_lines,
     law_cards,
+    object_elements,
+    press_deck,
 )
-from finger3d.analyses.calculix.objects import MOST_FACETS, object_elements
-from finger3d.analyses.calculix.press import press_deck
 from finger3d.analyses.export_model import export_mesh
 from finger3d.cli import main
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FACETS, quadratic
+from finger3d.fem.mesh import FACETS, quadratic
 from finger3d.fem.solids.hyperelastic import Hyperelastic
-from finger3d.meshing.given.given import given_mesh
-from finger3d.meshing.given.mesh_output import write_mesh_vtu
+from finger3d.meshing.given import given_mesh
+from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.objects import Cylinder, MeshObject, ObjectPose, PlacedObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene import load, parse
 from tests.bodies import ball, box

@@ -17,16 +17,15 @@ import finger3d
 from finger3d.analyses.free_keys import FreeKey
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.material_tests import LawInTests
-from finger3d.analyses.identify.measured import MeasuredPress, read_measured
 from finger3d.analyses.identify.posterior import FittedValues, fitted_values, sampled
-from finger3d.analyses.identify.simulated import Simulation
+from finger3d.analyses.identify.presses import MeasuredPress, Simulation, read_measured
 from finger3d.analyses.pressed_body import under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.materials.modulus import modulus_of_shore_00
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import table_row
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.results.history import table_row
 from finger3d.results.journal import Journal
 from finger3d.scene import parse
 from tests.identify_cases import FREE, PRESS, TRUE, bench

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 import finger3d
-from finger3d.analyses.identify.result import Identification
+from finger3d.analyses.identify.run import Identification
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.laws.material_tests import TESTS, nominal_stress, principal_stretches, rising_to
-from finger3d.fem.laws.stability import unstable_from
+from finger3d.fem.laws.base import TESTS, nominal_stress, principal_stretches, rising_to, unstable_from
 from tests.identify_cases import PRESS, bench
 from tests.scenes import written
 from tests.sensor_cases import scene

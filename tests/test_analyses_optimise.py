@@ -17,16 +17,14 @@ import finger3d
 from finger3d._types import Float
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.optimise.gauge_fields import GaugeFields, StrainField
-from finger3d.analyses.optimise.gauge_search import Candidates, Region, objectives, search
-from finger3d.analyses.optimise.run import find_best, optimise
-from finger3d.analyses.optimise.task import OptimisationProblem, sensitivity
+from finger3d.analyses.gauge_places import Candidates, GaugeFields, Region, StrainField, objectives, search
+from finger3d.analyses.optimise import OptimisationProblem, find_best, optimise, sensitivity
 from finger3d.analyses.pressed_body import presses
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 from finger3d.progress import QUIET
 from finger3d.scene import load, tree
 from finger3d.sensor.likelihood import ReadingEffects, prior

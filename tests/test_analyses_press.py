@@ -344,7 +344,7 @@ def test_a_finger_drawn_outside_can_be_pressed(strange: Path, tmp_path: Path) ->
 def test_a_finger_drawn_outside_presses_alike_from_step_and_stl(strange: Path, tmp_path: Path) -> None:
     """Meshes of the body and of its facets agree within the sum of their error bars, 2 %."""
     from finger3d.accuracy.estimate import estimate
-    from finger3d.mechanics.results.history import measure
+    from finger3d.mechanics.history import measure
 
     force, bars = {}, {}
     for kind in ("step", "stl"):

@@ -22,9 +22,9 @@ from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
 from finger3d.io import read_arrays
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
-from finger3d.mechanics.results.history import measure
 from tests.commands import loaded
 from tests.models import small_section
 

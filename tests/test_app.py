@@ -27,7 +27,7 @@ from finger3d.app.page import (
 )
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 from finger3d.scene.scene import parse
 from tests.models import marched
 

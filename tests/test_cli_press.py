@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import finger3d.analyses.compare.run as compare_module
-from finger3d.analyses.compare.cases import press_with_errors
+import finger3d.analyses.compare as compare_module
+from finger3d.analyses.compare import press_with_errors
 from finger3d.analyses.cost import ERRORS
 from finger3d.cli import main
 from finger3d.errors import MissingError, Outcome

@@ -9,20 +9,25 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from finger3d.contact.conditions import ContactProblem, project_on_friction_cone, residual
+from finger3d.contact.conditions import (
+    ContactLaw,
+    ContactProblem,
+    NormalLaw,
+    Signorini,
+    project_on_friction_cone,
+    residual,
+)
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw, TwoCoefficients
-from finger3d.contact.law import ContactLaw, NormalLaw, Signorini
-from finger3d.contact.rules import RULES, RuleName, maeno_active_set
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.solve import RULES, RuleName, maeno_active_set, solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Sphere
 from tests.contact_cases import half_plane, problem_of, random_compliance, random_problem, violation
 

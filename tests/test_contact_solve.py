@@ -24,8 +24,7 @@ from finger3d.contact.newton import (
     newton,
     uniqueness,
 )
-from finger3d.contact.rules import maeno_active_set
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.solve import maeno_active_set, solve_increment
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from tests.contact_cases import half_plane, half_space, problem_of, random_compliance, random_problem, violation

@@ -15,9 +15,8 @@ import pytest
 
 import finger3d.effects
 from finger3d.cli import main
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import SLIP, STICK, Coulomb, TwoCoefficients
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.effects import effect_names, effect_type
@@ -27,14 +26,14 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.mesh import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import ElasticObject, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, Sphere
 from finger3d.scene import parse
 from tests.foil_cases import FOIL, FOIL_TABLE, GOOD, MIDDLE

@@ -11,10 +11,8 @@ import pytest
 
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.mesh.simplex import quadratic
-from finger3d.fem.recovery.reactions import mean_traction_weights
-from finger3d.fem.recovery.recover import extrapolated, nodal_pressure, nodal_strain, strain_and_stress
+from finger3d.fem.mesh import quadratic, quadrature
+from finger3d.fem.recovery import extrapolated, mean_traction_weights, nodal_pressure, nodal_strain, strain_and_stress
 from finger3d.fem.tensors import cofactor, determinant
 from tests.meshes import full, grid
 from validation import cook, manufactured, patch_test

@@ -10,9 +10,9 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
+from finger3d.fem.laws.base import least_stiffness, unstable_from
 from finger3d.fem.laws.invariants import Derivatives, InvariantLaw
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.laws.stability import least_stiffness, unstable_from
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.objects import Plane

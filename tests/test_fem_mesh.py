@@ -13,15 +13,31 @@ from scipy.sparse.linalg import spsolve
 from finger3d._types import Float
 from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import MooneyRivlin, NeoHooke
-from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.elements import EDGES, LINE2, LINE3, TET4, TET10, TRI3, TRI6, Element, quadrature
-from finger3d.fem.mesh.locate import cells_at, inverse_map, locate
-from finger3d.fem.mesh.parts import ElasticityByPart, elasticity_of
-from finger3d.fem.mesh.quality import cell_angles_deg, curved_volume, most_distorted
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes, unfold
-from finger3d.fem.recovery.recover import strain_and_stress
-from finger3d.fem.solids.deformed import nodal_fields
-from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian
+from finger3d.fem.laws.material import Elasticity, ElasticityByPart, Isotropic, elasticity_of
+from finger3d.fem.mesh import (
+    EDGES,
+    LINE2,
+    LINE3,
+    TET4,
+    TET10,
+    TRI3,
+    TRI6,
+    Element,
+    Mesh,
+    boundary,
+    cell_angles_deg,
+    cells_at,
+    curved_volume,
+    inverse_map,
+    locate,
+    most_distorted,
+    quadratic,
+    quadrature,
+    signed_volumes,
+    unfold,
+)
+from finger3d.fem.recovery import strain_and_stress
+from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian, nodal_fields
 from tests.meshes import full, grid, points_in
 
 ELEMENTS = [LINE2, LINE3, TRI3, TRI6, TET4, TET10]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finger3d.fem.mesh.simplex import Mesh, quadratic, reflected, signed_volumes
-from finger3d.fem.surface.finite_contact import DeformedContact, deformed_contact
-from finger3d.fem.surface.traces import (
+from finger3d.fem.mesh import Mesh, quadratic, reflected, signed_volumes
+from finger3d.fem.surface import (
     BoundarySurface,
+    DeformedContact,
+    deformed_contact,
     displacement_row,
     facing_trace,
     strain_row,
@@ -18,7 +19,7 @@ from finger3d.fem.surface.traces import (
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from tests.meshes import grid
 
 

@@ -289,8 +289,8 @@ def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Pa
         }
     )
     from finger3d.mechanics.discretise.build import build
+    from finger3d.mechanics.history import measure
     from finger3d.mechanics.march.solve import march
-    from finger3d.mechanics.results.history import measure
 
     problem = build(same.model())
     wanted = measure(problem.points, list(march(problem))[-1])["normal_force_N"]

@@ -14,7 +14,7 @@ from finger3d.geometry.imported import of_surface
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
 from finger3d.geometry.tessellate import tessellate
-from finger3d.meshing.structured.snap import check_closed, project
+from finger3d.meshing.unstructured.snap import check_closed, project
 from tests.bodies import ball, box, channel
 from tests.cad_cases import EXACT, body_of, faces_of
 from tests.designs import FIG9, HALF

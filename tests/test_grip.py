@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.least_grip import least_grip
+from finger3d.analyses.press import least_grip
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.app.live_body import LiveBody
 from finger3d.cli import main
@@ -19,10 +19,10 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.generalised import motions
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.grip import Grip
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import vertical_frame
 from finger3d.progress import QUIET
 from finger3d.report.press import press_page

@@ -29,9 +29,9 @@ from finger3d._machine import (
 from finger3d.errors import MissingError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
-from finger3d.meshing.refinement.sizing import sizing
-from finger3d.meshing.structured.snap import UnusableMeshError
+from finger3d.meshing.sizing import sizing
 from finger3d.meshing.unstructured import tetwild
+from finger3d.meshing.unstructured.snap import UnusableMeshError
 from tests.bodies import CUBE, SIDES
 
 
@@ -87,7 +87,7 @@ import numpy as np
 from finger3d.mechanics.model import MeshOptions
 from finger3d.geometry.registry import designs
 from finger3d.meshing.unstructured import tetwild
-from finger3d.meshing.refinement.sizing import sizing
+from finger3d.meshing.sizing import sizing
 from tests.bodies import CUBE, SIDES
 low, high = np.array([-5.0, 0, -5]), np.array([5.0, 10, 5])
 options = MeshOptions(size_mm=0.3, base_size_mm=0.3)

@@ -11,18 +11,17 @@ import pytest
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, quadratic
-from finger3d.fem.surface.traces import BoundarySurface, surface
+from finger3d.fem.mesh import Mesh, curved_volume, quadratic
+from finger3d.fem.surface import BoundarySurface, surface
 from finger3d.geometry.registry import designs
+from finger3d.mechanics.discretise.body_mesh import stretched
 from finger3d.mechanics.discretise.build import build, mesh_part
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry
-from finger3d.mechanics.discretise.moved_mesh import stretched
-from finger3d.mechanics.discretise.regular_points import regular_points
+from finger3d.mechanics.discretise.contact_points import contact_geometry
+from finger3d.mechanics.discretise.resolution import regular_points
 from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.meshes import grid, part_volume
 from tests.models import block, fig9, last, run

@@ -16,24 +16,21 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws import NeoHooke, Yeoh
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.quality import most_distorted
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import most_distorted
+from finger3d.fem.recovery import displacement
 from finger3d.fem.solids.hyperelastic import Hyperelastic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.finite_strain.body import FiniteBody
-from finger3d.mechanics.finite_strain.failure import cause_of_failure, fold_warnings, snap_warnings
+from finger3d.mechanics.finite_strain.body import DeformedBody, FiniteBody
 from finger3d.mechanics.finite_strain.formulation import FiniteStrain
-from finger3d.mechanics.finite_strain.increment import FiniteIncrement
-from finger3d.mechanics.finite_strain.state import DeformedBody
+from finger3d.mechanics.finite_strain.increment import FiniteIncrement, cause_of_failure, fold_warnings, snap_warnings
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import GeneralisedForces
+from finger3d.mechanics.history import State, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.results.history import measure
-from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, MeshObject, Move, ObjectPose, Plane, Sphere, Wedge
 from tests.models import block, ended, half_cylinder, large_fig9, run
 

@@ -19,7 +19,7 @@ from finger3d.contact.friction import Coulomb, TwoCoefficients
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.assembly import Stiffness
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import CONTACT
+from finger3d.fem.mesh import CONTACT
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
 from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.geometry.registry import designs
@@ -27,9 +27,9 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion, edge_ratio
 from finger3d.mechanics.discretise.foils import discretised_foils
 from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from tests.foil_cases import FOIL, LEGS, MIDDLE, block
 from tests.models import marched

@@ -28,11 +28,10 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import forces_on
+from finger3d.mechanics.history import State, StepResult, measure
 from finger3d.mechanics.march.parts import solved_in_turn
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, Plane, Sphere
 from finger3d.scene import load
 from tests.held_cases import MU, PRESS, N, held, numbers, pressed

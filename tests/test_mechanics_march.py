@@ -11,14 +11,15 @@ import scipy.sparse as sp
 
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.contact.friction import Coulomb, TwoCoefficients
-from finger3d.contact.rules import RULES
+from finger3d.contact.solve import RULES
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.mesh import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
@@ -32,7 +33,6 @@ from finger3d.mechanics.march.step_halving import (
 )
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Cylinder, Plane
 from tests.models import block, fig9, last, run
 from validation import increment_errors

@@ -12,7 +12,7 @@ from finger3d.mechanics.discretise.foils import EmbeddedBars
 from finger3d.mechanics.formulation import Loads, length_scale
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions
 from finger3d.mechanics.path import ending_at, targets
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Move, ObjectPose
 from tests.models import block
 

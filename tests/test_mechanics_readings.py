@@ -19,19 +19,21 @@ from finger3d.effects.kinetic_friction import Effect as KineticFriction
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import displacement_row
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import displacement_row
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure, table_row
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid, grid_markers, marker_table
-from finger3d.mechanics.readings.columns import (
+from finger3d.mechanics.readings import (
     Column,
+    Marker,
+    MeshedBody,
+    Taxel,
 )
-from finger3d.mechanics.readings.reading import Marker, MeshedBody, Taxel
-from finger3d.mechanics.results.history import StepResult, measure, table_row
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import Plane
 from finger3d.results.summary import steps_of

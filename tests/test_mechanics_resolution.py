@@ -23,18 +23,19 @@ from finger3d.mechanics.discretise.companions import coarse_companions, coarser,
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.resolution import (
     UnresolvedOverlap,
+    is_meshable_at,
     landmarks_of,
+    size_advice,
     unresolved_details,
     unresolved_overlap,
     warnings_before_meshing,
 )
-from finger3d.mechanics.discretise.size_advice import is_meshable_at, size_advice
 from finger3d.mechanics.discretise.symmetry import symmetry
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface, penetration_warnings
-from finger3d.mechanics.results.history import measure
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from tests.bodies import box
 from tests.models import ended, swept_fig9

@@ -14,23 +14,23 @@ from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic
+from finger3d.fem.mesh import Mesh, boundary, quadratic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, largest_force, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import (
+    CAVITY,
     SurfaceCheck,
     beyond_candidates,
+    cavity_warnings,
     check_surface,
     penetration_advice,
     penetration_warnings,
 )
-from finger3d.mechanics.results.cavity import CAVITY, cavity_warnings
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_margin import largest_force
 from finger3d.objects import Cylinder, ObjectPose, Plane, RigidObject, Sphere, Wedge
 from finger3d.scene import parse
 from tests.held_cases import MU, PRESS, N, held

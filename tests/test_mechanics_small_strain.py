@@ -18,11 +18,11 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import Press, march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.small_strain.linear_contact import carried_by_object
-from finger3d.mechanics.small_strain.viscoelastic_body import (
+from finger3d.mechanics.small_strain import carried_by_object
+from finger3d.mechanics.viscoelastic import (
     ConstantBulkModulus,
     ConstantPoissonRatio,
     RelaxationWorkspace,
@@ -199,7 +199,7 @@ def test_stress_carries_the_force(domain: str, nu: float, bulk: bool) -> None:
 
 
 def _nodal_volume(problem: Problem) -> np.ndarray:
-    from finger3d.fem.mesh.elements import quadrature
+    from finger3d.fem.mesh import quadrature
 
     mesh = problem.mesh
     bary, w = quadrature(mesh.dim, 2)

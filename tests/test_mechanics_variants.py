@@ -22,12 +22,11 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build, changed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.groups import march_in_groups
-from finger3d.mechanics.march.parallel import map_parallel
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.march.variants import press_variants
+from finger3d.mechanics.march.variants import map_parallel, press_variants
 from finger3d.mechanics.model import ElasticObject, Foils, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 
 CLIPPED = designs()["clipped_cylinder"](radius_mm=6.0, half_length_mm=4.0, edge_height_mm=2.0, width_mm=4.0)

@@ -16,13 +16,13 @@ from finger3d.effects.elastic_object import Effect as ElasticObject
 from finger3d.effects.large_deformation import Effect
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
-from finger3d.fem.mesh.simplex import FREE_FACES
+from finger3d.fem.mesh import FREE_FACES
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave
 from tests.bodies import ball, box, channel, write_stl
 from tests.models import block, ended, fig9, last, run

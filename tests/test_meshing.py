@@ -11,20 +11,26 @@ import pytest
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.elements import EDGES
-from finger3d.fem.mesh.quality import curved_jacobians, curved_volume, min_angle_deg
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.mesh import (
+    EDGES,
+    Mesh,
+    boundary,
+    curved_jacobians,
+    curved_volume,
+    min_angle_deg,
+    quadratic,
+    signed_volumes,
+)
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.imported import imported
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
+from finger3d.meshing.bisection import refined
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.refinement.bisection import refined
-from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.refinement.sizing import Sizing, count_cells, sizing
 from finger3d.meshing.report import mesh_report
-from finger3d.meshing.structured.swept import mesh_section, mesh_swept
+from finger3d.meshing.sizing import Grading, Sizing, count_cells, sizing
+from finger3d.meshing.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild
 from finger3d.meshing.unstructured.solids import box
 from tests.commands import loaded

@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, curved_volume, quadratic
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.given.given import GivenMesh, given_mesh
-from finger3d.meshing.given.mesh_files import read_contents
-from finger3d.meshing.given.mesh_output import write_mesh_vtu
+from finger3d.meshing.given import GivenMesh, given_mesh
+from finger3d.meshing.mesh_files import read_contents, write_mesh_vtu
 from tests.given_meshes import GMSH, cube, refused, vtu_of
 from tests.meshes import part_volume
 

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import cell_angles_deg, curved_jacobians, curved_volume
-from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
+from finger3d.fem.mesh import Mesh, boundary, cell_angles_deg, curved_jacobians, curved_volume, signed_volumes, unfold
 from finger3d.geometry.cad import sound
 from finger3d.geometry.implicit import ImplicitCylinder, ImplicitPlane, ImplicitSphere
 from finger3d.geometry.registry import designs
 from finger3d.geometry.tessellate import Tessellation, tessellate
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.structured.snap import (
+from finger3d.meshing.swept import mesh_section
+from finger3d.meshing.unstructured.snap import (
     MIN_DIHEDRAL_DEG,
     Seams,
     UnusableMeshError,
@@ -28,7 +28,6 @@ from finger3d.meshing.structured.snap import (
     snap,
     snap_nodes,
 )
-from finger3d.meshing.structured.swept import mesh_section
 from tests.cad_cases import body_of, faces_of
 from tests.commands import loaded
 from tests.designs import FIG9, HALF, make, zone_of
@@ -174,7 +173,7 @@ def test_a_design_without_section_cannot_be_swept() -> None:
 def test_structured_meshes_load_no_cad() -> None:
     program = (
         "from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
-        "from finger3d.meshing.generate import *; from finger3d.meshing.structured.swept import *;"
+        "from finger3d.meshing.generate import *; from finger3d.meshing.swept import *;"
         "d = designs()['half_cylinder'](5.0, 10.0);"
         "o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2, grading=None);"
         "z = (-2, 2, -5, 5); mesh_section(d, o, z); mesh_solid(d, o, z)"

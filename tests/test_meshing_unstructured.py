@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.fem.mesh.quality import curved_jacobians, curved_volume
-from finger3d.fem.mesh.simplex import Mesh, boundary, signed_volumes, unfold
+from finger3d.fem.mesh import Mesh, boundary, curved_jacobians, curved_volume, signed_volumes, unfold
 from finger3d.geometry.imported import imported
 from finger3d.geometry.parts import OUTSIDE, glue
 from finger3d.geometry.registry import designs
@@ -20,10 +19,9 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import tessellate_parts
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.given.interfaces import part_facets
-from finger3d.meshing.refinement.sizing import sizing
-from finger3d.meshing.structured.snap import UnusableMeshError, check_closed, snap
+from finger3d.meshing.sizing import sizing
 from finger3d.meshing.unstructured import netgen, tetwild
+from finger3d.meshing.unstructured.snap import UnusableMeshError, check_closed, part_facets, snap
 from finger3d.meshing.unstructured.solids import (
     box,
     check_volume,

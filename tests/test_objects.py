@@ -16,9 +16,9 @@ from finger3d.contact.friction import OPEN
 from finger3d.errors import Finger3dError
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import (
     Cylinder,
     DistanceTracker,

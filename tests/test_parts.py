@@ -17,13 +17,12 @@ from finger3d.effects import effect_type
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
-from finger3d.fem.mesh.parts import elasticity_of
-from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, elasticity_of
+from finger3d.fem.mesh import quadratic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Taxel
+from finger3d.mechanics.readings import Taxel
 from tests.meshes import full, grid
 from tests.models import last, marched
 from validation._common import side_load

@@ -13,9 +13,9 @@ import pytest
 
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.errors import Outcome
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh
+from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh
 from finger3d.mechanics.model import Gauge
-from finger3d.mechanics.readings.columns import strain_columns
+from finger3d.mechanics.readings import strain_columns
 from finger3d.plotting import solid as render
 from finger3d.plotting.calibration import draw as draw_calibration
 from finger3d.plotting.comparison import draw as draw_comparison

@@ -16,9 +16,9 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.fem.mesh.simplex import CONTACT, Mesh
+from finger3d.fem.mesh import CONTACT, Mesh
 from finger3d.mechanics.model import Gauge, MeshOptions
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from finger3d.plotting import renderer
 from finger3d.plotting import solid as render
 from finger3d.plotting.deformed import draw_finger

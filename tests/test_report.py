@@ -13,7 +13,7 @@ import pytest
 
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.model import Gauge
-from finger3d.mechanics.readings.columns import strain_columns
+from finger3d.mechanics.readings import strain_columns
 from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, Page, PageSection, Table
 from finger3d.report.calibrate import calibrate_page
 from finger3d.report.chart import Chart, Line

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finger3d.analyses.compare.run import compare
+from finger3d.analyses.compare import compare
 from finger3d.cli import main
 from finger3d.plotting.layout import DPI
 from finger3d.report.build import Page

@@ -12,11 +12,10 @@ from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import contact_table, measure, slip_events
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.readings.reading import Taxel
-from finger3d.mechanics.results.history import contact_table, measure
-from finger3d.mechanics.results.slip_events import slip_events
+from finger3d.mechanics.readings import Taxel
 from finger3d.objects import Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held
 from tests.models import block

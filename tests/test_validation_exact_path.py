@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Plane
 from tests.contact_cases import half_plane, violation
 from tests.models import fig9, half_cylinder

@@ -13,7 +13,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._press import fig9_finger

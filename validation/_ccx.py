@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.analyses.calculix.deck import OBJECT, Contact
-from finger3d.analyses.calculix.press import press_deck
+from finger3d.analyses.calculix import OBJECT, Contact, press_deck
 from finger3d.errors import MissingError
 from finger3d.mechanics.model import Model
 

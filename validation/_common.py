@@ -12,18 +12,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.mesh import Mesh, boundary, quadratic, quadrature, signed_volumes
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry
+from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
+from finger3d.mechanics.discretise.contact_points import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose, vertical_frame
 

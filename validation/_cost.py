@@ -20,18 +20,17 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import local_rows
+from finger3d.fem.surface import local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import candidate_points, contact_rows, mesh_part
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
-from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb

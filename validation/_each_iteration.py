@@ -10,9 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
+from finger3d.contact.conditions import TOLERANCE, ContactLaw, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.discretise.build import widened
 from finger3d.mechanics.discretise.problem import Problem

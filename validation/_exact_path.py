@@ -37,13 +37,12 @@ from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.tensors import rotated_delassus
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry
+from finger3d.mechanics.discretise.contact_points import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import LinearBody, transported
+from finger3d.mechanics.history import State, StepResult
+from finger3d.mechanics.small_strain import LinearBody, transported
 from finger3d.objects import Move, ObjectPose, vertical_frame
 
 _ZERO = 1e-13

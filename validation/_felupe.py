@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
+from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.mechanics.model import Model
 
 

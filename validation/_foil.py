@@ -17,9 +17,9 @@ from scipy import sparse
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.fem.solvers.condense import condense, stiffened
-from finger3d.fem.surface.traces import displacement_row
+from finger3d.fem.surface import displacement_row
 from finger3d.mechanics.discretise.foils import discretised_foils
 from finger3d.mechanics.model import Foils, Gauge
 

@@ -16,9 +16,9 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction

@@ -11,7 +11,7 @@ from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.state import ContactState
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.objects import Sphere
 
 from ._common import Body, body, box, graded, held_at, increment

@@ -6,7 +6,7 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.history import StepResult
 
 
 class PlainCoulomb(Coulomb):

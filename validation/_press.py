@@ -14,9 +14,9 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult
 
 
 def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm: float = 36.6) -> Design:

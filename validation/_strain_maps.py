@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.recovery.strain_reader import StrainReader
+from finger3d.fem.recovery import StrainReader, displacement
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.history import StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

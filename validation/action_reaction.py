@@ -24,9 +24,9 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 
 from ._common import rate
 from ._press import changed, fig9_finger

@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.accuracy.advice import largest_principal_strain
 from finger3d.accuracy.changes import Change, changing_numbers
-from finger3d.accuracy.model_error import Judgement, at_large_deformation
+from finger3d.accuracy.model_error import Judgement, at_large_deformation, largest_principal_strain
 from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
@@ -28,9 +27,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Plane, Sphere
 
 from ._drawn import FAR, NEAR, UNDER, drawn

@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import Any
 
 from finger3d._machine import versions
-from finger3d.analyses.calculix.deck import Contact
+from finger3d.analyses.calculix import Contact
 from finger3d.mechanics.model import Leg
 
 from ._ccx import Answer, program, version

@@ -20,16 +20,15 @@ import numpy as np
 
 import finger3d
 from finger3d._types import Tree
-from finger3d.analyses.calculix.deck import Contact
-from finger3d.analyses.calculix.press import press_deck
+from finger3d.analyses.calculix import Contact, press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, scene_of
 
 from ._ccx import printed_forces, program, solve

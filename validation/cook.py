@@ -18,7 +18,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 
 from ._common import box, convergence, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated

@@ -24,15 +24,15 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import estimate, press_numbers
-from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.cost import CostRow, Forecasts
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.quantities import kinds_of
+from finger3d.mechanics.readings import kinds_of
 
 from ._drawn import drawn, drawn_solids
 from ._press import in_edges

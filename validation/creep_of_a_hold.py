@@ -36,7 +36,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.least_grip import least_grip
+from finger3d.analyses.press import least_grip
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.objects import TIME

@@ -2,7 +2,7 @@
 
 No source.  The scenes of geometries/ as they are, and random sections and solids without ``[mesh]``: four designs under
 planes, bars and balls, 2 to 15 % of their height deep, nu from 0.3 to 0.49, mu from 0.06 to 1, with a gauge.  All
-numbers that have error bars count, relative as finger3d.accuracy.richardson.relative_error has it.
+numbers that have error bars count, relative as finger3d.accuracy.error_bars.relative_error has it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.richardson import relative_error
+from finger3d.accuracy.error_bars import ErrorBars, relative_error
 from finger3d.analyses.press import press
-from finger3d.mechanics.readings.quantities import kinds_of
-from finger3d.mechanics.results.history import table_row
+from finger3d.mechanics.history import table_row
+from finger3d.mechanics.readings import kinds_of
 
 from ._rows import Result, Row, at_most, columns
 

@@ -28,12 +28,12 @@ from finger3d.accuracy.model_error import at_large_deformation
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import DISSIPATION_TOLERANCE, TOLERANCE, march_automatic
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.postprocess.penetration import check_surface
-from finger3d.mechanics.readings.columns import AREAS, MAIN
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import AREAS, MAIN
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.history import measure
 
 from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
 from ._press import fig9_finger, under

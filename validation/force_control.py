@@ -29,9 +29,9 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import measure
+from finger3d.mechanics.readings import Gauge
 from finger3d.objects import Sphere
 
 from ._press import changed, converged, fig9_finger

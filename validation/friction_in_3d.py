@@ -21,13 +21,12 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerances import with_defaults
-from finger3d.analyses.optimise.gauge_fields import GaugeFields
-from finger3d.analyses.optimise.gauge_search import Region, search
+from finger3d.analyses.gauge_places import GaugeFields, Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Marker
+from finger3d.mechanics.readings import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.analyses.calculix.press import press_deck
+from finger3d.analyses.calculix import press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.model import Leg, Model
 

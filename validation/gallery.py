@@ -24,8 +24,8 @@ from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.results.history import measure
 from finger3d.scene import load
 
 from . import _layer

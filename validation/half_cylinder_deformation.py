@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.fem.mesh.simplex import unfold
+from finger3d.fem.mesh import unfold
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.history import StepResult
 
 from ._paper import CASES, SHOWN, STRAIN, STRESS, Profile, fig9, half_cylinder, moved, said
 from ._press import under

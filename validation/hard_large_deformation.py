@@ -26,19 +26,19 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import quadrature
+from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.postprocess.penetration import SurfaceCheck, check_surface
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, Wave, Wedge
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable

@@ -37,10 +37,9 @@ from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, largest_force, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.mechanics.results.slip_margin import largest_force
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press

@@ -31,9 +31,9 @@ from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import body, contact_axis, convergence, graded, quarter_block, rate

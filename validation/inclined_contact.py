@@ -17,8 +17,8 @@ from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere
 
 from ._press import converged

@@ -18,8 +18,8 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Gauge, Leg, Model
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Cylinder, Sphere
 
 from ._exact_path import exact_press

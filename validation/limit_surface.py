@@ -26,8 +26,8 @@ from finger3d.contact.friction import STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Plane
 
 from ._press import changed, converged, fig9_finger

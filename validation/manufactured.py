@@ -15,7 +15,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.mesh import quadratic
 
 from ._common import body_load, convergence, cube, error_norms, held_at, pressure_error, rate, solve
 from ._rows import Result, Row, exact_columns

@@ -20,9 +20,8 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.analyses.identify.material_tests import MaterialTest, read_material_tests
-from finger3d.analyses.identify.result import Identification
-from finger3d.analyses.identify.run import identify
-from finger3d.fem.laws.material_tests import nominal_stress, principal_stretches
+from finger3d.analyses.identify.run import Identification, identify
+from finger3d.fem.laws.base import nominal_stress, principal_stretches
 
 from ._rows import Result, Row, columns, listed
 

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 
 from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns

@@ -24,8 +24,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, RigidObject
 
 from ._press import converged, fig9_finger

@@ -15,20 +15,18 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import OPEN, STICK, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.rules import maeno_active_set
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.solve import maeno_active_set, solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import Mesh, unfold
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.mesh import Mesh, unfold
+from finger3d.fem.recovery import displacement
 from finger3d.fem.solvers.condense import Condensation, condense
-from finger3d.fem.surface.traces import strain_row
+from finger3d.fem.surface import strain_row
 from finger3d.geometry.registry import designs
-from finger3d.meshing.structured.grid import Sizes, rows
+from finger3d.meshing.grid import Sizes, rows
 
 from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains
 from ._press import under

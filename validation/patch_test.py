@@ -16,7 +16,7 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

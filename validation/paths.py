@@ -22,9 +22,9 @@ from finger3d.accuracy.estimate import estimate, press_numbers
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.step_halving import errors_of_runs, march_automatic
 from finger3d.mechanics.model import Gauge, Leg
-from finger3d.mechanics.results.history import StepResult, measure
 
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance

@@ -21,9 +21,9 @@ from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated

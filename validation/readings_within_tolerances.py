@@ -22,7 +22,7 @@ from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
-from finger3d.mechanics.readings.reading import Taxel
+from finger3d.mechanics.readings import Taxel
 from finger3d.sensor import Estimate, estimate
 
 from ._press import changed, converged, fig9_finger

@@ -31,9 +31,9 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import State
 from finger3d.mechanics.march.parts import frictional_dissipation
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.state import State
 from finger3d.objects import Cylinder, Move, ObjectPose
 
 from ._press import changed, converged

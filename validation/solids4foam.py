@@ -30,12 +30,12 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.simplex import Mesh, boundary, quadratic, signed_volumes
+from finger3d.fem.mesh import Mesh, boundary, quadratic, signed_volumes
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.meshing.given.mesh_output import write_mesh_vtu
+from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.scene import scene_of
 
 from ._rows import Result, Row, Settled, at_least, at_most, columns, grouped, settled

@@ -22,8 +22,8 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg
-from finger3d.mechanics.results.history import StepResult
 
 from ._paper import STRAIN, fig9, said
 from ._press import changed, converged, under

@@ -16,17 +16,15 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.rules import maeno_active_set
-from finger3d.contact.solve import solve_increment
+from finger3d.contact.solve import maeno_active_set, solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh.simplex import quadratic
+from finger3d.fem.mesh import quadratic
 from finger3d.fem.solvers.condense import Condensation, condense
-from finger3d.fem.surface.traces import BoundarySurface, local_rows, surface
+from finger3d.fem.surface import BoundarySurface, local_rows, surface
 
 from ._common import box, held_at, nodes_of, side_load
 from ._rows import Result, Row, exact_columns, listed

@@ -26,14 +26,14 @@ from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.simplex import Mesh, quadratic
+from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import local_rows, surface
+from finger3d.fem.surface import local_rows, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 
 from ._common import cube, increment, side_load
 from ._rows import Result, Row, exact_columns, grouped, listed

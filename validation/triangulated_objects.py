@@ -25,8 +25,8 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, RigidObject, Sphere, first_touch
 
 from ._common import convergence, rate

@@ -24,12 +24,12 @@ from finger3d.contact.friction import Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.meshing.generate import mesh_solid
 from finger3d.objects import (
     ContactPath,

@@ -24,13 +24,13 @@ from scipy.optimize import brentq
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.fem.surface.traces import facing_trace, local_rows
+from finger3d.fem.surface import facing_trace, local_rows
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.elastic_object import ObjectBody
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.results.history import measure
 from finger3d.objects import Cylinder, Plane, vertical_frame
 from finger3d.progress import QUIET
 

@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactProblem
+from finger3d.contact.conditions import ContactLaw, ContactProblem
 from finger3d.contact.friction import Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.mechanics.discretise.problem import Problem

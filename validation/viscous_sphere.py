@@ -25,21 +25,21 @@ from scipy.optimize import brentq
 from scipy.signal import residue
 
 from finger3d._types import Float
+from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import OPEN, Coulomb
-from finger3d.contact.law import ContactLaw
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict, surface
+from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.problem import scatter_to_points
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.small_strain.elastic import SmallStrain
-from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
+from finger3d.mechanics.small_strain import SmallStrain
+from finger3d.mechanics.viscoelastic import Viscoelastic
 from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
 
 from . import _halfspace, _rings

@@ -18,8 +18,8 @@ import numpy as np
 from finger3d.effects import effect_names
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.results.history import measure
 from finger3d.scene import Scene, parse
 
 from ._rows import Result, Row, exact_columns, listed

@@ -19,8 +19,8 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import MeshOptions
-from finger3d.mechanics.results.history import StepResult, measure
 
 from . import fig9_strains, half_cylinder_forces, half_cylinder_strains
 from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains

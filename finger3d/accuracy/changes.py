@@ -8,12 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 from finger3d._types import Tree
-from finger3d.accuracy.richardson import largest, spacing
+from finger3d.accuracy.error_bars import largest, spacing
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
-from finger3d.mechanics.readings.quantities import Kind, kinds_of
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.readings import AREAS, MAIN, Kind, by_key, kinds_of
 
 _SURE = 1.0 / 3.0
 """Relative error up to which a change is significant: the true change is then within a factor of 1.5 of it."""

@@ -38,18 +38,18 @@ from finger3d._cost import (
     tets_of_ftetwild,
 )
 from finger3d._types import Tree
+from finger3d.mechanics.discretise.body_mesh import face_near_gauge, locally_refined
 from finger3d.mechanics.discretise.build import WHOLE_FACE, candidate_points, poses
 from finger3d.mechanics.discretise.companions import LEAST_IN_SOLID
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
-from finger3d.mechanics.discretise.gauge_refinement import face_near_gauge, locally_refined
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import free_surface
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.step_halving import automatic, limits
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.meshing.limits import check_memory
-from finger3d.meshing.refinement.sizing import Sizing
+from finger3d.meshing.sizing import Sizing
 from finger3d.objects import PlacedObject
 
 _LATTICE = 100
@@ -187,7 +187,7 @@ def _runs(model: Model, size: PressSize) -> list[int]:
 def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
     """Return the cells and the size of a structured or given mesh, or estimates from the field of edge lengths."""
     from finger3d.meshing.generate import mesh_solid
-    from finger3d.meshing.structured.swept import mesh_section
+    from finger3d.meshing.swept import mesh_section
 
     zone = model.first_contact.contact_box
     if model.domain != "solid" or model.mesh.mesher == "swept" or isinstance(model.design, GivenMesh):
@@ -197,7 +197,7 @@ def _size(model: Model, axes: tuple[str, ...]) -> tuple[int, PressSize]:
         touching = len(candidate_points(model, free_surface(model, mesh, 1.0), first, MARGIN).nodes)
         dofs = mesh.dim * report.points + (len(mesh.part_corners[0]) if model.mixed else 0)
         return report.cells, PressSize(mesh.dim, dofs, touching)
-    from finger3d.meshing.refinement.sizing import count_cells, sizing
+    from finger3d.meshing.sizing import count_cells, sizing
     from finger3d.meshing.unstructured.solids import box
 
     field = sizing(model.design, model.mesh, zone, *box(model.design, axes))

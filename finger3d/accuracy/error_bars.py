@@ -1,13 +1,131 @@
-"""Error bars of the numbers of a press: the discretisation error plus the error of the increments; and their texts."""
+"""Error bars: the discretisation error, from the spread of a number over meshes, plus that of the increments.
+
+If the error of a number q falls as h^p with the edge length h, its error and the number q_k on a mesh with edges of k h
+are related by ::
+
+    error of q = |q - q_k| / |k^p - 1|
+
+A single difference is small by chance in one of five numbers.  The error bar is therefore the root mean square over
+several companions, times a factor fitted to drawn scenes (validation/error_bars.py) ::
+
+    bar of q = c root mean square over k of |q - q_k| / |k^p - 1|
+
+The order p of forces is that of quadratic elements at a bonded corner, p = 2 lambda, where displacements go as
+distance^lambda (Williams 1952).  Numbers that depend less on the corners have a higher order.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+import numpy as np
+
 from finger3d._types import Tree, TreeView
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.readings import ORDER, Column, Kind, kinds_of
+
+_LEAST = 0.002
+"""Least relative error over h/a, for points of distance h in a contact of half-length a: all companions may agree."""
+
+_LEAST_OF_ZONES = 0.04
+"""The same for lengths and areas of contact and stick, which points on the border enter or leave unseen."""
+
+_LEAST_SLIP = 0.1
+"""Share of the work for that of few points that slip unseen."""
+
+
+_IF_ZERO = {
+    Kind.STICK_AREA: "contact_area_mm2",
+    Kind.FRICTION_SUM: "normal_force_N",
+    Kind.DISSIPATION: "external_work_mJ",
+}
+_NOTHING = 1e-9  # of the number in its place, below which a number is zero
+
+
+def largest(numbers: Mapping[str, float], kinds: Mapping[str, Kind], kind: Kind) -> float:
+    """Return the largest magnitude of all numbers of a kind, 0 without any."""
+    return max((abs(v) for k, v in numbers.items() if kinds[k] is kind), default=0.0)
+
+
+def scale_of(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str) -> float:
+    """Return the magnitude to which an error of a number is relative.
+
+    For a reading it is the largest of its kind, for a length that of contact, for a component of the force the normal
+    force, and for a moment the normal force at the end of contact at least, since those vanish in symmetric presses.
+    Where nothing sticks or slips, it is the area of contact, the normal force and the work for areas, friction and
+    dissipation.
+    """
+    kind = kinds[name]
+    scale = largest(numbers, kinds, kind) if kind.is_reading else abs(numbers[name])
+    force, reach = abs(numbers.get("normal_force_N", 0.0)), numbers.get("contact_half_length_mm", scale)
+    if kind in (Kind.CONTACT_LENGTH, Kind.STICK_LENGTH):
+        return reach
+    if kind is Kind.FORCE:
+        return force
+    if kind is Kind.SHARE:
+        return 1.0
+    if kind is Kind.MOMENT:
+        return max(scale, force * reach)
+    whole = abs(numbers.get(_IF_ZERO.get(kind, name), 0.0))
+    return whole if scale <= _NOTHING * whole else scale
+
+
+def relative_error(numbers: Mapping[str, float], kinds: Mapping[str, Kind], name: str, error: float) -> float:
+    """Return the relative error of a number, see `scale_of`."""
+    scale = scale_of(numbers, kinds, name)
+    return error / scale if scale > 0.0 else (math.inf if error > 0.0 else 0.0)
+
+
+def gain(ratio: float, order: float = ORDER) -> float:
+    """Return the difference to the companion over the error, for a `ratio` of edge lengths, companion over mesh."""
+    return abs(math.pow(ratio, order) - 1.0)
+
+
+def spacing(problem: Problem, step: StepResult) -> float:
+    """Return the distance of the contact points over the half-length of contact, at most 1."""
+    points, reach = problem.points, measure(problem.points, step)["contact_half_length_mm"]
+    touching = step.state.force[:, 0] > 0.0
+    area = float(np.median(points.area[touching])) if touching.any() else math.inf
+    distance = math.sqrt(area) if points.dim == 3 else area / (2.0 * points.half_width_mm)
+    return min(1.0, distance / reach) if reach > 0.0 else 1.0
+
+
+def spread_error(
+    numbers: Mapping[str, float],
+    companions: Iterable[tuple[float, Mapping[str, float]]],
+    readings: Iterable[Column] = (),
+    spacing: float = 0.0,
+) -> dict[str, float]:
+    """Return the discretisation error by name, from the spread of a number over several meshes.
+
+    Parameters
+    ----------
+    numbers : of the press, by name
+    companions : edge length over that of the mesh (below 1 for a finer one), and numbers by name, of every companion
+    readings : columns of the readings among the numbers
+    spacing : distance of the contact points over the half-length of contact, see `spacing`
+
+    Returns
+    -------
+    dict
+        Errors in the units of the numbers; names without a finite error are left out.
+    """
+    kinds, told = kinds_of(readings), list(companions)
+    found = {}
+    for name, value in numbers.items():
+        errors = [(value - other[name]) / gain(ratio, kinds[name].order) for ratio, other in told]
+        bar = kinds[name].bar_factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
+        scale = scale_of(numbers, kinds, name)
+        if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
+            scale *= _LEAST_SLIP
+        least = _LEAST_OF_ZONES if kinds[name].is_zone else _LEAST
+        found[name] = max(bar, least * spacing * scale)
+    return {name: error for name, error in found.items() if math.isfinite(error)}
+
 
 _ROUND_OFF = 1e-15
 """Relative round-off of a number."""

@@ -1,10 +1,14 @@
-"""Error estimate of a press: the discretisation error, and the error due to the size of the increments.
+"""Errors of a press, estimated: those of the mesh and of the increments, and that of the spread of Young's modulus.
 
 The discretisation error follows from the same press on companion meshes (`finger3d.mechanics.discretise.companions`,
-`finger3d.accuracy.richardson`).
+`finger3d.accuracy.error_bars`).
 
 Which counts of increments are solved, and on which mesh, follows from the numbers of increments, unknowns and contact
 points.  Two identical presses hence have identical error bars, whatever the load of the machine.
+
+Where all forces are proportional to the modulus, forces, moments, energies and pressures have its relative error, and
+lengths and strains have none.  Elsewhere the scene is pressed on a coarser mesh with the modulus of each part less and
+plus its spread.
 """
 
 from __future__ import annotations
@@ -12,27 +16,129 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from threading import Event
+from types import TracebackType
+from typing import NamedTuple, Self
 
 from finger3d._cost import INCREMENT_ERRORS_S, INCREMENT_ERRORS_SHARE
-from finger3d.accuracy.companion_presses import CompanionPress, companion_presses
-from finger3d.accuracy.error_bars import ErrorBars
-from finger3d.accuracy.richardson import spacing, spread_error
-from finger3d.errors import FAILURES, Finger3dError
+from finger3d.accuracy.error_bars import ErrorBars, spacing, spread_error
+from finger3d.contact.acceleration import one_thread
+from finger3d.errors import FAILURES, Finger3dError, MissingError
+from finger3d.fem.laws.material import Isotropic
+from finger3d.mechanics.discretise.companions import coarse_companions, companion, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.step_halving import (
+    FEW_CUTS,
     StepEstimate,
     errors_of_runs,
     last_step,
+    rough_workspace,
     step_error,
     with_increments_of,
 )
+from finger3d.mechanics.march.variants import press_variants
+from finger3d.mechanics.model import Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid
-from finger3d.mechanics.readings.columns import AREAS, GIVEN_BY_FORCE, MAIN, RESULTANTS, SLIP, by_key, in_space
-from finger3d.mechanics.results.history import StepResult, measure
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.mechanics.readings import (
+    AREAS,
+    GIVEN_BY_FORCE,
+    MAIN,
+    MEASURED,
+    RESULTANTS,
+    SLIP,
+    by_key,
+    in_space,
+    quantities,
+)
+from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
+
+
+class CompanionPress(NamedTuple):
+    """Edge length of a companion over that of the mesh, its problem, and its last increment."""
+
+    ratio: float
+    problem: Problem
+    end: StepResult
+
+
+def companion_presses(
+    problem: Problem,
+    chosen: StepEstimate | None = None,
+    report: Progress = QUIET,
+    cancel: Event | None = None,
+    unknowns: int | None = None,
+) -> list[CompanionPress]:
+    """Press the companions of a problem in the same increments, which are numbers; those that fail are left out.
+
+    They have coarser meshes; where there are none, finer ones.
+
+    Parameters
+    ----------
+    chosen : runs of a companion that chose automatic increments
+    unknowns : of the mesh whose error follows, in place of those of the problem's
+    """
+    found = []
+    for ratio, beside in coarse_companions(problem, report, chosen.beside if chosen else None, unknowns):
+        try:
+            found.append(CompanionPress(ratio, beside, _end_of(beside, chosen, cancel)))
+        except FAILURES:
+            continue
+    if not found:
+        finer = finer_companions(problem, report)
+        found = [CompanionPress(ratio, beside, _end_of(beside, None, cancel)) for ratio, beside in finer]
+    return found
+
+
+def _end_of(beside: Problem, chosen: StepEstimate | None, cancel: Event | None) -> StepResult:
+    """Return the last increment of a companion, pressed roughly unless it is known."""
+    if chosen and chosen.beside and chosen.beside.mesh is beside.mesh:
+        count, steps = chosen.runs[-1]
+        if all(leg.steps == count for leg in beside.model.legs):
+            return steps[-1]
+    return last_step(beside, rough_workspace(beside), FEW_CUTS, cancel)
+
+
+class CompanionThread:
+    """Thread in which the companions of one problem are pressed while that is pressed itself.
+
+    An increment at finite strain has too little work for two threads; two presses do not take much longer than one.
+    """
+
+    def __init__(self) -> None:
+        self._problem: Problem | None = None
+        self._cancel, self._running = Event(), ExitStack()
+        self._future: Future[list[CompanionPress]] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._cancel.set()
+        self._running.close()
+
+    def begin(self, problem: Problem, chosen: StepEstimate | None = None) -> None:
+        """Press the companions of a problem in increments that are numbers; those of an earlier one are given up."""
+        self.__exit__(None, None, None)
+        self._problem, self._cancel = problem, Event()
+        self._running.enter_context(one_thread())
+        pool = self._running.enter_context(ThreadPoolExecutor(1))
+        self._future = pool.submit(companion_presses, problem, chosen, QUIET, self._cancel)
+
+    def of(self, problem: Problem, chosen: StepEstimate | None, report: Progress) -> list[CompanionPress]:
+        """Return the presses of a problem's companions, made now unless they were begun; raises what they raised."""
+        if self._future is None or self._problem is None or self._problem.mesh is not problem.mesh:
+            return companion_presses(problem, chosen, report)
+        try:
+            return self._future.result()
+        finally:
+            self._running.close()
+
 
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
@@ -85,7 +191,7 @@ def estimate(
     ----------
     problem, steps : the press as it was solved, all increments converged
     report : receives the messages
-    numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.richardson.kinds_of`
+    numbers : the numbers of an increment by name, of the kinds in `finger3d.accuracy.error_bars.kinds_of`
     chosen : how automatic increments were chosen
     companions : presses the companions, or returns what was pressed already
 
@@ -248,3 +354,66 @@ def _on_meshes(companions: Sequence[Problem], kind: str) -> str:
     sizes += ", of both bodies" if own.object_compliance else ""
     dofs = ", ".join(str(beside.size.dofs) for beside in companions)
     return f"mesh: {dofs} dofs ({sizes}) beside, {'finer, ' * (kind == 'finer')}spread"
+
+
+_ROUND_OFF = 1e-9
+"""Relative error of a number that does not depend on the modulus, such as the prescribed force."""
+
+
+def modulus_errors(
+    problem: Problem, steps: Sequence[StepResult], spreads: Mapping[str, float], numbers: Measure
+) -> tuple[dict[str, float], str]:
+    """Return the errors of the last increment due to the spreads of Young's moduli of the finger, by name.
+
+    Those of several moduli, which are independent, add as squares.
+
+    Parameters
+    ----------
+    steps : all increments, converged
+    spreads : relative standard deviation of Young's modulus by the label of the part, that of the main body by ""
+    numbers : the numbers of an increment by name; of those that depend on the moduli, the errors are returned
+
+    Returns
+    -------
+    errors : in the units of the numbers; empty without a spread or an estimate
+    reason : why there is no estimate, in words; empty if there is one, or nothing to estimate
+    """
+    if not spreads or not steps:
+        return {}, ""
+    others = {column.key for column in steps[-1].readings if column.kind not in MEASURED}
+    told = {name: x for name, x in numbers(problem, steps[-1]).items() if name not in others}
+    if set(spreads) == {""} and problem.model.forces_scale_with_modulus:
+        known = quantities(steps[-1].readings)
+        return {name: spreads[""] * abs(x) for name, x in told.items() if known[name].is_stress}, ""
+    try:
+        found = _by_variants(problem, len(steps), spreads, numbers)
+    except FAILURES as error:
+        return {}, str(error) or type(error).__name__
+    errors = {name: math.hypot(*(one.get(name, 0.0) for one in found)) for name in told}
+    return {name: error for name, error in errors.items() if error > _ROUND_OFF * abs(told[name])}, ""
+
+
+def _by_variants(
+    problem: Problem, increments: int, spreads: Mapping[str, float], numbers: Measure
+) -> list[dict[str, float]]:
+    """Return the errors by name due to each spread, from presses on a coarser mesh."""
+    legs = with_increments_of(problem.model.legs, increments)
+    beside = companion(replace(problem, model=replace(problem.model, legs=legs)))
+    models = [times_modulus(beside.model, 1.0 + sign * s, label) for label, s in spreads.items() for sign in (-1, 1)]
+    ends = press_variants(beside, models, lambda p, steps: numbers(p, steps[-1]))
+    found = []
+    for soft, stiff in zip(ends[::2], ends[1::2], strict=True):
+        if soft.found is None or stiff.found is None:
+            raise MissingError(soft.failure or stiff.failure)
+        found.append({name: 0.5 * abs(x - soft.found[name]) for name, x in stiff.found.items()})
+    return found
+
+
+def times_modulus(model: Model, ratio: float, label: str | None = None) -> Model:
+    """Return a model with Young's modulus of one part, "" for the main body, or of all of them times a ratio."""
+
+    def scaled(name: str, material: Isotropic) -> Isotropic:
+        return replace(material, E_MPa=(ratio if label in (None, name) else 1.0) * material.E_MPa)
+
+    parts = tuple((name, scaled(name, one)) for name, one in model.parts)
+    return replace(model, material=scaled("", model.material), parts=parts)

@@ -1,5 +1,9 @@
 """Mesh refinement until the estimated error of one number, the goal, is below a tolerance.
 
+What limits the area of stick in a solid is the distance of the contact points at its border, not the cells of the body.
+The cells that the border crosses are bisected, once for every factor of two of `mesh.stick_refinement`, each time from
+the press on the mesh before.
+
 A first mesh whose error is far below the tolerance is made coarser instead, as long as the tolerance is met.  Otherwise
 the edges of some zones of the mesh become shorter: those at the contact, at the base and the body around, at gauges,
 and at the border of stick.  Which of them is found on the companion with twice the edges, on which the edges of one
@@ -10,22 +14,85 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+
+import numpy as np
 
 from finger3d._cost import GROWTH, PRESS_TO_ROUND
 from finger3d._ranges import four_digits
-from finger3d._types import Tree
-from finger3d.accuracy.borders import MOST_STICK_REFINEMENT, with_refined_borders
+from finger3d._types import Float, Tree
+from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import discretisation, press_numbers
-from finger3d.accuracy.richardson import relative_error
+from finger3d.contact.friction import SLIP, STICK
 from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.fem.mesh import axis_numbers
+from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
-from finger3d.mechanics.readings.quantities import Kind, kinds_of
+from finger3d.mechanics.readings import Kind, kinds_of
+from finger3d.meshing.sizing import SizedPlaces
 from finger3d.progress import QUIET, Progress
+
+MOST_STICK_REFINEMENT = 16.0
+"""Largest `mesh.stick_refinement`."""
+
+_REACH = 0.6
+"""Distance from the border up to which edges are shortest, over the length of the edges that it crosses."""
+
+_RATE = 1.0
+"""Growth of the edge length per distance beyond."""
+
+
+def with_refined_borders(model: Model, report: Progress = QUIET) -> Problem:
+    """Return the body on a mesh with edges of ``mesh.size_mm / mesh.stick_refinement`` at the border of stick.
+
+    The coarser meshes that find the border have no shorter edges around gauges.  If nothing slips on one of them, or if
+    its press does not converge, the mesh stays as coarse at the contact.
+
+    Raises
+    ------
+    Finger3dError
+        If the refined mesh is estimated to need too much memory.
+    """
+    options, factor, borders = model.mesh, 1.0, None
+    while factor < options.stick_refinement:
+        coarse = build(replace(model, mesh=replace(options, gauge_refinement=1.0, borders=borders)), report)
+        short = with_few_increments(coarse)
+        steps = list(march(short))
+        places = stick_borders(short, _ends_of_legs(short, steps)) if steps[-1].outcome.ok else np.zeros((0, 3))
+        if not len(places) and options.gauge_refinement == 1.0:
+            return coarse
+        if not len(places):
+            break
+        edge = options.size_mm / factor
+        factor = min(2.0 * factor, options.stick_refinement)
+        report.say(f"border of stick: edges of {options.size_mm / factor:.3g} mm")
+        borders = SizedPlaces(places, options.size_mm / factor, _RATE, _REACH * edge)
+    return build(replace(model, mesh=replace(options, borders=borders)), report)
+
+
+def _ends_of_legs(problem: Problem, steps: Sequence[StepResult]) -> list[StepResult]:
+    """Return the last increments of the legs, between which the border moves."""
+    counts = [leg.steps if isinstance(leg.steps, int) else 1 for leg in problem.model.legs]
+    return [steps[end - 1] for end in np.cumsum(counts) if end <= len(steps)]
+
+
+def stick_borders(problem: Problem, steps: Sequence[StepResult]) -> Float:
+    """Return the middles (k, d) mm of edges between points that stick and slip, mirrored into the meshed part."""
+    points, middles = problem.points, [np.zeros((0, 3))]
+    for step in steps:
+        ends = step.state.status[points.edges]
+        border = (ends == STICK).any(axis=1) & (ends == SLIP).any(axis=1)
+        middles.append(points.points[points.edges[border]].mean(axis=1))
+    places = np.vstack(middles)
+    for axis in axis_numbers(problem.axes):
+        places[:, axis] = np.abs(places[:, axis])
+    return np.unique(np.round(places[:, : problem.dim], 9), axis=0)
+
 
 MAX_ROUNDS = 8
 GOAL, ALL = "normal_force_N", "all"

@@ -18,20 +18,18 @@ from typing import Self
 from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
 from finger3d._types import Tree
-from finger3d.accuracy.companion_presses import companion_presses
 from finger3d.accuracy.cost import forecast, without_output_s
-from finger3d.accuracy.estimate import estimate, press_numbers
+from finger3d.accuracy.error_bars import relative_error
+from finger3d.accuracy.estimate import companion_presses, estimate, press_numbers
 from finger3d.accuracy.refine import ALL
-from finger3d.accuracy.richardson import relative_error
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.companions import coarser
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.mechanics.readings.columns import AREAS, MAIN, by_key
-from finger3d.mechanics.readings.quantities import ORDER, kinds_of
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.mechanics.readings import AREAS, MAIN, ORDER, by_key, kinds_of
+from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Source, scene_of
 

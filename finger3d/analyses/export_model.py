@@ -61,10 +61,10 @@ def export_mesh(
     Finger3dError
         If the scene is a section, or the folder holds the finger's own file.
     """
-    from finger3d.fem.mesh.simplex import axis_numbers, unfold
+    from finger3d.fem.mesh import axis_numbers, unfold
     from finger3d.mechanics.discretise.build import mesh_part
     from finger3d.mechanics.discretise.symmetry import symmetry
-    from finger3d.meshing.given.mesh_output import write_mesh_vtu
+    from finger3d.meshing.mesh_files import write_mesh_vtu
 
     out, report, scene = Path(out), report or Progress(), scene_of(scene, overrides)
     model = scene.model()
@@ -99,7 +99,7 @@ def export_deck(
     Finger3dError
         If CalculiX has no equal of what the scene asks for; the line names it.
     """
-    from finger3d.analyses.calculix.press import press_deck
+    from finger3d.analyses.calculix import press_deck
     from finger3d.analyses.effects_by_need import settled
 
     out, report = Path(out), report or Progress()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
@@ -10,23 +11,67 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, TypeAlias
 
-from finger3d.accuracy.companion_presses import CompanionThread
-from finger3d.analyses.press_files import Fields, ResultWriter
-from finger3d.analyses.press_record import PressRecord, point_count_warning
+import numpy as np
+
+from finger3d.accuracy.estimate import CompanionThread
+from finger3d.analyses.press_files import Fields, PressRecord, ResultWriter, point_count_warning
 from finger3d.analyses.pressed_body import PressedBody, with_penetration
 from finger3d.analyses.result import PressResult, result_in
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.march.solve import march
+from finger3d.mechanics.march.step_halving import with_few_increments
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
     from finger3d.accuracy.refine import Refinement
-    from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.march.step_halving import StepEstimate
     from finger3d.results.states import States
     from finger3d.scene import Scene, Source
+
+
+_WITHIN = 0.01
+"""Relative distance of a force that holds and one that does not at which the search ends."""
+
+_INCREMENTS = 5
+"""Increments of closing and of each load: the force at which all of a contact slips hardly depends on them."""
+
+_NONE = 1e-4
+"""Share of the largest force below which no grip is needed."""
+
+
+def least_grip(problem: Problem, largest: float, report: Progress) -> float:
+    """Return the smallest force (N) that holds the object, within 1 % of one that does not, or 0 if none is needed.
+
+    The first two trials are next to the force at which Coulomb's friction on flat faces bears the load.
+
+    Parameters
+    ----------
+    problem : a finger of a grip
+    largest : force (N) of each finger that holds
+    """
+    few = with_few_increments(problem, _INCREMENTS)
+    workspace = formulation_of(problem.model).workspace()
+
+    def holds(force: float) -> bool:
+        legs = tuple(replace(leg, force_N=2.0 * force) for leg in few.model.legs)
+        steps = list(march(replace(few, model=replace(few.model, legs=legs)), workspace=workspace))
+        report.say(f"a grip of {force:.4g} N {'holds' if steps[-1].outcome.ok else 'does not hold'} the object")
+        return steps[-1].outcome.ok
+
+    mu = problem.model.friction.largest
+    tangential = max(math.hypot(leg.force_x_N or 0.0, leg.force_z_N or 0.0) for leg in few.model.legs)
+    flat = 0.5 * tangential / mu if mu > 0.0 else math.inf
+    trials = [share * flat for share in (1.0 + 0.45 * _WITHIN, 1.0 - 0.45 * _WITHIN)]
+    not_held, held = 0.0, largest
+    while held > max((1.0 + _WITHIN) * not_held, _NONE * largest):
+        known = [trial for trial in trials if not_held < trial < held]
+        force = known[0] if known else float(np.sqrt(not_held * held)) if not_held else 0.5 * held
+        not_held, held = (not_held, force) if holds(force) else (force, held)
+    return held if not_held else 0.0
 
 
 Begun: TypeAlias = "Callable[[Problem, StepEstimate | None], None]"
@@ -226,10 +271,13 @@ def _remark(problem: Problem, step: StepResult) -> str:
 
 def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> States | None:
     """Recover and write the fields after the last converged increment, None without one; add warnings and advice."""
-    from finger3d.accuracy.advice import largest_principal_strain
-    from finger3d.mechanics.finite_strain.failure import fold_warnings, snap_warnings
-    from finger3d.mechanics.postprocess.penetration import increments_without_contact, penetration_warnings
-    from finger3d.mechanics.results.cavity import cavity_warnings
+    from finger3d.accuracy.model_error import largest_principal_strain
+    from finger3d.mechanics.finite_strain.increment import fold_warnings, snap_warnings
+    from finger3d.mechanics.postprocess.penetration import (
+        cavity_warnings,
+        increments_without_contact,
+        penetration_warnings,
+    )
 
     begin = time.perf_counter()
     report.stage("writing fields")
@@ -250,8 +298,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Sta
 
 def _estimate_errors(record: PressRecord, report: Progress, companions: CompanionThread) -> None:
     """Estimate the errors by mesh and increments."""
-    from finger3d.accuracy.estimate import estimate, estimate_with_grid, press_numbers
-    from finger3d.accuracy.modulus import modulus_errors
+    from finger3d.accuracy.estimate import estimate, estimate_with_grid, modulus_errors, press_numbers
     from finger3d.scene.derived import spreads
 
     report.stage("estimating the error")
@@ -271,7 +318,6 @@ def _estimate_errors(record: PressRecord, report: Progress, companions: Companio
 
 def _find_least_grip(record: PressRecord, report: Progress) -> None:
     """Find the smallest grip that holds; none where the scene's own does not."""
-    from finger3d.analyses.least_grip import least_grip
 
     if not record.history.outcome.ok:
         record.warnings.append("least grip: the scene's own grip does not hold the object; ask with a larger one")
@@ -303,7 +349,7 @@ def _estimate_changes(record: PressRecord, report: Progress) -> None:
 
 def _advise(record: PressRecord) -> None:
     """Set the lines of advice that follow from the results so far."""
-    from finger3d.accuracy.advice import advise
+    from finger3d.accuracy.model_error import advise
     from finger3d.mechanics.postprocess.penetration import penetration_advice
 
     large = record.model_error.get("large_deformation")

@@ -13,7 +13,7 @@ from finger3d._types import Tree
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
-from finger3d.mechanics.results.history import History
+from finger3d.mechanics.history import History
 from finger3d.results.states import load_states
 from finger3d.results.summary import PressStep, press_summary, read_columns, steps_of
 from finger3d.results.vtu import grid

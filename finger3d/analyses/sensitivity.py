@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finger3d._types import Tree, TreeView
+from finger3d.accuracy.error_bars import spread_error
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.accuracy.richardson import spread_error
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import scene_with
@@ -24,12 +24,11 @@ from finger3d.mechanics.discretise.companions import coarse_companions, coarser,
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.step_halving import with_increments_of
 from finger3d.mechanics.march.variants import press_variants
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import Column, in_space
-from finger3d.mechanics.readings.quantities import quantities
-from finger3d.mechanics.results.history import StepResult
+from finger3d.mechanics.readings import Column, in_space, quantities
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, scene_of, tree
 from finger3d.scene.material import with_moduli_only

@@ -16,14 +16,13 @@ from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_o
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.recovery import displacement
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult, contact_table, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
-from finger3d.mechanics.readings.columns import of_kind
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.results.history import StepResult, contact_table, measure
+from finger3d.mechanics.readings import Gauge, of_kind
 from finger3d.plotting.figures import middle_line
 from finger3d.progress import QUIET, Progress
 from finger3d.sensor.curve import ReadingCurve

@@ -15,7 +15,7 @@ from werkzeug.serving import BaseWSGIServer, make_server
 from finger3d.app.live_body import LiveBody, LivePress, LiveReading
 from finger3d.contact.friction import STATUS_NAMES
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 from finger3d.plotting.gauges import COLOUR
 from finger3d.plotting.panels import middle_section
 from finger3d.plotting.solid import COLOURS

@@ -6,8 +6,7 @@ import webbrowser
 from pathlib import Path
 
 from finger3d._extras import require
-from finger3d.cli.common import Interrupted, app, job
-from finger3d.cli.folders import load
+from finger3d.cli.common import Interrupted, app, job, load
 from finger3d.cli.options import Set
 
 

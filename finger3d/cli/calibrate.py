@@ -7,12 +7,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import load
-from finger3d.cli.options import Json, Out, Set
+from finger3d.cli.common import app, job, load
+from finger3d.cli.options import CalibrationOptions, Json, Out, Set, parsed_tolerances
 from finger3d.cli.printing import print_json, print_rows
-from finger3d.cli.sensor_options import CalibrationOptions
-from finger3d.cli.tolerances import parsed_tolerances
 from finger3d.errors import MissingError
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import load
+from finger3d.cli.common import app, job, load
 from finger3d.cli.options import Json, Out, Set
 from finger3d.cli.printing import print_columns, print_json
 from finger3d.errors import Finger3dError, MissingError
@@ -37,7 +36,7 @@ def compare(
     except ValueError:
         raise Finger3dError(f"--widths {widths}: must be numbers of mm with commas, for instance 5,20,50,200") from None
     loaded = load(scene, set_, out)
-    from finger3d.analyses.compare.run import compare as run
+    from finger3d.analyses.compare import compare as run
     from finger3d.results.summary import read_json
 
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} cases are kept in {out}") as report:

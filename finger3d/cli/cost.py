@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import load
+from finger3d.cli.common import app, job, load
 from finger3d.cli.options import Json, Set
 from finger3d.cli.printing import print_columns, print_json
 from finger3d.errors import Finger3dError

@@ -9,9 +9,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from finger3d.cli.common import app
-from finger3d.cli.options import Json
+from finger3d.cli.options import Json, ReadingOptions
 from finger3d.cli.printing import print_json
-from finger3d.cli.sensor_options import ReadingOptions
 from finger3d.errors import Finger3dError
 
 

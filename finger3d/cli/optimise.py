@@ -2,17 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
-from finger3d.cli.optimise_options import OptimiseOptions
-from finger3d.cli.options import Continued, Json, Set
+from finger3d.cli.common import app, check_writable, job
+from finger3d.cli.options import Continued, Json, Noise, Set, Texts, Tolerances, parsed_tolerances
 from finger3d.cli.printing import print_json, print_page
-from finger3d.cli.tolerances import parsed_tolerances
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimiseOptions:
+    """What is free, and what is best.
+
+    Parameters
+    ----------
+    free
+        A free key and its bounds, for instance finger.radius_mm=60:200; may be repeated.
+    gauges
+        Find the places and directions of so many gauges that together determine mu best, with all tolerances of
+        a calibration; --free bounds gauge.x_mm, gauge.y_mm, gauge.z_mm and gauge.angle_deg.
+    spacing
+        Least distance of two of these, mm: their length, so that none overlap.
+    gauge
+        Gauge whose sensitivity to friction is to be largest; default: the first.
+    mu
+        Ascending values of mu, with commas; default: nine from 0.05 to 1.
+    budget
+        Number of designs; of bodies, if keys of gauges are optimised for each body.
+    seed
+        Seed of the random number generator.
+    """
+
+    free: Texts | None = None
+    gauges: int | None = None
+    spacing: float = 3.0
+    tolerance: Tolerances = None
+    gauge: str | None = None
+    mu: str | None = None
+    noise: Noise = 1.5e-4
+    budget: int = 60
+    seed: int = 0
 
 
 @app.command
@@ -43,13 +75,13 @@ def optimise(
     o, sets = options or OptimiseOptions(), set_ or []
     mus = parsed_mus(o.mu) if o.mu else None
     if o.gauges is None:
-        from finger3d.analyses.optimise.run import optimise as run
+        from finger3d.analyses.optimise import optimise as run
         from finger3d.report.optimise import optimise_page as page
 
         with job(json_, lambda _: f"every evaluated design is kept in {out}; the same command continues") as report:
             run(scene, o.free or (), out, o.gauge, mus, o.noise, o.budget, o.seed, sets, report)
     else:
-        from finger3d.analyses.optimise.gauge_run import place_gauges
+        from finger3d.analyses.gauge_places import place_gauges
         from finger3d.report.gauge_places import gauge_places_page as page
 
         with job(json_, lambda _: "nothing was written") as report:

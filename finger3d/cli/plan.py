@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finger3d.cli.common import app
-from finger3d.cli.folders import load
+from finger3d.cli.common import app, load
 from finger3d.cli.options import Json, Set
 from finger3d.cli.printing import print_json, print_rows
 

@@ -10,8 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import load
+from finger3d.cli.common import app, job, load
 from finger3d.cli.options import Flag, Json, Out, Set
 from finger3d.cli.printing import print_json, print_rows
 from finger3d.errors import MissingError

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.cli.common import app, job
-from finger3d.cli.folders import check_writable
-from finger3d.cli.options import Json, Set, Texts
+from finger3d.cli.common import app, check_writable, job
+from finger3d.cli.options import Json, Set, Texts, parsed_tolerances
 from finger3d.cli.printing import print_columns, print_json
-from finger3d.cli.tolerances import parsed_tolerances
 
 
 @app.command

@@ -20,7 +20,7 @@ from finger3d.contact.acceleration import (
 )
 from finger3d.contact.conditions import ContactProblem, residual
 from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, Precision
-from finger3d.contact.rules import RULES, RuleName
+from finger3d.contact.solve import RULES, RuleName
 from finger3d.contact.state import ContactSolution, ContactState, next_state, pressure
 from finger3d.errors import Outcome
 

@@ -97,7 +97,7 @@ class ContactSolution(Generic[S]):
 
     Attributes
     ----------
-    state : `ContactState`, or `finger3d.mechanics.results.state.State` with that of the body
+    state : `ContactState`, or `finger3d.mechanics.history.State` with that of the body
         Valid only if `outcome` is CONVERGED; otherwise the state before the increment.
     residual : float
         Largest violation of Eqs. (1)-(4) and of "friction opposes slip", dimensionless.

@@ -11,7 +11,7 @@ from finger3d._ranges import Share
 from finger3d.effects import fill
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
-from finger3d.fem.laws.stability import unstable_from
+from finger3d.fem.laws.base import unstable_from
 from finger3d.mechanics.model import Model
 
 _TABLE = "effects.large_deformation"

@@ -14,9 +14,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.mesh.parts import LinearElasticity
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.laws.material import LinearElasticity
+from finger3d.fem.mesh import Mesh, quadrature
 
 AnyInt = NDArray[np.int32] | NDArray[np.int64]
 
@@ -72,7 +71,7 @@ class Pattern:
     length : (blocks,) entries in the first of the rows that the block stands in
     slot : (e, pairs) block of every local pair: of two nodes, then of a pressure and a node, then of two pressures
     swapped : (e, pairs of nodes) whether a pair's nodes stand the other way round in the matrix
-    vertices : (p,) node of every pressure, see `finger3d.fem.mesh.simplex.Mesh.part_corners`
+    vertices : (p,) node of every pressure, see `finger3d.fem.mesh.Mesh.part_corners`
     """
 
     indptr: AnyInt

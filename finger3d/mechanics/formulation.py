@@ -11,11 +11,11 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.state import ContactSolution
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.surface import BoundarySurface
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.generalised import GeneralisedForces
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.results.state import B, State
+from finger3d.mechanics.history import B, State
+from finger3d.mechanics.readings import Column
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 W = TypeVar("W", bound="Workspace")

@@ -6,7 +6,7 @@ from typing import Any
 
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.small_strain.elastic import SmallStrain
+from finger3d.mechanics.small_strain import SmallStrain
 
 
 def formulation_of(model: Model) -> Formulation[Any, Any]:
@@ -16,7 +16,7 @@ def formulation_of(model: Model) -> Formulation[Any, Any]:
 
         return FiniteStrain(model.hyperelastic_law, model.relaxation)
     if model.relaxation is not None:
-        from finger3d.mechanics.small_strain.viscoelastic import Viscoelastic
+        from finger3d.mechanics.viscoelastic import Viscoelastic
 
         return Viscoelastic(model.relaxation)
     return SmallStrain()

@@ -7,18 +7,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
+from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.contact.law import ContactLaw
-from finger3d.contact.rules import STEP_DEPENDENT_RULES, RuleName
+from finger3d.contact.solve import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.design import Design
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.reading import Marker, Reading, Taxel
-from finger3d.meshing.options import Mesher
-from finger3d.meshing.refinement.grading import SizedPlaces
+from finger3d.mechanics.readings import Column, Gauge, Marker, Reading, Taxel
+from finger3d.meshing.sizing import Mesher, SizedPlaces
 from finger3d.objects import (
     ContactPath,
     FirstTouch,

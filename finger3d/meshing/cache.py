@@ -14,10 +14,10 @@ import numpy as np
 
 from finger3d._machine import source_hash
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.io import check_arrays, read_arrays, write_arrays
-from finger3d.meshing.options import MeshSizes, Zone
+from finger3d.meshing.sizing import MeshSizes, Zone
 
 _PACKAGES = {"ftetwild": ("pytetwild", "build123d"), "netgen": ("netgen-mesher", "build123d")}
 

@@ -8,15 +8,14 @@ import time
 import numpy as np
 
 from finger3d._cost import MAX_TETS
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
-from finger3d.meshing.given.given import GivenMesh, mesh_given
+from finger3d.meshing.given import GivenMesh, mesh_given
 from finger3d.meshing.limits import check_sizes, is_possible
-from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.refinement.sizing import count_cells, rounded_zone, sizing
 from finger3d.meshing.report import MeshReport, mesh_report
-from finger3d.meshing.structured.swept import cell_count, mesh_swept
+from finger3d.meshing.sizing import MeshSizes, Zone, count_cells, rounded_zone, sizing
+from finger3d.meshing.swept import cell_count, mesh_swept
 from finger3d.meshing.unstructured.solids import box
 from finger3d.progress import QUIET, Progress
 

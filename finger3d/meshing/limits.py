@@ -9,8 +9,7 @@ from finger3d._machine import memory_bytes
 from finger3d._ranges import at_most
 from finger3d.errors import Finger3dError
 from finger3d.geometry.design import Design
-from finger3d.meshing.options import MeshSizes
-from finger3d.meshing.refinement.sizing import Sizing, count_cells
+from finger3d.meshing.sizing import MeshSizes, Sizing, count_cells
 
 
 def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from finger3d.fem.mesh.quality import curved_volume, min_angle_deg
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh, curved_volume, min_angle_deg
 
 
 @dataclass(frozen=True)

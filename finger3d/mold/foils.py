@@ -12,7 +12,7 @@ import numpy as np
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import triangulated
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 from finger3d.mold.body import Body
 from finger3d.mold.layout import Layout
 from finger3d.mold.options import MoldOptions

@@ -11,7 +11,7 @@ import numpy as np
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN
 from finger3d.contact.zones import border_shares
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
+from finger3d.fem.mesh import CONTACT, FREE_FACES
 from finger3d.plotting.gauges import draw_marks
 from finger3d.plotting.panels import (
     edges_of,

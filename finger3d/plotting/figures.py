@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
+from finger3d.fem.mesh import CONTACT, FREE_FACES
 from finger3d.plotting.layout import WIDEST, finish, sheet
 from finger3d.plotting.panels import CMAP, patches
 from finger3d.plotting.solid import COLOURS

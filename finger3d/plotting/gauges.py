@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Float, Int
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from finger3d.mechanics.readings.gauges import Gauge
+    from finger3d.mechanics.readings import Gauge
 
 
 COLOUR = "#b0006a"
@@ -84,7 +84,7 @@ def marks_of(mesh: Mesh, gauges: Sequence[Gauge], near: bool = False) -> tuple[M
 
 def _near(mesh: Mesh, point: Float, outside: float) -> Float:
     """Project a point (3,) along z onto the surface by bisection, between its own z and `outside`."""
-    from finger3d.fem.mesh.locate import cells_at
+    from finger3d.fem.mesh import cells_at
 
     inside = point[2]
     if cells_at(mesh, np.array([*point[:2], outside])):
@@ -98,7 +98,7 @@ def _near(mesh: Mesh, point: Float, outside: float) -> Float:
 def _weights(mesh: Mesh, point: Float) -> tuple[Int, Float] | None:
     """Return the nodes and weights (k,) that interpolate at a point, or None outside the body."""
     # Imported here because a process that only draws marks does not need SciPy.
-    from finger3d.fem.mesh.locate import cells_at
+    from finger3d.fem.mesh import cells_at
 
     found = cells_at(mesh, point)
     if not found:

@@ -9,7 +9,7 @@ import numpy as np
 
 from finger3d._types import Float, Int
 from finger3d.contact.friction import OPEN, SLIP, STATUS_NAMES, STICK
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.plotting.layout import WIDEST, blank, head
 from finger3d.plotting.solid import BODY, COLOURS

@@ -11,8 +11,8 @@ import numpy as np
 
 from finger3d._extras import available
 from finger3d.errors import MissingError
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.fem.mesh import FREE_FACES, Mesh
+from finger3d.mechanics.readings import Gauge
 from finger3d.plotting.deformed import draw_finger
 from finger3d.plotting.gauges import Mark, marks_of
 from finger3d.plotting.layout import save

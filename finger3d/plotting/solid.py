@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.contact.friction import OPEN, SLIP, STICK
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders
-from finger3d.fem.mesh.elements import TRI3, TRI6, TRIANGLES
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, part_of_facets
+from finger3d.fem.mesh import CONTACT, FREE_FACES, TRI3, TRI6, TRIANGLES, Mesh, part_of_facets
 from finger3d.plotting.gauges import Mark
 from finger3d.plotting.renderer import (
     AXES,
@@ -60,7 +59,7 @@ class DeformedFinger:
     displacement : (n, d) mm
     pressure, shear : (c,) and (c, 3) MPa, at the contact points; the shear is the friction on the finger
     status : (c,) status of these points
-    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.mesh.simplex.FREE_FACES` of their faces
+    nodes, faces : (c,) their nodes, and the numbers in `finger3d.fem.mesh.FREE_FACES` of their faces
     thing : (t, 3, 3) corners of the object's triangles, mm; None without it
     title : of the picture
     marks : gauges, from `finger3d.plotting.gauges.marks_of`

@@ -11,8 +11,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.contact.conditions import TOLERANCE
 from finger3d.contact.friction import OPEN, STATUS_NAMES
-from finger3d.mechanics.readings.columns import MEASURED
-from finger3d.mechanics.readings.quantities import OF_INCREMENT
+from finger3d.mechanics.readings import MEASURED, OF_INCREMENT
 from finger3d.report.build import Figure, Page, PageSection, Part, Table
 from finger3d.report.press_rows import headline, spelt
 from finger3d.report.scene import how_modelled

@@ -9,8 +9,7 @@ from finger3d._types import TreeView
 from finger3d.accuracy.changes import two_digits
 from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.mechanics.readings.columns import AREAS, MAIN, SLIP
-from finger3d.mechanics.readings.quantities import Kind, Quantity, named
+from finger3d.mechanics.readings import AREAS, MAIN, SLIP, Kind, Quantity, named
 from finger3d.progress import Progress
 from finger3d.report.build import HeadlineRow
 from finger3d.results.summary import ROUND_OFF, PressStep, grip_rows, read_json, readings_of

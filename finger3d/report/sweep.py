@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from finger3d.mechanics.readings.columns import Column
+from finger3d.mechanics.readings import Column
 from finger3d.report.build import Code, HeadlineRow, Page, PageSection, Table
 from finger3d.report.chart import Chart, Line
 from finger3d.results.summary import read_json, read_rows, strains_of, title_of

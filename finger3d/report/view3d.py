@@ -10,8 +10,8 @@ import numpy as np
 
 from finger3d._types import Array
 from finger3d.contact.zones import facet_borders
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.fem.mesh import FREE_FACES, Mesh
+from finger3d.mechanics.readings import Gauge
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.html import asset, embedded
 from finger3d.results.states import States, chosen, label

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.companions import FACTOR
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.quantities import named
+from finger3d.mechanics.readings import Column, named
 
 FORCE = "force_N_per_mm"
 
@@ -33,7 +32,7 @@ class Case:
     ----------
     model : plane stress, plane strain, or solid
     size_mm : edge length at the contact
-    numbers : quantity -> value, forces per width; see `finger3d.analyses.compare.cases.quantities`
+    numbers : quantity -> value, forces per width; see `finger3d.analyses.compare.quantities`
     strains : columns of the strains among the numbers
     errors : quantity -> error bar of mesh and increments; empty if it was not estimated
     lines : line along x ("z = 0", "end") -> columns x_mm, pressure_MPa, shear_x_MPa, shear_z_MPa, status

@@ -13,12 +13,12 @@ from finger3d._types import Array, freeze_arrays
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import Zone, edges_of, zones
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES, Mesh, middles
+from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
 from finger3d.io import check_arrays, read_arrays, write_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.history import StepResult, contact_table
+from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.objects import PlacedObject
 from finger3d.results.summary import without_round_off
 
@@ -36,9 +36,9 @@ class States:
     Attributes
     ----------
     points : (n, d) mm at rest, in the order of fields.vtu
-    cells, facets : (e, k), (t, j) as in `finger3d.fem.mesh.simplex.Mesh`; facets of all labels together
+    cells, facets : (e, k), (t, j) as in `finger3d.fem.mesh.Mesh`; facets of all labels together
     part : (e,) number of the part that each cell belongs to, 0 for the main body
-    facet_face : (t,) number in `finger3d.fem.mesh.simplex.FREE_FACES` of the face of each facet, -1 for any other
+    facet_face : (t,) number in `finger3d.fem.mesh.FREE_FACES` of the face of each facet, -1 for any other
     nodes : (m,) numbers of the contact points among `points`, in the order of contact.csv
     face : (m,) number of the face that each contact point belongs to
     compliance : (m,) 1/MPa, as in `finger3d.mechanics.discretise.contact_points.ContactPoints`
@@ -166,10 +166,10 @@ def states_of(
     Parameters
     ----------
     steps : those that converged, in turn
-    mesh, parent, sign : the whole finger, and where each node comes from (`finger3d.fem.mesh.simplex.unfold`)
+    mesh, parent, sign : the whole finger, and where each node comes from (`finger3d.fem.mesh.unfold`)
     last : (n, d) mm, displacement of the whole finger at the end, which is known already
     """
-    from finger3d.fem.recovery.recover import displacement
+    from finger3d.fem.recovery import displacement
 
     kept = chosen(len(steps))
     u = np.empty((len(kept), *mesh.points.shape), dtype=np.float32)

@@ -12,8 +12,7 @@ import numpy as np
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
-from finger3d.mechanics.readings.columns import Column, displacement_columns, pressure_column, strain_columns
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Column, Gauge, displacement_columns, pressure_column, strain_columns
 from finger3d.scene.tables import GaugeTable, record_of
 
 ROUND_OFF = 1e-9

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from finger3d._extras import require
 from finger3d._types import Array
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.io import atomic
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from finger3d._ranges import LONGEST_SLIDE, at_least, at_most
 from finger3d._types import Float, Tree, TreeView
 from finger3d.geometry.design import Design, lacks_section
-from finger3d.mechanics.readings.columns import (
+from finger3d.mechanics.readings import (
     AREAS,
     GIVEN_BY_FORCE,
     MAIN,
@@ -21,7 +21,7 @@ from finger3d.mechanics.readings.columns import (
     pressure_column,
     strain_columns,
 )
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.scene.derived import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import Place, dotted, shown

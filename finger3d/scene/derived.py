@@ -125,7 +125,7 @@ def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) 
     turns = {f"turn_{axis}": math.radians(table[f"turn_{axis}_deg"]) for axis in "xyz"}
     leg = {key: value for key, value in table.items() if not key.startswith("turn_")} | turns
     if leg["depth_mm"] is None:
-        from finger3d.mechanics.march.force_control import forecast_depth
+        from finger3d.mechanics.march.equilibrium import forecast_depth
 
         constants = tables.material.constants
         material = Isotropic(constants.E_MPa, constants.nu)

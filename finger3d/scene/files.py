@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, cast
 from finger3d._types import Tree, TreeView
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import SUFFIXES, content
-from finger3d.meshing.given.mesh_files import MESH_SUFFIXES
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import MeshObject, RigidObject
 from finger3d.scene.tables import FileTable, MeshFileTable, TomlTable
 
 if TYPE_CHECKING:
     from finger3d.geometry.imported import Imported
-    from finger3d.meshing.given.given import GivenMesh
+    from finger3d.meshing.given import GivenMesh
 
 FINGER_SUFFIXES = (*SUFFIXES, *MESH_SUFFIXES)
 """Files that may be a finger; an object is no mesh of tetrahedra."""
@@ -60,7 +60,7 @@ def _named(document: TreeView) -> Iterator[tuple[str, str, str]]:
 def finger(path: str, table: TomlTable) -> Imported | GivenMesh:
     """Return the finger in a file, turned as its table says."""
     if path.lower().endswith(MESH_SUFFIXES):
-        from finger3d.meshing.given.given import given_mesh
+        from finger3d.meshing.given import given_mesh
 
         return given_mesh(path, cast(MeshFileTable, table).scale)
     from finger3d.geometry.imported import imported

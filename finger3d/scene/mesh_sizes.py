@@ -7,7 +7,7 @@ import math
 from finger3d._ranges import four_digits
 from finger3d.geometry.design import Design
 from finger3d.mechanics.model import Domain, MeshOptions
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.meshing.given import GivenMesh
 from finger3d.objects import RigidObject
 from finger3d.scene.tables import MeshTable
 

@@ -17,8 +17,7 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import ElasticConstants
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, first_contact
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.reading import Marker, Taxel
+from finger3d.mechanics.readings import Gauge, Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped

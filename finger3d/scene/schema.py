@@ -16,7 +16,7 @@ from finger3d.effects import effect_names, effect_type
 from finger3d.geometry.files import SUFFIXES
 from finger3d.geometry.registry import designs
 from finger3d.materials.elastic import MODULUS_KEYS
-from finger3d.meshing.given.mesh_files import MESH_SUFFIXES
+from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables
 from finger3d.scene.tables import (

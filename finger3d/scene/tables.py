@@ -33,10 +33,10 @@ from finger3d._ranges import (
     Zero,
 )
 from finger3d._types import Tree
-from finger3d.contact.rules import RuleName
+from finger3d.contact.solve import RuleName
 from finger3d.materials.elastic import MODULUS_KEYS, ElasticConstants, elastic_constants
 from finger3d.mechanics.model import Domain
-from finger3d.meshing.options import Mesher
+from finger3d.meshing.sizing import Mesher
 
 Record = TypeVar("Record")
 Steps = Count | Literal["auto"]

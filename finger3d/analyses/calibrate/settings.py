@@ -12,7 +12,7 @@ from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.reading import Reading
+from finger3d.mechanics.readings import Reading
 from finger3d.sensor.curve import FEWEST, LARGEST_STRAIN, Kind
 
 _LARGEST_MU = 1e6

@@ -15,32 +15,106 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from finger3d._types import Float
-from finger3d.accuracy.richardson import gain
-from finger3d.analyses.calibrate.curve_points import CurvePoints
-from finger3d.analyses.calibrate.increments import error_of_increments
-from finger3d.analyses.calibrate.reference import ReferenceBody, read
+from finger3d.accuracy.error_bars import gain
+from finger3d.accuracy.estimate import times_modulus
+from finger3d.analyses.calibrate.curve_points import CurvePoints, error_of_increments
 from finger3d.analyses.calibrate.settings import CalibratedReading, CalibrationSettings
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.calibrate.variations import deeper, poisson_steps, tilted_mesh, with_modulus
-from finger3d.analyses.pressed_body import under
+from finger3d.analyses.pressed_body import presses, under
 from finger3d.errors import Finger3dError
+from finger3d.fem.laws.material import MIXED_FROM
 from finger3d.mechanics.discretise.build import changed
-from finger3d.mechanics.discretise.companions import companion, edge_ratio
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.companions import built_like, companion, edge_ratio
+from finger3d.mechanics.discretise.contact_points import MARGIN
+from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.step_halving import with_few_increments
-from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.gauges import Gauge
-from finger3d.mechanics.readings.quantities import Quantity
+from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.readings import Column, Gauge, Quantity
 from finger3d.objects import Plane
 from finger3d.progress import Progress
 from finger3d.sensor.curve import LARGEST_SD, Tolerance
+
+
+@dataclass(frozen=True)
+class ReferenceBody:
+    """Body that others are compared with: readings (k, m) by names (k) at mu (m,)."""
+
+    problem: Problem
+    names: tuple[str, ...]
+    mu: Float
+    readings: Float
+
+    @classmethod
+    def of(cls, problem: Problem, names: tuple[str, ...], mu: Float) -> ReferenceBody:
+        """Press a problem at mu (m,)."""
+        return cls(problem, names, mu, read(problem, names, mu))
+
+    def change(self, problem: Problem) -> Float:
+        """Return the changes (k, m) of the readings in another body or path."""
+        return np.asarray(read(problem, self.names, self.mu) - self.readings)
+
+    def rebuilt(self, margin: float = MARGIN, **changes: Any) -> Problem:
+        """Build the body with a changed model; other readings are omitted, except gauges that stiffen the body."""
+        model = replace(reading_only(self.problem.model, self.names), **changes)
+        return built_like(self.problem, model, margin=margin)
+
+
+def reading_only(model: Model, names: Sequence[str]) -> Model:
+    """Return the model without readings of other names; gauges that stiffen the body are kept."""
+    dim = 3 if model.domain == "solid" else 2
+    wanted = set(names)
+    return replace(
+        model,
+        gauges=model.gauges if model.inclusions else tuple(g for g in model.gauges if g.name in wanted),
+        markers=tuple(m for m in model.markers if wanted & {column.name for column in m.columns(dim)}),
+        taxels=tuple(t for t in model.taxels if t.name in wanted),
+    )
+
+
+def read(problem: Problem, names: Sequence[str], mu: Float) -> Float:
+    """Return readings (k, m) by names (k) at mu (m,), NaN where a press failed."""
+    frames = [p.frame for p in sorted(presses(problem, mu.tolist()), key=lambda p: p.mu)]
+    every = [frame.named_readings if frame.outcome.ok else {} for frame in frames]
+    return np.array([[one.get(name, math.nan) for one in every] for name in names])
+
+
+_TILTED_POINTS = {2: 100, 3: 500}
+"""Contact points, by dimension, that the mesh of a tilted body has about."""
+
+
+def deeper(legs: tuple[Leg, ...], step: float) -> tuple[Leg, ...]:
+    """Return the legs with a step (mm) added to every depth but that of first touch."""
+    return tuple(replace(leg, depth_mm=leg.depth_mm + step * (leg.depth_mm > 0.0)) for leg in legs)
+
+
+def poisson_steps(nu: float, step: float) -> tuple[float, float]:
+    """Return two steps of Poisson's ratio of the same element: to both sides, or one and two to the side with room."""
+    low, high = (MIXED_FROM, 0.5) if nu >= MIXED_FROM else (0.0, MIXED_FROM - 1e-9)
+    if low <= nu - step and nu + step <= high:
+        return -step, step
+    room = max(high - nu, low - nu, key=abs)
+    step = math.copysign(min(step, 0.5 * abs(room)), room)
+    return step, 2.0 * step
+
+
+def with_modulus(problem: Problem, factor: float) -> Problem:
+    """Return the problem with Young's moduli of all parts multiplied."""
+    return changed(problem, times_modulus(problem.model, factor))
+
+
+def tilted_mesh(problem: Problem) -> MeshOptions:
+    """Return the mesh options of a tilted body: longer edges, and a structured mesh where the design allows one."""
+    options, left = problem.model.mesh, len(problem.points.nodes) / _TILTED_POINTS[problem.dim]
+    factor = min(2.0, max(1.0, left)) if problem.dim == 2 else min(1.5, max(1.25, math.sqrt(left)))
+    mesher: Any = "swept" if problem.model.design.section() is not None else options.mesher
+    return replace(options, size_mm=factor * options.size_mm, base_size_mm=factor * options.base_size_mm, mesher=mesher)
+
 
 _FEW = 20
 """Most increments of a leg in which the effect of a tolerance is pressed, if they are chosen: it is a difference, and

@@ -20,8 +20,7 @@ from scipy.interpolate import RBFInterpolator
 from finger3d._types import Float
 from finger3d.analyses.free_keys import FreeKey, values_at
 from finger3d.analyses.identify.material_tests import LawInTests
-from finger3d.analyses.identify.measured import SHARPEST, MeasuredPress
-from finger3d.analyses.identify.simulated import MODULI, OFFSET, Simulation
+from finger3d.analyses.identify.presses import MODULI, OFFSET, SHARPEST, MeasuredPress, Simulation
 from finger3d.errors import Finger3dError
 
 _OFFSETS = np.linspace(0.0, 1.0, 33)

@@ -12,14 +12,13 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.free_keys import FreeKey
-from finger3d.analyses.identify.measured import INDEX, STD, check_stds
-from finger3d.analyses.identify.simulated import MODULI, with_last_share
+from finger3d.analyses.identify.presses import INDEX, MODULI, STD, check_stds, with_last_share
 from finger3d.csv_table import CsvTable, read_table
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import CONSTANTS, Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw
-from finger3d.fem.laws.material_tests import LARGEST_STRETCH, TESTS, nominal_stress, principal_stretches, rising_to
+from finger3d.fem.laws.base import LARGEST_STRETCH, TESTS, nominal_stress, principal_stretches, rising_to
 from finger3d.scene import Scene
 from finger3d.scene.messages import choose, listed
 

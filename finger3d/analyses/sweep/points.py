@@ -14,12 +14,12 @@ import numpy as np
 from finger3d._types import Tree, TreeView
 from finger3d.analyses.effects_by_need import settled
 from finger3d.analyses.free_keys import FreeKey, check_distinct
-from finger3d.analyses.shared_body import Variant, body_key, finest
+from finger3d.analyses.pressed_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.postprocess.marker_grid import grid_markers
-from finger3d.mechanics.readings.reading import Marker
+from finger3d.mechanics.readings import Marker
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Scene, Source, parse, tables_of, tree
 from finger3d.scene import files as bodies

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from finger3d.analyses.shared_body import SharedBody, VariantResult, body_key
+from finger3d.analyses.pressed_body import SharedBody, VariantResult, body_key
 from finger3d.analyses.sweep.labels import SAMPLE
 from finger3d.analyses.sweep.points import BodySpec, Point
 from finger3d.errors import FAILURES, Finger3dError
-from finger3d.mechanics.readings.columns import by_key
+from finger3d.mechanics.readings import by_key
 from finger3d.results.journal import Row
 from finger3d.scene import parse
 

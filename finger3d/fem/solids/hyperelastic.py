@@ -22,11 +22,40 @@ from finger3d.fem.assembly import Pattern, Stiffness, cell_parts, pressure_scale
 from finger3d.fem.laws import IsochoricLaw
 from finger3d.fem.laws.base import Inhomogeneous
 from finger3d.fem.laws.material import LEAST_COMPRESSIBILITY, MIXED_FROM, Isotropic
-from finger3d.fem.mesh.elements import quadrature
-from finger3d.fem.mesh.simplex import Mesh
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.solids.stiff import STIFF, hookean_stress
+from finger3d.fem.mesh import Mesh, MeshPart, cells_at, quadrature
+from finger3d.fem.recovery import averaged, displacement, nodal_gradient, nodal_pressure
 from finger3d.fem.tensors import InvertedError, cofactor, determinant
+
+STIFF = 1e4
+"""Young's modulus, over the least of all parts, from which a part strains so little that every law has the stress
+of Hooke's law.  In the round-off of F the forces of a part 1e5 times as stiff as another one are lost."""
+
+
+def hookean_stress(
+    slope: Float, f: Float, p: Float | None, moduli: tuple[Float, Float], past: Float, plane_stress: bool
+) -> Float:
+    """Return the first Piola-Kirchhoff stress (s, 3, 3) MPa of Hooke's law for the Green-Lagrange strain.
+
+    Parameters
+    ----------
+    slope, f : (s, d, d), (s, 3, 3) displacement and deformation gradients
+    p : (s,) MPa, the pressure of the mixed form; None in the displacement form
+    moduli : shear and bulk moduli (s,) MPa
+    past : (s, 3, 3) MPa, second Piola-Kirchhoff stress that has relaxed
+    """
+    shear, bulk = 2.0 * moduli[0], moduli[1]
+    h, unit, d = np.zeros_like(f), np.eye(3), slope.shape[-1]
+    h[:, :d, :d] = slope
+    strain = 0.5 * (h + np.swapaxes(h, 1, 2) + np.swapaxes(h, 1, 2) @ h)
+    dilatation = np.trace(strain, axis1=1, axis2=2)
+    if plane_stress:
+        across = (past[:, 2, 2] + (shear / 3.0 - bulk) * dilatation) / (2.0 / 3.0 * shear + bulk)
+        strain[:, 2, 2], dilatation = across, dilatation + across
+    second = shear[:, None, None] * (strain - dilatation[:, None, None] / 3.0 * unit) - past
+    if p is None:
+        return np.asarray(f @ (second + (bulk * dilatation)[:, None, None] * unit))
+    return np.asarray(f @ second + p[:, None, None] * cofactor(f))
+
 
 _THICKNESS_ITERATIONS, _THICKNESS_ERROR = 60, 1e-9
 """Iterations for the stretch of the thickness at most, and relative change of it in the last: the next change would be
@@ -372,3 +401,49 @@ class TotalLagrangian:
     def elastic_stress(self, x: Float, relaxing: Relaxing | None, volumetric: bool) -> Float:
         """Return the elastic second Piola-Kirchhoff stress (m, 3, 3) MPa at the quadrature points."""
         return self.material.elastic_stress(self.deformation(x, relaxing), self.pressures(x), relaxing, volumetric)
+
+
+def stretch(mesh: Mesh, u: Float, point: Float, direction: Float) -> float:
+    """Relative elongation |F d| - 1 at `point` (d,) along the unit `direction` (d,), mean over cells that hold it."""
+    elongations = []
+    for cell, bary in cells_at(mesh, point):
+        nodes = mesh.cells[cell]
+        slope = u[nodes].T @ mesh.element.physical_gradients(mesh.points[nodes][None], bary[None])[0][0, 0]
+        elongations.append(np.linalg.norm(direction + slope @ direction) - 1.0)
+    return float(np.mean(elongations))
+
+
+def nodal_fields(body: TotalLagrangian, x: Float) -> tuple[Float, Float, Float]:
+    """Return deformation gradient, Green-Lagrange strain and elastic Cauchy stress (n, 3, 3) at the nodes.
+
+    They follow from the volume-weighted mean of the displacement gradient at every node.  At a node where it is folded
+    over they are those of a quadrature point beside it.
+    """
+    points = len(quadrature(body.mesh.dim, 2)[0])
+    u = displacement(body.mesh, x)
+    vertex_pressure = body.pressure_scale * x[body.mesh.points.size :]
+
+    def of_part(part: MeshPart) -> tuple[Float, Float]:
+        first = part.cells[0] * points  # one point stands for all of a part
+        material = body.material.of_points(slice(first, first + 1))
+        f = material.deformation(_sound_gradient(part.mesh, u[part.nodes]))
+        p = nodal_pressure(part.mesh, vertex_pressure[part.corners]) if material.mixed else None
+        return f, material.stress(f, p) @ np.swapaxes(f, 1, 2) / determinant(f)[:, None, None]
+
+    f, cauchy = averaged(body.mesh, of_part)
+    return f, 0.5 * (np.swapaxes(f, 1, 2) @ f - np.eye(3)), cauchy
+
+
+def _sound_gradient(mesh: Mesh, u: Float) -> Float:
+    """Displacement gradient (n, d, d) at the nodes, where it is folded over that of a quadrature point beside it."""
+    slope = nodal_gradient(mesh, u)
+    folded = np.linalg.det(slope + np.eye(mesh.dim)) <= 0.0
+    if folded.any():
+        bary, _ = quadrature(mesh.dim, 2)
+        nearest = (mesh.element.nodes @ bary.T).argmax(axis=1)
+        cells, local = np.nonzero(folded[mesh.cells])
+        for q in np.unique(nearest[local]):
+            one, nodes = cells[nearest[local] == q], local[nearest[local] == q]
+            gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells[one]], bary[q : q + 1])
+            slope[mesh.cells[one, nodes]] = np.einsum("eki,ekj->eij", u[mesh.cells[one]], gradients[:, 0])
+    return slope

@@ -17,13 +17,12 @@ from finger3d._cost import PressSize, duration
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.mesh.parts import elasticity_of, moduli_of
-from finger3d.fem.mesh.simplex import CONTACT, Mesh
+from finger3d.fem.laws.material import elasticity_of, moduli_of
+from finger3d.fem.mesh import CONTACT, Mesh
 from finger3d.fem.solvers.condense import Condensation, condense, stiffened
-from finger3d.fem.surface.traces import BoundarySurface, local_rows, restrict
-from finger3d.mechanics.discretise.contact_geometry import MARGIN, contact_geometry, may_touch
-from finger3d.mechanics.discretise.gauge_refinement import locally_refined
-from finger3d.mechanics.discretise.moved_mesh import stretched, with_points_of
+from finger3d.fem.surface import BoundarySurface, local_rows, restrict
+from finger3d.mechanics.discretise.body_mesh import locally_refined, stretched, with_points_of
+from finger3d.mechanics.discretise.contact_points import MARGIN, contact_geometry, may_touch
 from finger3d.mechanics.discretise.problem import (
     CondensedBody,
     ContactSystem,
@@ -37,11 +36,11 @@ from finger3d.mechanics.discretise.resolution import check
 from finger3d.mechanics.discretise.symmetry import active_dofs, held_dofs, symmetry, unfold_points
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
-from finger3d.mechanics.readings.reading import MeshedBody
+from finger3d.mechanics.readings import MeshedBody
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.limits import check_rows
 from finger3d.meshing.report import MeshReport
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress
 

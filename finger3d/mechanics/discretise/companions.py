@@ -15,16 +15,16 @@ from dataclasses import replace
 import numpy as np
 
 from finger3d.errors import Finger3dError, UnresolvedError
-from finger3d.fem.surface.traces import contact_face, surface
+from finger3d.fem.surface import contact_face, surface
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.contact_geometry import MARGIN
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.given.given import GivenMesh
-from finger3d.meshing.refinement.grading import SizedPlaces
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.given import GivenMesh
+from finger3d.meshing.sizing import SizedPlaces
+from finger3d.meshing.swept import mesh_section
 from finger3d.progress import QUIET, Progress
 
 FACTOR = 2.0

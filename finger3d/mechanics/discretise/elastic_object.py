@@ -3,7 +3,7 @@
 The object is meshed and condensed like the finger, in small strain, and held where it is gripped: the lower half of a
 cylinder or ball on its cut; behind a plane, wedge or wave a block as long and wide as the finger, on its far face; a
 body from a file on its highest plane.  Its surface is read at the finger's own contact points, as the same weighted
-means (`finger3d.fem.surface.traces`), so the two meshes need not match and contact forces are equal and opposite.
+means (`finger3d.fem.surface`), so the two meshes need not match and contact forces are equal and opposite.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from finger3d._types import Float, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.simplex import Mesh, axis_numbers, reflected
+from finger3d.fem.mesh import Mesh, axis_numbers, reflected
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.traces import facing_trace
+from finger3d.fem.surface import facing_trace
 from finger3d.geometry.design import Design
 from finger3d.geometry.registry import designs
-from finger3d.mechanics.discretise.moved_mesh import stretched_object, with_points_of
+from finger3d.mechanics.discretise.body_mesh import stretched_object, with_points_of
 from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.model import ElasticObject, MeshOptions, Model
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.options import Mesher, Zone
-from finger3d.meshing.structured.swept import mesh_section
+from finger3d.meshing.sizing import Mesher, Zone
+from finger3d.meshing.swept import mesh_section
 from finger3d.objects import HeldBody, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress
 

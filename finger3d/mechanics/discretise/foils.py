@@ -22,13 +22,12 @@ import scipy.sparse as sp
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.mesh.locate import cells_at
-from finger3d.fem.mesh.simplex import Mesh, reflect_into_part
+from finger3d.fem.mesh import Mesh, cells_at, reflect_into_part
 from finger3d.fem.solids.bars import AddedStiffness, Bars
 from finger3d.fem.solids.kelvin import FoilPatches, InfiniteBody
-from finger3d.fem.surface.traces import displacement_rows
+from finger3d.fem.surface import displacement_rows
 from finger3d.mechanics.model import Foils, Model
-from finger3d.mechanics.readings.gauges import Gauge
+from finger3d.mechanics.readings import Gauge
 
 _COINCIDENT = 1e-9  # mm, and radians
 

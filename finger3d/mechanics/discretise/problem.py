@@ -15,18 +15,16 @@ from finger3d.contact.newton import uniqueness
 from finger3d.contact.state import ContactState
 from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import Stiffness
-from finger3d.fem.mesh.parts import LinearElasticity, moduli_of
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh
-from finger3d.fem.recovery.recover import strain_and_stress
+from finger3d.fem.laws.material import LinearElasticity, moduli_of
+from finger3d.fem.mesh import FREE_FACES, Mesh
+from finger3d.fem.recovery import strain_and_stress
 from finger3d.fem.solids.bars import AddedStiffness
 from finger3d.fem.solvers.condense import Condensation
-from finger3d.fem.surface.traces import BoundarySurface, joined, surface
-from finger3d.mechanics.discretise.contact_geometry import contact_geometry, may_touch
-from finger3d.mechanics.discretise.contact_points import ContactPoints
+from finger3d.fem.surface import BoundarySurface, joined, surface
+from finger3d.mechanics.discretise.contact_points import ContactPoints, contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.readings.columns import Column
-from finger3d.mechanics.readings.reading import MeshedBody
+from finger3d.mechanics.readings import Column, MeshedBody
 from finger3d.meshing.report import MeshReport
 from finger3d.objects import ObjectPose, PlacedObject, SecondFinger, vertical_frame
 

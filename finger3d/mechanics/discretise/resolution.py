@@ -1,4 +1,4 @@
-"""Whether the contact points resolve the shape of the object.
+"""Whether the contact points resolve the shape of the object, and the edge length at which they would.
 
 The gap of a contact point is an average over its hat function, so that a part of the object between the points, or
 one that is lost in the average, is not represented.  The *unresolved overlap* at a place is the overlap of object and
@@ -12,22 +12,129 @@ normal, and points of walls and ends count too: a flank may touch the finger fro
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from finger3d._types import Float
 from finger3d.errors import UnresolvedError
-from finger3d.fem.mesh.simplex import CONTACT
-from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
+from finger3d.fem.mesh import CONTACT
+from finger3d.fem.surface import BoundarySurface, contact_face, restrict
 from finger3d.geometry.design import DesignSummary
+from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem, rigid_gap
-from finger3d.mechanics.discretise.regular_points import Box, regular_points
-from finger3d.mechanics.discretise.size_advice import is_meshable_at, rounded_down, size_advice
+from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
+from finger3d.meshing.generate import is_meshable
 from finger3d.objects import ObjectPose, PlacedObject, RigidObject
+
+_LATTICE, _POSES = 100, 4
+"""Places along each side of the finger at which the object is looked for, and poses along each leg."""
+
+
+def is_meshable_at(model: Model, size: float) -> bool:
+    """Return whether a press with an edge length (mm) in the contact zone is estimated to fit into memory."""
+    options = replace(model.mesh, size_mm=size, base_size_mm=max(size, model.mesh.base_size_mm))
+    dim, zone, axes = 3 if model.domain == "solid" else 2, model.first_contact.contact_box, symmetry(model)
+    extents = [2.0 * model.design.half_length_mm, model.design.width_mm][: dim - 1]
+    rows = dim * _candidate_share(model) * math.prod(extent / size for extent in extents) / 2 ** len(axes)
+    return is_meshable(model.design, options, zone, dim, axes, rows)
+
+
+def _candidate_share(model: Model) -> float:
+    """Return the share of the finger's plan that comes near the object, where contact points are candidates."""
+    width, line = model.design.width_mm * (model.domain == "solid"), np.linspace(-0.5, 0.5, _LATTICE)
+    x, z = np.reshape(np.meshgrid(2.0 * model.design.half_length_mm * line, width * line), (2, -1))
+    y, path = model.design.top(x, z), targets(tuple(replace(leg, steps=_POSES) for leg in model.legs))
+    placed = (PlacedObject.of(model.object, model.first_contact.first_contact_mm, pose) for pose in path)
+    near = np.any([obj.overlap(x, y, z) > -MARGIN * model.largest_depth_mm for obj in placed], axis=0)
+    return float(near.mean())
+
+
+def size_advice(model: Model, size: float, effect: str, otherwise: str) -> str:
+    """Return the advice of an edge length (mm), rounded down, and its effect, or of something else without memory."""
+    size = rounded_down(size)
+    if is_meshable_at(model, size):
+        return f"mesh.size_mm = {size:g} {effect}"
+    return f"no mesh.size_mm whose press fits into this machine's memory {effect}; {otherwise}"
+
+
+def rounded_down(size: float) -> float:
+    """Return a length rounded down to two digits."""
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    return float(f"{math.floor(size / unit * (1.0 + 1e-12)) * unit:.2g}")
+
+
+Box = tuple[float, float, float, float]
+
+
+def regular_points(model: Model, box: Box, size_mm: float, middle: Float | None = None) -> BoundarySurface:
+    """Return a regular grid of contact points over a box.
+
+    Parameters
+    ----------
+    box : (x_min, x_max, z_min, z_max), mm
+    size_mm : distance of the points
+    middle : (2,) array, mm
+        Place in the middle of four points; by default the origin.
+    """
+    design, solid = model.design, model.domain == "solid"
+    half = (design.half_length_mm, 0.5 * design.width_mm)
+    middle = np.zeros(2) if middle is None else middle
+    lines = [_lines(box[2 * k : 2 * k + 2], half[k], size_mm, middle[k]) for k in range(2 if solid else 1)]
+    hats = [_hats(line) for line in lines]
+    places, means = [h[0] for h in hats], [h[1] for h in hats]
+    samples = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(lines))
+    points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
+    mean = means[0] if len(means) == 1 else sp.kron(*means, format="csr")
+    height, y = (design.top(p[:, 0], p[:, 1] if solid else 0.0 * p[:, 0]) for p in (samples, points))
+    used = np.isfinite(height)
+    mean = sp.csr_matrix(mean)[:, used]
+    weight = np.asarray(mean.sum(axis=1)).ravel()
+    kept = (weight > 0.0) & np.isfinite(y)
+    mean = sp.csr_matrix(sp.diags_array(1.0 / weight[kept]) @ mean[kept])
+    samples, points = (np.insert(p, 1, v, axis=1) for p, v in ((samples[used], height[used]), (points[kept], y[kept])))
+    return BoundarySurface(
+        nodes=np.arange(len(points)),
+        face=np.full(len(points), CONTACT, dtype=np.int8),
+        points=points,
+        area=np.ones(len(points)),
+        normals=np.zeros_like(points),
+        trace=sp.csr_matrix((len(points), 0)),
+        samples=samples,
+        average=mean,
+        interpolate=sp.csr_matrix((len(samples), 0)),
+        hats=mean,
+    )
+
+
+def _lines(box: Sequence[float], half: float, size: float, middle: float) -> Float:
+    """Return the coordinates of contact points along one axis, with the ends of the finger."""
+    low, high = max(box[0] - size, -half), min(box[1] + size, half)
+    first, last = math.ceil((low - middle) / size - 0.5), math.floor((high - middle) / size - 0.5)
+    inner = middle + (np.arange(first, last + 1) + 0.5) * size
+    ends = [v for v in (low, high) if abs(v) == half]
+    line = np.unique(np.concatenate([inner, ends]))
+    return line if len(line) > 1 else np.array([low, high])
+
+
+def _hats(line: Float) -> tuple[Float, sp.csr_matrix]:
+    """Return quadrature points (q,) between coordinates (n,), and the mean of samples over each hat function (n, q)."""
+    x, w = np.polynomial.legendre.leggauss(4)
+    weight = 0.5 * (x + 1.0)
+    steps = np.diff(line)
+    places = (line[:-1, None] + weight * steps[:, None]).ravel()
+    mean = np.zeros((len(line), len(steps), 4))
+    number = np.arange(len(steps))
+    mean[number, number] = (1.0 - weight) * w * steps[:, None]
+    mean[number + 1, number] = weight * w * steps[:, None]
+    rows = mean.reshape(len(line), -1)
+    return places, sp.csr_matrix(rows / rows.sum(axis=1, keepdims=True))
+
 
 REFUSE_ABOVE, _WARN_ABOVE = 0.5, 0.1
 """Unresolved overlap, over the depth of the press, above which a press is refused, and above which it warns."""

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, freeze_arrays
 from finger3d.contact.state import ContactState
-from finger3d.fem.mesh.parts import LinearElasticity, contact_compliance
-from finger3d.fem.mesh.simplex import FREE_FACES, Mesh, axis_numbers, unfold
-from finger3d.fem.surface.traces import BoundarySurface
+from finger3d.fem.laws.material import LinearElasticity, contact_compliance
+from finger3d.fem.mesh import FREE_FACES, Mesh, axis_numbers, unfold
+from finger3d.fem.surface import BoundarySurface
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.model import Model
 from finger3d.objects import PlacedObject, vertical_frame

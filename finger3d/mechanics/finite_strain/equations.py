@@ -22,26 +22,26 @@ import scipy.sparse as sp
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, augmentation_parameters, residual
-from finger3d.contact.rules import RULES
+from finger3d.contact.solve import RULES
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.assembly import on_places
-from finger3d.fem.recovery.recover import displacement
+from finger3d.fem.recovery import displacement
 from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface.finite_contact import DeformedContact
+from finger3d.fem.surface import DeformedContact
 from finger3d.fem.tensors import InvertedError, rotated_delassus
 from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
-from finger3d.mechanics.finite_strain.body import FiniteBody
-from finger3d.mechanics.finite_strain.state import (
+from finger3d.mechanics.finite_strain.body import (
     DeformedBody,
+    FiniteBody,
     FiniteStrainWorkspace,
     Linearisation,
     contact_of,
     curvature_of,
 )
 from finger3d.mechanics.formulation import length_scale
-from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import advanced, carried_by_object, motion_until_touch, transported
+from finger3d.mechanics.history import State
+from finger3d.mechanics.small_strain import advanced, carried_by_object, motion_until_touch, transported
 from finger3d.objects import Move, vertical_frame
 
 _NEGLIGIBLE = 1e-6

@@ -16,12 +16,12 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
-from finger3d.fem.mesh.parts import elasticity_of
-from finger3d.fem.mesh.simplex import Mesh, reflected, side_by_side
-from finger3d.fem.surface.traces import BoundarySurface, restrict
+from finger3d.fem.laws.material import elasticity_of
+from finger3d.fem.mesh import Mesh, reflected, side_by_side
+from finger3d.fem.surface import BoundarySurface, restrict
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import held_dofs
-from finger3d.mechanics.results.state import State
+from finger3d.mechanics.history import State
 from finger3d.objects import ObjectPose, SecondFinger
 
 FINGERS = "lower", "upper"

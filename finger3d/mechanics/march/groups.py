@@ -12,13 +12,12 @@ from typing import Any
 
 from finger3d.contact.state import ContactSolution
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.finite_strain.body import FiniteStrainWorkspace
 from finger3d.mechanics.finite_strain.formulation import Beginning, increments
-from finger3d.mechanics.finite_strain.state import FiniteStrainWorkspace
 from finger3d.mechanics.formulation import Workspace
+from finger3d.mechanics.history import State, StepResult
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.path import stations
-from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.state import State
 from finger3d.objects import Move
 
 

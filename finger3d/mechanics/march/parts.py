@@ -14,8 +14,8 @@ from finger3d.contact.state import SNAPPED, ContactSolution, ContactState
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.results.state import State
-from finger3d.mechanics.small_strain.linear_contact import transported
+from finger3d.mechanics.history import State
+from finger3d.mechanics.small_strain import transported
 from finger3d.objects import Move, ObjectPose
 
 FIRST_PARTS = 1.0 / 16.0, 0.25

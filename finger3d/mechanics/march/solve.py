@@ -11,20 +11,19 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.solve import STEP_DEPENDENT_RULES
 from finger3d.contact.state import ContactSolution
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import GeneralisedForces, forces_on
+from finger3d.mechanics.history import State, StepResult
 from finger3d.mechanics.march.equilibrium import ToForces
 from finger3d.mechanics.march.grip import Grip
 from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, solved_in_turn
 from finger3d.mechanics.path import Load, Station, stations
-from finger3d.mechanics.readings.columns import Column, in_order, strain_columns
-from finger3d.mechanics.results.history import StepResult
-from finger3d.mechanics.results.state import State
+from finger3d.mechanics.readings import Column, in_order, strain_columns
 from finger3d.objects import Move, ObjectPose
 from finger3d.progress import QUIET, Progress
 

@@ -26,17 +26,17 @@ from typing import TypeAlias, TypeVar
 
 from finger3d._cost import AUTOMATIC_S, PressSize
 from finger3d._types import Float
-from finger3d.contact.rules import STEP_DEPENDENT_RULES
+from finger3d.contact.solve import STEP_DEPENDENT_RULES
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.companions import coarse_companions
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import CUTS, march
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START, stations
-from finger3d.mechanics.readings.columns import by_key, of_kind
-from finger3d.mechanics.results.history import StepResult, measure
+from finger3d.mechanics.readings import by_key, of_kind
 
 Measurement = Callable[[Problem, StepResult], dict[str, float]]
 """Quantities by name, measured at the end of a press."""
@@ -231,7 +231,7 @@ def _refined_beside(
 def rough_workspace(problem: Problem) -> Workspace:
     """Return an empty workspace in which increments at finite strain end at the residual `ROUGH`."""
     if problem.model.finite_strain:
-        from finger3d.mechanics.finite_strain.state import FiniteStrainWorkspace  # a press imports what its scene names
+        from finger3d.mechanics.finite_strain.body import FiniteStrainWorkspace  # a press imports what its scene names
 
         return FiniteStrainWorkspace(target=ROUGH)
     workspace: Workspace = formulation_of(problem.model).workspace()

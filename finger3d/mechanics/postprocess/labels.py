@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import STATUS_NAMES
-from finger3d.fem.mesh.simplex import CONTACT, Mesh
-from finger3d.fem.surface.traces import values_over
+from finger3d.fem.mesh import CONTACT, Mesh
+from finger3d.fem.surface import values_over
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult, pose_entry
 from finger3d.mechanics.postprocess.marker_grid import MarkerGrid, grid_markers
-from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult, pose_entry
+from finger3d.mechanics.readings import Marker
 
 Sample: TypeAlias = Mapping[str, NDArray[Any]]
 """Arrays of a sample by name: fields (s, nx, nz) or (s, nx, nz, k) after s increments, poses (s,), and the grid."""

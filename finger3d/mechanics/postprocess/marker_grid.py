@@ -9,17 +9,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Tree
-from finger3d.fem.mesh.simplex import FREE_FACES, axis_numbers
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import values_over
+from finger3d.fem.mesh import FREE_FACES, axis_numbers
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import values_over
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.readings.columns import Column, displacement_columns
-from finger3d.mechanics.readings.reading import Marker
-from finger3d.mechanics.results.history import StepResult, pose_entry
-from finger3d.meshing.given.given import GivenMesh
+from finger3d.mechanics.history import StepResult, pose_entry
+from finger3d.mechanics.readings import Column, Marker, displacement_columns
+from finger3d.meshing.given import GivenMesh
 
 _INWARD = 1e-9
 """Share of the way to the middle of a facet by which a point on its border is moved: its line then meets the facet."""

@@ -1,4 +1,4 @@
-"""Penetration of the finger's free surface into the object, between the candidate points and outside them."""
+"""Penetration of the finger's free surface into the object, and of the surface of a cavity into itself."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN
-from finger3d.fem.mesh.simplex import CONTACT, FREE_FACES
-from finger3d.fem.recovery.recover import displacement
-from finger3d.fem.surface.traces import BoundarySurface, contact_face, restrict
-from finger3d.mechanics.discretise.contact_geometry import may_touch
+from finger3d.fem.mesh import CONTACT, FREE_FACES, TRIANGLES, Mesh
+from finger3d.fem.recovery import displacement
+from finger3d.fem.surface import BoundarySurface, contact_face, restrict
+from finger3d.mechanics.discretise.contact_points import may_touch
 from finger3d.mechanics.discretise.problem import Problem, free_surface, rigid_gap
-from finger3d.mechanics.discretise.resolution import vertical_overlap
-from finger3d.mechanics.discretise.size_advice import rounded_down, size_advice
+from finger3d.mechanics.discretise.resolution import rounded_down, size_advice, vertical_overlap
 from finger3d.mechanics.formulation import length_scale
 from finger3d.mechanics.formulations import formulation_of
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
-from finger3d.mechanics.results.history import StepResult
 from finger3d.objects import DistanceTracker, Move, ObjectPose
 
 _TOUCHES = {True: 1e-9, False: 1e-3}
@@ -193,4 +192,35 @@ def increments_without_contact(problem: Problem, steps: Sequence[StepResult]) ->
     return [
         f"{len(missed)} of {len(steps)} increments reach no contact point and have no force, at depths up to "
         f"{max(missed):.3g} mm; lower mesh.size_mm"
+    ]
+
+
+CAVITY = "cavity"
+"""Label of the facets of inner surfaces."""
+
+
+def cavity_warnings(mesh: Mesh, displacement: Float) -> list[str]:
+    """Return a warning if the inner surface of a solid crosses itself: nothing keeps its faces apart.
+
+    Parameters
+    ----------
+    mesh : the whole finger at rest, mm
+    displacement : (n, 3) mm
+    """
+    facets = mesh.facets.get(CAVITY)
+    if facets is None or not len(facets):
+        return []
+    from finger3d.geometry.surface import Triangles
+    from finger3d.geometry.surface_checks import crossings
+
+    triangles = facets[:, TRIANGLES].reshape(-1, 3) if facets.shape[1] == 6 else facets
+    nodes, faces = np.unique(triangles, return_inverse=True)
+    pairs = crossings(Triangles((mesh.points + displacement)[nodes], faces.reshape(-1, 3)))
+    if not len(pairs):
+        return []
+    where = (mesh.points[nodes[faces.reshape(-1, 3)[pairs[0]]]]).mean(axis=0)
+    return [
+        "the inner surface of the finger crosses itself near x, y, z = "
+        + ", ".join(f"{value:.3g}" for value in where)
+        + " mm at rest: its faces do not touch in this model; press less deep, or make the wall thicker"
     ]

@@ -16,11 +16,10 @@ from finger3d._cost import netgen_limit_s
 from finger3d._extras import require
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import checked_tets
-from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.refinement.sizing import RATE, Sizing, sizing
+from finger3d.meshing.sizing import RATE, MeshSizes, Sizing, Zone, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,
@@ -45,7 +44,7 @@ def new_mesh(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     require('mesh.mesher = "netgen"', "build123d", "netgen", instead='set mesh.mesher = "swept"')
     if design.tessellation() is not None:

@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike
 from finger3d._child import ChildError, in_child
 from finger3d._types import Array, Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.quality import curved_volume
-from finger3d.fem.mesh.simplex import Mesh, signed_volumes
+from finger3d.fem.mesh import Mesh, curved_volume, signed_volumes
 from finger3d.geometry.design import Design
-from finger3d.meshing.refinement.grading import Grading
-from finger3d.meshing.refinement.sizing import Sizing
+from finger3d.meshing.sizing import Grading, Sizing
 
 if TYPE_CHECKING:
     from finger3d.geometry.parts import Glued
@@ -69,7 +67,7 @@ def check_volume(design: Design, body: Tessellation, symmetry: tuple[str, ...]) 
 
 def finer_in_layers(field: Sizing, body: Tessellation) -> Sizing:
     """Return the size field with edge lengths at every part that are no longer than the part is thick."""
-    from finger3d.meshing.given.interfaces import points_on, thickness
+    from finger3d.meshing.unstructured.snap import points_on, thickness
 
     if not body.part_labels:
         return field
@@ -96,7 +94,7 @@ def on_cad(points: Float, tets: Int, body: Tessellation, mesher: str) -> Mesh:
     UnusableMeshError
         If the tets do not fill the body or one of its parts, are inverted, or cannot be snapped.
     """
-    from finger3d.meshing.structured.snap import snap
+    from finger3d.meshing.unstructured.snap import snap
 
     part = None
     if body.part_labels:
@@ -110,7 +108,7 @@ def on_cad(points: Float, tets: Int, body: Tessellation, mesher: str) -> Mesh:
 def _in_parts(points: Float, tets: Int, body: Tessellation) -> tuple[Float, Int, Int]:
     """Return the points and tets inside the body, and the part (t,) of each tet."""
     from finger3d.geometry.parts import OUTSIDE
-    from finger3d.meshing.given.interfaces import parts_of
+    from finger3d.meshing.unstructured.snap import parts_of
 
     part = parts_of(points[tets].mean(axis=1), body)
     inside = part != OUTSIDE
@@ -120,7 +118,7 @@ def _in_parts(points: Float, tets: Int, body: Tessellation) -> tuple[Float, Int,
 
 def _check_volumes(mesh: Mesh, body: Tessellation) -> None:
     """Raise an UnusableMeshError if the curved cells of a part do not fill its surface."""
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     part = np.zeros(len(mesh.cells), dtype=np.int64) if mesh.part is None else mesh.part
     for number, label in enumerate(("", *body.part_labels)):
@@ -134,7 +132,7 @@ def _check_volumes(mesh: Mesh, body: Tessellation) -> None:
 
 def check_tets(points: Float, tets: Int, volume_mm3: float, mesher: str = "pytetwild") -> None:
     """Raise an UnusableMeshError for no tets, inverted ones, or ones that do not fill the body."""
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     if not len(tets):
         raise UnusableMeshError(f"{mesher} returned no cells")
@@ -159,7 +157,7 @@ def run_mesher(mesher: Callable[..., Mapping[str, Array]], limit: float, **argum
     UnusableMeshError
         If the process crashes, or does not end in time.
     """
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     try:
         result = in_child(mesher, limit, **arguments)

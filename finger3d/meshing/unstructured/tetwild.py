@@ -17,13 +17,12 @@ from finger3d._extras import require
 from finger3d._ranges import at_least
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh.simplex import Mesh
+from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.meshing.limits import checked_tets
-from finger3d.meshing.options import MeshSizes, Zone
-from finger3d.meshing.refinement.sizing import Sizing, sizing
+from finger3d.meshing.sizing import MeshSizes, Sizing, Zone, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,
@@ -57,7 +56,7 @@ def new_mesh(
     design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
-    from finger3d.meshing.structured.snap import UnusableMeshError
+    from finger3d.meshing.unstructured.snap import UnusableMeshError
 
     require('mesh.mesher = "ftetwild"', "build123d", "pytetwild", instead='set mesh.mesher = "swept"')
     start = time.perf_counter()

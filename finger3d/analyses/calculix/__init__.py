@@ -1,1 +1,0 @@
-"""Input decks of CalculiX: a press as its solver ccx reads it."""

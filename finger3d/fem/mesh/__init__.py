@@ -1,1 +1,0 @@
-"""Meshes of simplices: shape functions, quality, search."""

@@ -1,1 +1,0 @@
-"""Fields recovered from the unknowns."""

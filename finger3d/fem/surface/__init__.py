@@ -1,1 +1,0 @@
-"""Boundary surfaces, their traces, and their deformation."""

@@ -1,1 +1,0 @@
-"""Readings of a press: gauges, markers and taxels."""

@@ -1,1 +1,0 @@
-"""Bodies in small strain, elastic and viscoelastic."""

@@ -1,1 +1,0 @@
-"""Refinement of a mesh by bisection, and prescribed edge lengths."""

@@ -1,1 +1,0 @@
-"""Structured meshes of sections and swept solids."""
