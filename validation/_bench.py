@@ -26,7 +26,9 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import cores
+from finger3d.analyses.press import press
 from finger3d.analyses.pressed_body import presses
+from finger3d.analyses.sweep.run import sweep
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
@@ -38,6 +40,9 @@ from finger3d.progress import Progress
 
 from ._press import changed, converged, fig9_finger
 from ._rows import Row, at_most
+from .beside_ansys import SCENES
+from .label_rate import DRAWN, OBJECTS
+from .label_rate import scene as pad_under
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -220,6 +225,8 @@ def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     yield list(_sensitivity(quick))
     report.stage("sweeps of five values of mu")
     yield _sweeps(quick)
+    report.stage("slides of a gel pad, and labels")
+    yield [*_slides(quick), _labels(quick)]
     report.stage("large deformation")
     yield _large_deformation(QUICK if quick else MIDDLE)
 
@@ -255,6 +262,29 @@ def _sweeps(quick: bool) -> list[Row]:
     ]
 
 
+def _slides(quick: bool) -> Iterator[Row]:
+    """Yield the time of the published slides of a gel pad over that of one condensation of the same mesh."""
+    for scene in SCENES[-1:] if quick else SCENES[1:]:
+        for effects in ({"auto": False}, {"auto": False, "large_deformation": {}}):
+            tables = scene.tables(2.0 if quick else 1.0) | {"effects": effects}
+            spent = press(tables, error=False, figures=False).summary()["cost"]["seconds"]
+            ratio = (spent["assembly"] + spent["condensation"] + spent["contact"]) / spent["condensation"]
+            model, most = ("large deformation", 100.0) if len(effects) > 1 else ("small strain", 10.0)
+            seconds = ratio * spent["condensation"]
+            yield _row(f"{scene.name}, {model}, {seconds:.1f} s, over one condensation", most, ratio)
+
+
+def _labels(quick: bool) -> Row:
+    """Return how many samples with labels take as long as the condensation of their body."""
+    size, count = (1.0, 3) if quick else (0.85, 40)
+    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as out:
+        ranges = DRAWN | OBJECTS["ball"][1]
+        table = sweep(pad_under("ball", size, False), ranges, out, sample=f"random:{count}", workers=1).columns
+    samples = float(table["build_seconds"][0]) / (float(np.sum(table["seconds"])) / count)
+    what = "samples of a gel pad under a ball, with labels, in the time of meshing and condensation"
+    return Row(what, "goal of this project", 5.0, samples, 0.0, _load(), "statement", "at least")
+
+
 def _large_deformation(size: float) -> list[Row]:
     """Return factorisations and time of a press at large deformation, of many presses over one, and of a section."""
     model = LargeDeformation().apply(fig9(size))
@@ -285,10 +315,12 @@ def _ratios(best: dict[str, float]) -> list[Row]:
 
 
 def _row(what: str, most: float, got: float, reason: str = "a bound") -> Row:
+    return at_most(what, "goal of this project", most, got, f"{reason}; {_load()}", "statement")
+
+
+def _load() -> str:
     load = os.getloadavg()[0]
-    busy = "" if load <= 1.3 * cores() else ", BUSY"
-    reason = f"{reason}; load {load:.1f} on {cores()} cores{busy}"
-    return at_most(what, "goal of this project", most, got, reason, "statement")
+    return f"load {load:.1f} on {cores()} cores{'' if load <= 1.3 * cores() else ', BUSY'}"
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -4,9 +4,10 @@ No source: a goal of this project, ten hours on two cores, with an error of at m
 of a GelSight-like sensor, 20 x 16 mm and 4 mm thick, nearly incompressible, its back bonded.  Ball, cylinder and edge,
 its size, place, turn, depth, mu and slide are drawn at random; all samples of an object share one body condensed to the
 whole contact face.  The command is `finger3d sweep --sample random:N`, with the labels of the last increment on a grid
-of 0.5 mm.  Errors are those of the mesh, from edges 0.7 times as long for some of the same samples: forces converge
-with an order of 1.2 (accuracy.md), so that 1 / (1 - 0.7^1.2) of the difference is left.  Samples from the finished file
-are pressed again alone.  At large deformation fewer samples of the ball are measured, on edges of 1.5 mm.
+of 0.5 mm.  Edges are as short as each object needs.  Errors are those of the mesh, from edges half as long for some of
+the same samples: forces converge with an order of 1.2 (accuracy.md), so that the error is 1 / (1 - 0.5^1.2) of the
+difference.  Samples from the finished file are pressed again alone.  At large deformation fewer samples of the ball are
+measured, on edges of 1.5 mm.
 """
 
 from __future__ import annotations
@@ -28,12 +29,15 @@ from ._rows import Result, Row, at_most, columns
 BY_NAME = True
 GOAL = "goal of this project"
 HOURS, SAMPLES, ERROR = 10.0, 1e5, 0.03
-FINER, ORDER, FEW = 0.7, 1.2, 8
+FINER, ORDER, FEW, ALONE = 0.5, 1.2, 16, 334
 OBJECTS: dict[str, tuple[dict[str, Any], dict[str, tuple[float, float]]]] = {
     "ball": ({"shape": "sphere", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
     "cylinder": ({"shape": "cylinder", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
     "edge": ({"shape": "wedge", "angle_deg": 40.0, "tip_radius_mm": 1.0}, {"object.tip_radius_mm": (1.0, 3.0)}),
 }
+SIZES = {"ball": 1.0, "cylinder": 0.85, "edge": 0.6}
+"""Edges at the contact, mm."""
+
 DRAWN = {
     "friction.mu": (0.2, 1.0), "object.x_mm": (-4.0, 4.0), "object.z_mm": (-3.0, 3.0),
     "press.leg.0.depth_mm": (0.3, 0.8), "press.leg.1.depth_mm": (0.3, 0.8), "press.leg.1.slide_x_mm": (0.05, 0.6),
