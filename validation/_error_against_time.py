@@ -30,7 +30,6 @@ from ._felupe import felupe_press, is_felupe_installed
 from ._rows import Result, Row, at_least, columns, committed, zero
 from .beside_calculix import calculix
 
-BY_NAME = True
 NU = 0.45
 SIZES = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
 NUMBERS = {"normal_force_N": "normal force", "gauge_g": "gauge strain", "stick_area_mm2": "stick area"}

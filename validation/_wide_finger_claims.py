@@ -22,7 +22,9 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import MeshOptions
 from finger3d.mechanics.results.history import StepResult, measure
 
-from . import fig9_strains, half_cylinder_forces, half_cylinder_strains
+from . import _half_cylinder_forces as forces
+from . import _half_cylinder_strains as inner
+from . import fig9_strains
 from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
@@ -109,11 +111,11 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
         said("nu-not-told", force[MUS.index(0.25)], wanted=found.soft_N, here=here),
         said("ten-increments", abs(ten["friction_sum_N"] / friction[MUS.index(0.25)] - 1.0), here=here),
         # small contacts have few points; the mirror symmetry that is used makes the sum of f_t zero
-        *(row for row in half_cylinder_forces.statements_depths(here, depths[-1:]) if "sum of f_t" not in row.what),
-        *half_cylinder_forces.statements_zones(here, depths[0], depths[-1]),
-        *half_cylinder_strains.statements_depths(here, found.early, found.strain[MUS.index(0.25)]),
-        *half_cylinder_forces.statements_mus(here, mus, force, friction),
-        *half_cylinder_strains.statements_mus(here, whole, mirrored, middle.a),
+        *(row for row in forces.statements_depths(here, depths[-1:]) if "sum of f_t" not in row.what),
+        *forces.statements_zones(here, depths[0], depths[-1]),
+        *inner.statements_depths(here, found.early, found.strain[MUS.index(0.25)]),
+        *forces.statements_mus(here, mus, force, friction),
+        *inner.statements_mus(here, whole, mirrored, middle.a),
         said("kinetic-little", kinetic / np.abs(shear[MUS.index(0.25)]).max(), here=here),
         said("kinetic-told", kinetic / signal, here=here),
         said("width-79", 2.0 * middle.deformed, tolerance=1.0 + 2.0 * middle.edge_error(), here=here),
