@@ -11,7 +11,7 @@ truth: they are judged by the interval alone, in statements, since nothing is cl
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,10 +53,9 @@ COLUMNS = "scene by number value change error reported true_change"
 
 @dataclass(frozen=True)
 class Judged:
-    """Estimated and true change of one number of one press; `by` is what changes it."""
+    """Estimated and true change of one number of one press by large deformation."""
 
     scene: str
-    by: str
     number: str
     estimate: Change
     true: float
@@ -131,13 +130,10 @@ def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     truth = build(LargeDeformation().apply(model))
     end = last(truth)
     if end.outcome.ok:
-        yield from _judged(name, LARGE, estimate.changes, changing_numbers(truth, end))
-
-
-def _judged(name: str, by: str, changes: Mapping[str, Change], truth: Mapping[str, float]) -> Iterator[Judged]:
-    for number, change in changes.items():
-        if number in KINDS or number.startswith("gauge"):
-            yield Judged(name, by, number, change, truth[number] - change.value)
+        numbers = changing_numbers(truth, end)
+        for number, change in estimate.changes.items():
+            if number in KINDS or number.startswith("gauge"):
+                yield Judged(name, number, change, numbers[number] - change.value)
 
 
 def run(quick: bool) -> Result:
@@ -151,14 +147,15 @@ def run(quick: bool) -> Result:
     for kind in KINDS:
         rows += _rows([j for j in found if j.kind == kind], f"{KINDS[kind]} by {LARGE}")
     lines = [
-        (j.scene, j.by, j.number, j.estimate.value, j.estimate.change, j.estimate.error, j.estimate.significant, j.true)
+        (j.scene, LARGE, j.number, change.value, change.change, change.error, change.significant, j.true)
         for j in found
+        for change in [j.estimate]
     ]
     return Result(tuple(rows), columns(COLUMNS, lines), lambda figure: _draw(figure, found))
 
 
 def _estimated(found: list[Judged], pressed: int) -> Row:
-    share = len({j.scene for j in found if j.by == LARGE}) / pressed
+    share = len({j.scene for j in found}) / pressed
     return judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)
 
 
@@ -171,52 +168,38 @@ def _rows(found: list[Judged], what: str) -> Iterator[Row]:
         yield judged("share-of-reported-changes-within-a", within, SHARE, text=text)
         yield judged("share-of-reported-changes-whose-interval", covered, COVERED, text=text)
     if silent:
-        covered = float(np.mean([j.covered for j in silent]))
-        yield judged(
-            "share-of-changes-not-reported-whose",
-            covered,
-            COVERED,
-            what=what,
-            count=len(silent),
-            other_count=len(found),
-        )
+        covered, words = float(np.mean([j.covered for j in silent])), {"count": len(silent), "other_count": len(found)}
+        yield judged("share-of-changes-not-reported-whose", covered, COVERED, what=what, **words)
 
 
 def _draw(figure: Any, found: list[Judged]) -> None:
     """Draw true over estimated changes, and the band of the factor."""
     figure.set_size_inches(13.5, 4.5)
-    panels = figure.subplots(1, 3, squeeze=False)
+    panels = figure.subplots(1, 3)
     figure.suptitle("True change against the change that a press reports; the band is a factor of 1.5")
-    for line, by in zip(panels, (LARGE,), strict=True):
-        for axes, kind in zip(line, KINDS, strict=True):
-            here = [j for j in found if j.by == by and j.kind == kind]
-            reach = 0.0
-            for said, colour, label in ((False, "#b0b0b0", "not reported"), (True, "#2c5d8f", "reported")):
-                some = [j for j in here if j.estimate.significant == said]
-                if not some:
-                    continue
-                scale = np.array([_scale(j, found) for j in some])
-                x, y = (
-                    100.0 * np.array(values) / scale
-                    for values in ([j.estimate.change for j in some], [j.true for j in some])
-                )
-                bar = 100.0 * np.array([j.estimate.error for j in some]) / scale if said else None
-                axes.errorbar(x, y, xerr=bar, fmt="o", ms=3.5, lw=0.8, color=colour, label=label)
-                if said:
-                    reach = max(float(np.abs([*x, *y]).max()), reach)
-            reach = 1.1 * reach or 2.0
-            line_x = np.linspace(-reach, reach, 101)
-            axes.fill_between(line_x, line_x / FACTOR, line_x * FACTOR, color="#2c5d8f", alpha=0.12, lw=0.0)
-            axes.plot(line_x, line_x, color="#222222", lw=0.8)
-            unit = "% of the largest strain" if kind == "gauge" else "% of the number"
-            axes.set(title=f"{KINDS[kind]}, {by}", xlim=(-reach, reach), ylim=(-reach, reach))
-            axes.set(xlabel=f"estimated change, {unit}", ylabel=f"true change, {unit}")
-    panels[0, 0].legend(loc="upper left")
+    for axes, kind in zip(panels, KINDS, strict=True):
+        reach = 0.0
+        for said, colour, label in ((False, "#b0b0b0", "not reported"), (True, "#2c5d8f", "reported")):
+            some = [j for j in found if j.kind == kind and j.estimate.significant == said]
+            if not some:
+                continue
+            told = np.array([(j.estimate.change, j.true, j.estimate.error) for j in some])
+            x, y, bar = 100.0 * told.T / [_scale(j, found) for j in some]
+            axes.errorbar(x, y, xerr=bar if said else None, fmt="o", ms=3.5, lw=0.8, color=colour, label=label)
+            reach = float(np.abs([*x, *y]).max()) if said else reach
+        reach = 1.1 * reach or 2.0
+        line_x = np.linspace(-reach, reach, 101)
+        axes.fill_between(line_x, line_x / FACTOR, line_x * FACTOR, color="#2c5d8f", alpha=0.12, lw=0.0)
+        axes.plot(line_x, line_x, color="#222222", lw=0.8)
+        unit = "% of the largest strain" if kind == "gauge" else "% of the number"
+        axes.set(title=f"{KINDS[kind]}, {LARGE}", xlim=(-reach, reach), ylim=(-reach, reach))
+        axes.set(xlabel=f"estimated change, {unit}", ylabel=f"true change, {unit}")
+    panels[0].legend(loc="upper left")
 
 
 def _scale(judged: Judged, found: list[Judged]) -> float:
     """Return what a change is drawn relative to: the number, or for gauges the largest strain of the press."""
     if judged.kind != "gauge":
         return max(abs(judged.estimate.value), 1e-12)
-    same = [j for j in found if (j.scene, j.by, j.kind) == (judged.scene, judged.by, "gauge")]
+    same = [j for j in found if (j.scene, j.kind) == (judged.scene, "gauge")]
     return max(max(abs(j.estimate.value) for j in same), 1e-12)

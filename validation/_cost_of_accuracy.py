@@ -32,7 +32,7 @@ from ._cost import HALF, LARGE, QUANTITIES, SECTION, SOLID, Case
 from ._cost_extrapolated import EMPTY, at, constant, extrapolate, memory_mb, rate
 from ._cost_figure import draw
 from ._cost_runs import MODULE
-from ._cost_truth import LENGTHS, Advice, Truth, advise, mesh_errors, seconds, step_errors, truth, value
+from ._cost_truth import LENGTHS, Advice, Known, Truth, advise, mesh_errors, seconds, step_errors, truth, value
 from ._press import empty_mesh_cache
 from ._rows import Result, Row, listed, of_records, zero
 
@@ -152,9 +152,9 @@ def _advices(
     ladder, found = series["steps"][0], []
     for q in QUANTITIES:
         for target in TARGETS:
-            given = runs, errors, truths[q], runs[ladder], ladder.counts
-            one = advise(q, target, usual, *given)
-            found.append(one if one.case else extrapolate(one, _even(series), *given, rates[q]))
+            known = Known(runs, errors, truths[q], runs[ladder], ladder.counts)
+            one = advise(q, target, usual, known)
+            found.append(one if one.case else extrapolate(one, _even(series), known, rates[q]))
     return found
 
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Model
 
 from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, draw_shown, half_cylinder, said
 from ._press import under
@@ -36,7 +35,7 @@ def _depths(quick: bool) -> Result:
     size = 0.2 if quick else 0.025
     found, lines = {}, []
     for plane, nu in CASES:
-        problem = _whole(half_cylinder(nu, plane, size).model)
+        problem = build(replace(half_cylinder(nu, plane, size).model, symmetry=()))
         frames = under(problem, 0.25, 5)
         found[plane, nu] = [Profile.of(problem, f) for f in frames]
         for frame, profile in zip(frames, found[plane, nu], strict=True):
@@ -46,11 +45,6 @@ def _depths(quick: bool) -> Result:
     rows += [row for case in SHOWN for row in statements_depths(f"{case[0]}, nu = {case[1]:g}", found[case])]
     table = columns("plane nu depth_mm x_mm p_MPa q_MPa status", lines)
     return Result(tuple(rows), table, lambda figure: _draw_depths(figure, found))
-
-
-def _whole(model: Model) -> Any:
-    """The problem without use of its symmetry."""
-    return build(replace(model, symmetry=()))
 
 
 def _reference(size: float) -> Iterator[Row]:

@@ -22,6 +22,7 @@ from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.results.history import StepResult, measure
 from finger3d.objects import Cylinder, Sphere
 
+from ._common import ticks_at
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, Profile, fig9, half_cylinder, line_r5, said, strains
@@ -229,8 +230,7 @@ def _draw_orders(
             axes.loglog(counts, shown, "o-", ms=3, color=f"C{k}", label=quantity)
             axes.loglog([PLAIN], [plain[name][k] or np.nan], "x", color=f"C{k}")
         axes.loglog(counts, [2.0 / n**2 for n in counts], "k:", lw=1)
-        axes.set_xticks([*counts, PLAIN], [str(n) for n in (*counts, PLAIN)])
-        axes.set_xticks([], minor=True)
+        ticks_at(axes, [*counts, PLAIN])
         axes.set_title(name, fontsize=9)
     for axes in panels[len(own) :]:
         axes.set_axis_off()

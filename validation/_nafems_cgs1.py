@@ -23,7 +23,7 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh.simplex import Mesh
 
-from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
+from ._common import Body, body, box, contact_axis, convergence, distance, ellipse, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns
 
 R, SIDE, FORCE = 50.0, 200.0, 35e3
@@ -75,13 +75,6 @@ def pressed(both: Body, gap: Float, force: float) -> Float:
     return both.normal_force(gap - depth) / both.surface.area
 
 
-def ellipse(x: Float, p: Float, a: float) -> tuple[float, float]:
-    """Half-width (mm) and peak (MPa) of the line of p^2 over x^2 within 0.9 a."""
-    inner = x < 0.9 * a
-    slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
-    return float(np.sqrt(-top / slope)), float(np.sqrt(top))
-
-
 def run(quick: bool) -> Result:
     """Three sizes and more, a circle and a parabola."""
     counts = (8, 16, 32) if quick else (10, 20, 40, 80)
@@ -94,9 +87,9 @@ def run(quick: bool) -> Result:
         x = both.surface.points[:, 0]
         levels.append((x, [pressed(both, x**2 / (2.0 * R), load) for load in loads]))
         circle = pressed(both, R - np.sqrt(R**2 - x**2), FORCE)
-        found = {"parabola": ellipse(x, levels[-1][1][-1], a), "circle": ellipse(x, circle, a)}
+        found = {"parabola": ellipse(x, levels[-1][1][-1], 0.9 * a), "circle": ellipse(x, circle, 0.9 * a)}
         table += [(name, n, *values) for name, values in found.items()]
-    limits = [ellipse(levels[-1][0], p, v) for p, v in zip(levels[-1][1], hertz, strict=True)]
+    limits = [ellipse(levels[-1][0], p, 0.9 * v) for p, v in zip(levels[-1][1], hertz, strict=True)]
     errors = [
         float(np.sqrt(np.mean([_away(x, p, e) ** 2 for p, e in zip(ps, limits, strict=True)]))) for x, ps in levels
     ]
@@ -120,7 +113,7 @@ def _away(x: Float, p: Float, limit: tuple[float, float]) -> float:
     """Relative L2 error of nodal pressures p (n,) at x (n,) against an ellipse."""
     fine = np.linspace(0.0, 1.3 * limit[0], 8001)
     wanted = limit[1] * np.sqrt(np.maximum(0.0, 1.0 - (fine / limit[0]) ** 2))
-    return float(np.sqrt(np.sum((np.interp(fine, x, p) - wanted) ** 2) / np.sum(wanted**2)))
+    return distance(np.interp(fine, x, p), wanted)
 
 
 def draw(

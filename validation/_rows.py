@@ -6,7 +6,7 @@ import csv
 import math
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -196,6 +196,11 @@ def of_records(lines: Sequence[TreeView]) -> dict[str, list[Any]]:
     """Return the table of a study from lines by column; a line may lack some."""
     names = dict.fromkeys(name for line in lines for name in line)
     return {name: [line.get(name, "") for line in lines] for name in names}
+
+
+def rms(values: Iterable[float]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(list(values)))))
 
 
 def number(value: float) -> str:

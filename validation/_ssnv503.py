@@ -31,11 +31,11 @@ from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface.traces import local_rows, surface
 from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.results.history import measure
 
 from ._common import cube, increment, side_load
+from ._press import converged
 from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -114,9 +114,7 @@ def plate(dim: int, size: float) -> tuple[list[tuple[float, float, float]], floa
     mesh = MeshOptions(size, 2.0 * size, "swept")
     problem = build(Model(design, Isotropic(1.0, 0.3), mesh, legs, friction=Coulomb(MU), domain=domain))
     curve, slipping = [], 0.0
-    for frame in march(problem):
-        if not frame.outcome.ok:
-            raise AssertionError(f"plate, {dim}D, {frame.target}: {frame.outcome}")
+    for frame in converged(problem):
         m = measure(problem.points, frame)
         q = np.array([m["tangential_force_x_N"], m["tangential_force_z_N"]])
         slide = float(np.hypot(m["slide_x_mm"], m["slide_z_mm"]))

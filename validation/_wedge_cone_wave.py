@@ -26,7 +26,20 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Wave, Wedge
 
-from ._common import Body, body, box, contact_axis, convergence, graded, halved, held_at, mapped, quarter_block, rate
+from ._common import (
+    Body,
+    body,
+    box,
+    contact_axis,
+    convergence,
+    distance,
+    graded,
+    halved,
+    held_at,
+    mapped,
+    quarter_block,
+    rate,
+)
 from ._rows import Result, Row, exact_columns
 
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
@@ -37,10 +50,6 @@ _JOHNSON = "Johnson 1985, sec. 5.2; REFERENCES.md, 1.4"
 _ONE = "second order in the point spacing; 0.07 % or less measured, and coarse meshes must pass too"
 _WAVE = "second order in the point spacing; 0.01 % or less measured, and coarse meshes must pass too"
 Errors = Float  # (depths, 2): force over the closed form at equal a, less 1; L2 error of the pressure, nan if not taken
-
-
-def _away(got: Float, wanted: Float) -> float:
-    return float(np.sqrt(np.sum((got - wanted) ** 2) / np.sum(wanted**2)))
 
 
 TIP = Wedge(angle=math.atan(SLOPE))
@@ -73,7 +82,7 @@ def wedge_errors(at: Float, p: Float, force: float) -> tuple[float, float]:
     a = np.sqrt(6.0 * (drawn @ x**2) / drawn.sum())
     same = force / (MODULUS * SLOPE)
     exact = MODULUS * SLOPE / np.pi * np.arccosh(np.maximum(1.0, same / x))
-    return same / a - 1.0, _away(drawn, exact)
+    return same / a - 1.0, distance(drawn, exact)
 
 
 def own_path(count: int) -> float:
@@ -134,7 +143,7 @@ def wave(count: int, dim: int) -> Errors:
         s = 4.0 * (f @ square) / f.sum()
         exact = 2.0 * PEAK * np.cos(np.pi * x) * np.sqrt(np.maximum(0.0, share - np.sin(np.pi * x) ** 2))
         p = np.interp(x, place[order], (f / half.surface.area)[order])
-        found.append((share / s - 1.0, _away(p, exact) if dim == 2 else np.nan))
+        found.append((share / s - 1.0, distance(p, exact) if dim == 2 else np.nan))
     return np.array(found)
 
 
