@@ -35,7 +35,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.objects import Cylinder, Plane
 from tests.models import block, fig9, last, run
-from validation import increment_errors
+from validation import _increment_errors
 
 
 # validation/REFERENCES.md, 2.6, the paper's half cylinder; P within 1 %, lengths within .013 plus half a contact point
@@ -175,7 +175,7 @@ def numbers(problem: Problem, count: int) -> np.ndarray:
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_errors_fall_at_second_order(name: str) -> None:
     # points touch one by one, so that single ratios scatter widely about 4: the median is taken, and the whole fall
-    press = next(press for press in increment_errors.presses(quick=False) if press.name == name)
+    press = next(press for press in _increment_errors.presses(quick=False) if press.name == name)
     problem = build(replace(press.model, friction=Coulomb(press.mu)))
     exact = numbers(problem, 160 if press.model.finite_strain else 320)
     errors = np.abs([numbers(problem, count) / exact - 1.0 for count in COUNTS])

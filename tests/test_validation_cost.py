@@ -12,7 +12,7 @@ import pytest
 from validation._cost import SECTION, Case
 from validation._cost_extrapolated import at, constant, extrapolate, rate, unknowns
 from validation._cost_table import markdown
-from validation._cost_truth import Advice, Truth
+from validation._cost_truth import Advice, Known, Truth
 from validation._rows import committed
 
 CASES = [Case(SECTION, size, 4.0 * size) for size in (4.0, 2.0, 1.0, 0.5)]
@@ -49,8 +49,8 @@ def test_values_beyond_the_finest_mesh_go_on_with_their_power() -> None:
 
 
 def test_what_no_run_shows_is_extrapolated_and_marked() -> None:
-    ladder = _run(LADDER, LADDER.counts)
-    found = extrapolate(UNKNOWN, [CASES], RUNS, ERRORS, TRUTH, ladder, LADDER.counts, 1.0)
+    known = Known(RUNS, ERRORS, TRUTH, _run(LADDER, LADDER.counts), LADDER.counts)
+    found = extrapolate(UNKNOWN, [CASES], known, 1.0)
     assert found.extrapolated
     assert found.case is not None
     # 0.1 % less what five increments leave, 0.004 (1 / 25 - 1 / 400)

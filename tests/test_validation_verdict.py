@@ -39,7 +39,7 @@ def test_every_cell_is_made_from_rows_of_a_study_with_a_figure() -> None:
             found = claim.found(column, KEPT)
             assert found, f"{study}: no row for {claim.text!r}, {column}"
             assert {r.measure for r in found} == {found[0].measure}
-            assert (HOME / "figures" / f"{study}.png").is_file()
+            assert (HOME / "figures" / f"{claim.figure(column)}.png").is_file()
             # a pattern that finds rows of two models would mix columns
             assert len({"large deformation" in r.what for r in found}) == 1
 

@@ -16,6 +16,7 @@ from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOpti
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Cylinder, Plane, Sphere
 
+from ._drawn import FAR, NEAR, UNDER
 from ._press import fig9_finger
 
 SCENES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
@@ -64,12 +65,10 @@ def with_readings(model: Model) -> Model:
 def _fingers() -> dict[str, tuple[Design, tuple[Gauge, ...]]]:
     """Fingers by name, and their gauges."""
     block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=16.0)
-    near = (Gauge("a", 1.5, 4.0, angle=0.5), Gauge("b", 3.0, 3.0, angle=0.7), Gauge("c", 0.0, 3.5))
-    far = (Gauge("a", 36.0, 40.0, angle=0.5), Gauge("b", 20.0, 44.0, angle=0.2), Gauge("c", 5.0, 40.0))
     return {
-        "half cylinder": (designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0), near),
-        "Fig. 9": (fig9_finger(), far),
-        "block": (block, (Gauge("a", 0.5, 7.5, angle=0.5), Gauge("b", 0.0, 7.0))),
+        "half cylinder": (designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0), NEAR),
+        "Fig. 9": (fig9_finger(), FAR),
+        "block": (block, UNDER[:2]),
         "half-plane": (replace(block, half_length_mm=40.0, height_mm=40.0, width_mm=1.0), ()),
         "ball": (designs()["hemisphere"](radius_mm=8.0), ()),
     }

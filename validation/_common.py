@@ -229,6 +229,18 @@ def body(
     return Body(face, whole.reshape(c, d, c, d))
 
 
+def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
+    """Half-width (mm) and peak (MPa) of Hertz's pressure by the line of p^2 over x^2 within |x| < `reach`."""
+    inner = np.abs(x) < reach
+    slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
+    return float(np.sqrt(-top / slope)), float(np.sqrt(top))
+
+
+def distance(got: Float, wanted: Float) -> float:
+    """L2 norm of a difference at equidistant places over that of what is wanted."""
+    return float(np.sqrt(np.sum((got - wanted) ** 2) / np.sum(wanted**2)))
+
+
 def rate(sizes: Sequence[float], errors: Sequence[float]) -> float:
     """Slope of the least-squares line through log(error) over log(size)."""
     return float(np.polyfit(np.log(sizes), np.log(np.abs(errors)), 1)[0])
@@ -256,6 +268,12 @@ def convergence(
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(xlabel=xlabel, ylabel=ylabel)
+
+
+def ticks_at(axes: Any, places: Sequence[float]) -> None:
+    """Put ticks on a logarithmic x axis at these places alone."""
+    axes.set_xticks(places, [f"{place:g}" for place in places])
+    axes.set_xticks([], minor=True)
 
 
 def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Float:

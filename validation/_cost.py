@@ -87,16 +87,15 @@ def model_of(case: Case) -> Model:
     usual = 0.3 if case.body == HALF else 0.49
     nu = usual if case.nu is None else case.nu
     law = Coulomb(MU) if case.way == "condensed" else PlainCoulomb(MU)
+    given: dict[str, Any] = {"material": Isotropic(1.0, nu), "mesh": mesh, "friction": law}
     if case.body == HALF:
         design = designs()["half_cylinder"](radius_mm=5.0, width_mm=1.0)
         gauge = Gauge("g", 1.5, 4.2, angle=math.pi / 4)
-        return Model(
-            design, Isotropic(1.0, nu), mesh, (Leg(1.0),), friction=law, gauges=(gauge,), domain="plane-stress"
-        )
+        return Model(design, legs=(Leg(1.0),), gauges=(gauge,), domain="plane-stress", **given)
     # at large deformation the strain of the section along 30 degrees is near zero there, a twentieth of that along 60
     gauge = Gauge("g", 36.0, 40.0, angle=math.pi / 3 if case.body == LARGE[SECTION] else math.pi / 6)
     domain: Any = "solid" if case.body in (SOLID, LARGE[SOLID]) else "plane-strain"
-    model = Model(fig9_finger(), Isotropic(1.0, nu), mesh, (Leg(10.0),), friction=law, gauges=(gauge,), domain=domain)
+    model = Model(fig9_finger(), legs=(Leg(10.0),), gauges=(gauge,), domain=domain, **given)
     return LargeDeformation().apply(model) if case.body in LARGE.values() else model
 
 

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 
 from ._cost import LARGE, SOLID, Case
-from ._cost_truth import Advice, Truth, pace_of, seconds, step_errors
+from ._cost_truth import Advice, Known, Truth, pace_of, seconds, step_errors
 
 Errors = Mapping[Case, Mapping[str, float]]
-Runs = Mapping[Case, dict[str, Any]]
 
 SOLIDS = (SOLID, LARGE[SOLID])
 _FEWEST = 3
@@ -94,33 +93,23 @@ def _increments(quantity: str, ladder: Mapping[str, Any], counts: Sequence[int])
         yield count, errors[known] * known / count, pace_of(ladder, last) * count / last
 
 
-def extrapolate(
-    unknown: Advice,
-    groups: Sequence[Sequence[Case]],
-    runs: Runs,
-    errors: Errors,
-    truth: Truth,
-    ladder: Mapping[str, Any],
-    counts: Sequence[int],
-    power: float,
-) -> Advice:
+def extrapolate(unknown: Advice, groups: Sequence[Sequence[Case]], known: Known, power: float) -> Advice:
     """Return the cheapest mesh and increments that are expected to meet a target that no run is known to meet.
 
     Parameters
     ----------
     unknown : the number and the target
     groups : series of meshes, coarse to fine
-    ladder, counts : one mesh with several numbers of increments
     power : of the edge length; see `rate`
     """
-    best, empty = unknown, EMPTY * min(run["peak_MB"] for run in runs.values())
+    best, empty = unknown, EMPTY * min(run["peak_MB"] for run in known.runs.values())
     for cases in groups:
-        here = [runs[c] for c in cases]
+        here = [known.runs[c] for c in cases]
         dofs = [run["dofs"] for run in here]
-        error = constant(unknown.quantity, cases, errors, truth, power)
+        error = constant(unknown.quantity, cases, known.errors, known.truth, power)
         before = [seconds(run, pace=0.0) for run in here]
         contact = [seconds(run) - seconds(run, pace=0.0) for run in here]
-        for count, by_steps, longer in _increments(unknown.quantity, ladder, counts):
+        for count, by_steps, longer in _increments(unknown.quantity, known.ladder, known.counts):
             if by_steps >= unknown.target or math.isnan(power):
                 continue
             size = min(((unknown.target - by_steps) / error) ** (1.0 / power), cases[0].size)
@@ -128,14 +117,9 @@ def extrapolate(
             many = unknowns(size, cases, dofs)
             took = at(many, dofs, before) + longer * at(many, dofs, contact)
             if best.case is None or took < best.seconds:
-                best = replace(
-                    unknown,
-                    case=replace(cases[-1], size=size, base=4.0 * size),
-                    steps=count,
-                    seconds=took,
-                    mesh_seconds=at(many, dofs, [run["processor_seconds"]["mesh"] for run in here]),
-                    peak_mb=memory_mb(many, dofs, [run["peak_MB"] for run in here], empty),
-                    dofs=round(many),
-                    extrapolated=True,
-                )
+                case = replace(cases[-1], size=size, base=4.0 * size)
+                meshing = at(many, dofs, [run["processor_seconds"]["mesh"] for run in here])
+                peak = memory_mb(many, dofs, [run["peak_MB"] for run in here], empty)
+                best = replace(unknown, case=case, steps=count, seconds=took, mesh_seconds=meshing, peak_mb=peak,
+                               dofs=round(many), extrapolated=True)  # fmt: skip
     return best

@@ -55,11 +55,8 @@ def _elements(axes: Any, runs: Sequence[Line]) -> None:
         _plot(axes, _series(runs, SOLID, element), "seconds", "error_force", element, mark, color=colour)
     wild = _series(runs, SOLID, mesher="ftetwild")
     _plot(axes, wild, "seconds", "error_force", "mixed, fTetWild, mesh made anew", "D:", color="C4")
-    axes.set(
-        title="Which element?  Solid, normal force",
-        xlabel="processor time, mesh to last increment (s)",
-        ylabel="error, %",
-    )
+    axes.set(title="Which element?  Solid, normal force", ylabel="error, %")
+    axes.set(xlabel="processor time, mesh to last increment (s)")
 
 
 def _numbers(axes: Any, runs: Sequence[Line]) -> None:
@@ -69,7 +66,7 @@ def _numbers(axes: Any, runs: Sequence[Line]) -> None:
     axes.set(ylabel="error, %")
 
 
-def _grading(axes: Any, runs: Sequence[Line]) -> None:
+def _grading(axes: Any, _: Sequence[Line]) -> None:
     graded = [line for line in committed("graded_meshes") if line["goal"] == "normal_force_N"]
     for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
         for way, mark in (("equal grading", "o-"), ("graded", "s--")):

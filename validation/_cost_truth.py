@@ -98,6 +98,17 @@ def pace_of(ladder: Mapping[str, Any], count: int) -> float:
 
 
 @dataclass(frozen=True)
+class Known:
+    """Runs of one body, their errors, the truth of one number, and a mesh that was pressed in several counts."""
+
+    runs: Runs
+    errors: Mapping[Case, Mapping[str, float]]
+    truth: Truth
+    ladder: Mapping[str, Any]
+    counts: Sequence[int]
+
+
+@dataclass(frozen=True)
 class Advice:
     """The cheapest of the runs, and increments, that meets a target for a quantity; no case if none does.
 
@@ -116,33 +127,22 @@ class Advice:
     extrapolated: bool = False
 
 
-def advise(
-    quantity: str,
-    target: float,
-    groups: Sequence[Sequence[Case]],
-    runs: Runs,
-    errors: Mapping[Case, Mapping[str, float]],
-    truth: Truth,
-    ladder: Mapping[str, Any],
-    counts: Sequence[int],
-) -> Advice:
+def advise(quantity: str, target: float, groups: Sequence[Sequence[Case]], known: Known) -> Advice:
     """Search series of meshes (coarse to fine) and increments for the cheapest way below a target."""
-    by_steps = step_errors(ladder, quantity, counts)
-    best = Advice(quantity, target, None, 0, float("nan"), float("nan"), float("nan"), 0, truth.uncertainty)
-    if truth.uncertainty > target:
+    by_steps, uncertainty = step_errors(known.ladder, quantity, known.counts), known.truth.uncertainty
+    best = Advice(quantity, target, None, 0, float("nan"), float("nan"), float("nan"), 0, uncertainty)
+    if uncertainty > target:
         return best
     for cases in groups:
-        bound = np.maximum.accumulate([errors[c][quantity] for c in reversed(cases)])[::-1]
+        bound = np.maximum.accumulate([known.errors[c][quantity] for c in reversed(cases)])[::-1]
         for case, mesh_error in zip(cases, bound, strict=True):
-            for k, count in enumerate(counts):
-                if mesh_error + max(by_steps[n] for n in counts[k:]) > target:
+            for k, count in enumerate(known.counts):
+                if mesh_error + max(by_steps[n] for n in known.counts[k:]) > target:
                     continue
-                cost = seconds(runs[case], pace=pace_of(ladder, count))
+                run = known.runs[case]
+                cost, meshing = seconds(run, pace=pace_of(known.ladder, count)), run["processor_seconds"]["mesh"]
                 if best.case is None or cost < best.seconds:
-                    meshing = runs[case]["processor_seconds"]["mesh"]
-                    best = Advice(
-                        quantity, target, case, count, cost, meshing, runs[case]["peak_MB"], runs[case]["dofs"],
-                        truth.uncertainty,
-                    )  # fmt: skip
+                    size = run["peak_MB"], run["dofs"]
+                    best = Advice(quantity, target, case, count, cost, meshing, *size, uncertainty)
                 break
     return best

@@ -5,7 +5,7 @@ Lengths are in units of the contact half-width a = 1 mm that the last increment 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from finger3d.geometry.registry import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
+
+from ._press import changed, converged
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
 DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_with_friction
@@ -57,13 +58,8 @@ def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_
 def under(problem: Problem, friction: FrictionLaw | float, legs: tuple[Leg, ...] | None = None) -> list[Profile]:
     """March the problem under another friction, and other legs if given; the condensation is shared."""
     law = Coulomb(friction) if isinstance(friction, float) else friction
-    model = replace(problem.model, friction=law, legs=legs or problem.model.legs)
-    found = []
-    for frame in march(replace(problem, model=model)):
-        if not frame.outcome.ok:
-            raise AssertionError(f"mu = {law.mu:g}, {frame.target}: {frame.outcome}")
-        found.append(Profile.of(problem, frame))
-    return found
+    steps = converged(changed(problem, friction=law, legs=legs or problem.model.legs))
+    return [Profile.of(problem, step) for step in steps]
 
 
 @dataclass(frozen=True)

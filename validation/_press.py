@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Model
+from finger3d.mechanics.model import Gauge, Model
 
 
 def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm: float = 36.6) -> Design:
@@ -24,6 +25,12 @@ def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm
     return designs()["clipped_cylinder"](
         radius_mm=radius_mm, half_length_mm=50.0, edge_height_mm=edge_height_mm, width_mm=width_mm
     )
+
+
+def paper_gauges(length_mm: float, y_mm: float = 40.0) -> tuple[Gauge, Gauge]:
+    """Return the gauge of 30 degrees at x = 36 mm, "g", and its mirror image, "m"."""
+    turn = math.radians(30.0)
+    return Gauge("g", 36.0, y_mm, 0.0, turn, length_mm), Gauge("m", -36.0, y_mm, 0.0, math.pi - turn, length_mm)
 
 
 def changed(problem: Problem, **fields: Any) -> Problem:

@@ -6,8 +6,8 @@ import csv
 import math
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -146,12 +146,14 @@ class Result:
     rows, table : of its results
     figure : draws on a matplotlib Figure
     settled : of a study that counts the increments that converge
+    parts : by name, of a study whose parts have a table and a figure each
     """
 
     rows: tuple[Row, ...]
     table: Mapping[str, ArrayLike] | None = None
     figure: Callable[[Any], None] | None = None
     settled: Settled | None = None
+    parts: Mapping[str, Result] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:
@@ -182,10 +184,23 @@ def together(size: tuple[float, ...], /, **parts: Result) -> Result:
     return Result(tuple(row for part in parts.values() for row in part.rows), of_records(lines), draw)
 
 
+def in_parts(quick: bool, *modules: Any) -> Result:
+    """Return the result of a study whose parts are modules beside it: their rows, and the table and figure of each."""
+    parts = {module.__name__.rpartition(".")[2].lstrip("_"): module.run(quick) for module in modules}
+    counts = [part.settled for part in parts.values() if part.settled]
+    rows = tuple(row for part in parts.values() for row in part.rows)
+    return Result(rows, settled=settled(counts) if counts else None, parts=parts)
+
+
 def of_records(lines: Sequence[TreeView]) -> dict[str, list[Any]]:
     """Return the table of a study from lines by column; a line may lack some."""
     names = dict.fromkeys(name for line in lines for name in line)
     return {name: [line.get(name, "") for line in lines] for name in names}
+
+
+def rms(values: Iterable[float]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(list(values)))))
 
 
 def number(value: float) -> str:

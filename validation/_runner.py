@@ -209,12 +209,14 @@ def _keep(out: Path, study: Study, result: Result, stamp: str, seconds: float) -
     about.unlink(missing_ok=True)
     rows = [row.columns() for row in result.rows]
     write_csv(results / f"{study.name}.csv", {k: [r[k] for r in rows] for k in COLUMNS})
-    if result.table is not None:
-        write_csv(results / f"{study.name}_table.csv", result.table)
-    if result.figure is not None:
-        draw(result.figure, out / "figures" / f"{study.name}.png")
-    counts = {"settled": list(result.settled)} if result.settled else {}
-    write_json(about, {"question": study.question, "seconds": round(seconds, 1), "stamp": stamp, **counts})
+    for name, part in (result.parts or {study.name: result}).items():
+        if part.table is not None:
+            write_csv(results / f"{name}_table.csv", part.table)
+        if part.figure is not None:
+            draw(part.figure, out / "figures" / f"{name}.png")
+    more: Tree = {"settled": list(result.settled)} if result.settled else {}
+    more |= {"parts": list(result.parts)} if result.parts else {}
+    write_json(about, {"question": study.question, "seconds": round(seconds, 1), "stamp": stamp, **more})
 
 
 def draw(figure: Callable[[Any], None], path: Path) -> None:
@@ -260,6 +262,11 @@ def kept_rows(out: Path, study: Study) -> tuple[Row, ...]:
         return ()
     with path.open(newline="", encoding="utf-8") as stream:
         return tuple(map(_row, csv.DictReader(stream)))
+
+
+def kept_parts(out: Path, study: Study) -> list[str]:
+    """Return the names of the parts of a study, those of its tables and figures; its own name if it has no parts."""
+    return list(_about(out, study).get("parts", [study.name]))
 
 
 def kept_settled(out: Path, study: Study) -> Settled | None:
@@ -318,9 +325,11 @@ def write_index(out: Path, known: Mapping[str, Study]) -> None:
     for name, rows in kept.items():
         if rows:
             about = _about(out, known[name])
-            picture = f", [figure](figures/{name}.png)" if (out / "figures" / f"{name}.png").is_file() else ""
-            more = f", [table](results/{name}_table.csv)" if (out / "results" / f"{name}_table.csv").is_file() else ""
-            links = f"[{name}]({name}.py), [rows](results/{name}.csv){picture}{more}"
+            links = f"[{name}]({name}.py), [rows](results/{name}.csv)"
+            for part in kept_parts(out, known[name]):
+                of = "" if part == name else f" {part}"
+                for what, file in (("figure", f"figures/{part}.png"), ("table", f"results/{part}_table.csv")):
+                    links += f", [{what}{of}]({file})" if (out / file).is_file() else ""
             found = score(rows) + ("" if all(row.passed for row in rows) else ", **FAIL**")
             question = known[name].question.replace("|", "\\|")
             lines.append(f"| {links} | {question} | {found} | {about.get('seconds', '')} |")

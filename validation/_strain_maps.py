@@ -32,7 +32,6 @@ ANGLES = np.radians(np.arange(0.0, 180.0, 5.0))
 _WORST_RESOLUTION = 10.0  # upper end of the colour scale, in multiples of the limit; grey beyond
 _BEST_RESOLUTION = 0.05  # lower end of the colour scale, in multiples of the limit
 _QUANTILE = 0.99  # share of the squares within the colour scale of the slope
-_SMALLEST_SLOPE = 1e-12  # strain per unit of mu; avoids a division by zero
 
 
 @dataclass(frozen=True)
@@ -126,15 +125,9 @@ def resolution_panel(figure: Figure, axes: Axes, found: StrainMap, value: Float,
 
     norm = LogNorm(_BEST_RESOLUTION * limit, _WORST_RESOLUTION * limit)
     shown = np.ma.masked_invalid(value)
-    axes.pcolormesh(
-        _edges(found.x), _edges(found.y), np.where(np.isnan(value), np.nan, 1.0), cmap="Greys", vmin=0, vmax=4
-    )
-    drawn = axes.pcolormesh(
-        _edges(found.x),
-        _edges(found.y),
-        np.ma.masked_greater(shown, _WORST_RESOLUTION * limit),
-        cmap="viridis_r",
-        norm=norm,
-    )
+    edges = _edges(found.x), _edges(found.y)
+    axes.pcolormesh(*edges, np.where(np.isnan(value), np.nan, 1.0), cmap="Greys", vmin=0, vmax=4)
+    told = np.ma.masked_greater(shown, _WORST_RESOLUTION * limit)
+    drawn = axes.pcolormesh(*edges, told, cmap="viridis_r", norm=norm)
     axes.set_aspect("equal")
     _colour_bar(figure, axes, drawn, "standard deviation of mu", "min")

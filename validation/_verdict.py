@@ -23,18 +23,24 @@ class Claim:
     ----------
     text, where : what the paper says, and its figure or section
     measure : the number of the cells, and its bound
-    rows : for every column that is judged, a study and a pattern that finds its rows by what they measure
+    rows : for every column that is judged, a study, a pattern that finds its rows by what they measure, and the figure,
+        if it is not named as the study
     """
 
     text: str
     where: str
     measure: str
-    rows: Mapping[str, tuple[str, str]]
+    rows: Mapping[str, tuple[str, ...]]
 
     def found(self, column: str, kept: Mapping[str, Sequence[Row]]) -> list[Row]:
         """Return the rows that judge the claim in a column; none where it is not judged."""
-        study, pattern = self.rows.get(column, ("", ""))
+        study, pattern, *_ = self.rows.get(column, ("", ""))
         return [row for row in kept.get(study, ()) if re.search(pattern, row.what)]
+
+    def figure(self, column: str) -> str:
+        """Return the name of the figure of a column that is judged."""
+        study, _, *own = self.rows[column]
+        return own[0] if own else study
 
 
 def verdict(rows: Sequence[Row]) -> str:
@@ -64,8 +70,7 @@ def _cell(claim: Claim, column: str, kept: Mapping[str, Sequence[Row]], figures:
     rows = claim.found(column, kept)
     if not rows:
         return "–"
-    study = claim.rows[column][0]
-    return f"**{verdict(rows)}**: [{_numbers(rows)}]({figures}/{study}.png)"
+    return f"**{verdict(rows)}**: [{_numbers(rows)}]({figures}/{claim.figure(column)}.png)"
 
 
 def _numbers(rows: Sequence[Row]) -> str:

@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder
 from finger3d.sensor import Calibration, estimate
 
-from ._rows import Result, Row, at_most, columns, listed
+from ._rows import Result, Row, at_most, columns, listed, rms
 
 judged = listed(__file__)
 
@@ -153,12 +153,8 @@ def _rows(found: list[Reading]) -> Iterator[Row]:
 def _near_one(what: str, z: Float) -> Iterator[Row]:
     """Yield two rows: the stated errors are not too small, and they are not much too large."""
     why = "all readings of a body share one error of that body"
-    yield at_most(what, "1 if the errors are right", 1.3, _rms(z), why, "sensitivity")
-    yield judged("not-less-than-half", _rms(z), what=what)
-
-
-def _rms(z: Float) -> float:
-    return float(np.sqrt(np.mean(z**2)))
+    yield at_most(what, "1 if the errors are right", 1.3, rms(z), why, "sensitivity")
+    yield judged("not-less-than-half", rms(z), what=what)
 
 
 def _compared(nu: float, size: float) -> Row:

@@ -23,6 +23,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
 from . import _halfplane, _halfspace
+from ._common import ticks_at
 from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
@@ -168,16 +169,14 @@ def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:
         }
         middle.loglog(list(worst), list(worst.values()), mark + "-", label=name)
     middle.loglog([10, 40], [8, 2], "k:", lw=1, label="slope -1")
-    middle.set_xticks([4, 10, 20, 40], ["4", "10", "20", "40"])
-    middle.set_xticks([], minor=True)
+    ticks_at(middle, [4, 10, 20, 40])
     last = (t["dim"] == 2) & (t["points_per_a"] == fine)
     for share in np.unique(np.round(t["s"][last], 2)):
         at = last & (np.round(t["s"], 2) == share)
         order = np.argsort(t["increments"][at])
         gap = np.abs(t["loop_over_exact"] - t["W_over_exact"])[at][order]
         right.loglog(t["increments"][at][order], 100 * gap, "o-", label=f"cylinder, s = {share:g}")
-    right.set_xticks([5, 10, 20], ["5", "10", "20"])
-    right.set_xticks([], minor=True)
+    ticks_at(right, [5, 10, 20])
     left.set(xlabel="s = Q/(mu P)", ylabel="c/a", title="stick zone")
     middle.set(xlabel="points per a", ylabel="error of the work lost in a cycle, %", title="mesh")
     right.set(xlabel="increments to the peak", ylabel="|loop area - work lost|, % of exact", title="increments")

@@ -38,12 +38,11 @@ import numpy as np
 
 from finger3d.analyses.press import least_grip
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.objects import TIME
 from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
-from ._press import changed
+from ._press import changed, converged
 from ._rows import Result, Row, columns, committed_instead, listed
 from .held_weights import largest_change
 
@@ -143,9 +142,7 @@ def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
     problem = build(scene_of(tables).model())
     close, weigh = problem.model.legs
     hold = replace(weigh, steps=increments, duration_s=HOLD_S)
-    held = changed(problem, legs=(close, weigh, hold))
-    steps = list(march(held))
-    assert all(step.outcome.ok and step.pose for step in steps)
+    steps = converged(changed(problem, legs=(close, weigh, hold)))
     poses = np.array([np.delete(step.pose.coordinates, TIME) for step in steps[3:] if step.pose])
     moved = float(np.abs(poses - poses[0]).max())
     return max(moved, largest_change(problem, steps[3:])), least_grip(problem, NORMAL, QUIET)

@@ -13,7 +13,6 @@ described; this one is of a common kind.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -24,10 +23,11 @@ from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.model import Domain, Foils, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Foils, Leg, MeshOptions, Model
 
+from ._common import ticks_at
 from ._foil import alone, by_mesh, wing
-from ._press import fig9_finger, under
+from ._press import fig9_finger, paper_gauges, under
 from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
@@ -42,8 +42,7 @@ COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_f
 
 def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
     """The finger with a pair of foils, mirror images of each other."""
-    turn = math.radians(30.0)
-    gauges = (Gauge("g", 36.0, 38.0, 0.0, turn, length), Gauge("m", -36.0, 38.0, 0.0, math.pi - turn, length))
+    gauges = paper_gauges(length, 38.0)
     mesh, legs, law = MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), Coulomb(0.25)
     model = Model(fig9_finger(), Isotropic(1.0, NU), mesh, legs, friction=law, gauges=gauges, domain=domain)
     return build(FOIL.apply(model))
@@ -157,5 +156,4 @@ def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarr
     right.set_ylim(1e-6, 0.3)
     right.legend(fontsize=7, loc="lower right")
     for axes in (left, right):
-        axes.set_xticks(lengths, [f"{n:g}" for n in lengths])
-        axes.set_xticks([], minor=True)
+        ticks_at(axes, lengths)

@@ -7,8 +7,8 @@ and a strain noise of 1.5e-4 makes an error of 0.1 in mu = 0.5.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,12 @@ from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
+from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
 from ._paper import STRAIN, STRESS, said
-from ._press import fig9_finger
+from ._press import changed, fig9_finger, paper_gauges
 from ._rows import Result, Row, at_least, at_most, columns, together
 
 NOISE, ERROR = 1.5e-4, 0.1
@@ -164,11 +166,17 @@ def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> 
 
 def _read(model: Model, mus: Float) -> dict[str, Float]:
     """Strain (m,) over mu by gauge."""
-    found = sorted(presses(build(model), tuple(map(float, mus))), key=lambda press: press.mu)
-    for press in found:
-        if not press.frame.outcome.ok:
-            raise AssertionError(f"mu = {press.mu:g}: {press.frame.outcome}")
-    return {name: np.array([press.frame.gauges[name] for press in found]) for name in found[0].frame.gauges}
+    found = _pressed(build(model), mus)
+    return {name: np.array([frame.gauges[name] for frame in found.values()]) for name in found[float(mus[0])].gauges}
+
+
+def _pressed(problem: Problem, mus: Iterable[float]) -> dict[float, StepResult]:
+    """Last increments of converged presses by ascending mu."""
+    found = {press.mu: press.frame for press in presses(problem, tuple(map(float, mus)))}
+    for mu, frame in found.items():
+        if not frame.outcome.ok:
+            raise AssertionError(f"mu = {mu:g}: {frame.outcome}")
+    return dict(sorted(found.items()))
 
 
 def _compatible(curves: list[Curve]) -> Iterator[Row]:
@@ -232,7 +240,7 @@ MUS_FOIL = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)
 
 def model(quick: bool) -> Model:
     """The finger with the gauge and its mirror image, in small strain."""
-    gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, 4.0), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, 4.0))
+    gauges = paper_gauges(4.0)
     mesh = MeshOptions(5.0, 12.0, "swept") if quick else MeshOptions(2.0, 6.0, "swept")
     legs = (Leg(10.0, steps=5 if quick else 10),)
     return FOIL.apply(Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, friction=Coulomb(0.25), gauges=gauges))
@@ -242,13 +250,11 @@ def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:
     """Free strain and that of the foil, and the normal force (N), for every mu."""
     problem = build(model)
     found: dict[str, list[float]] = {"free": [], "foil": [], "force": []}
-    for press in sorted(presses(problem, mus), key=lambda press: press.mu):
-        if not press.frame.outcome.ok:
-            raise AssertionError(f"mu = {press.mu:g}: {press.frame.outcome}")
-        found["foil"].append(press.frame.gauges["g"])
-        found["free"].append(press.frame.gauges["g_free"])
-        state = replace(problem, model=replace(model, friction=model.friction.with_mu(press.mu)))
-        found["force"].append(-float(state.world_force(press.frame.meshed_state.contact)[:, 1].sum()))
+    for mu, frame in _pressed(problem, mus).items():
+        found["foil"].append(frame.gauges["g"])
+        found["free"].append(frame.gauges["g_free"])
+        state = changed(problem, friction=model.friction.with_mu(mu))
+        found["force"].append(-float(state.world_force(frame.meshed_state.contact)[:, 1].sum()))
     return {key: np.array(values) for key, values in found.items()}
 
 

@@ -31,8 +31,8 @@ from finger3d.mechanics.model import Leg, Model
 
 from ._ccx import printed_forces, program, solve
 from ._felupe import felupe_press, is_felupe_installed
+from ._hard_cases import DEPTH, MU, finger
 from ._rows import Result, Row, at_most, columns, committed
-from .hard_cases import DEPTH, MU, finger
 
 STIFFER = 100.0
 LIMIT_S = 900.0

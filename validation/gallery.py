@@ -113,14 +113,9 @@ def _theory_rows(ball: Problem, soft_ball: Problem) -> list[Row]:
     radius = 1.0 / (1.0 / 8.0 + 1.0 / 10.0)
     soft, b = at_equal_radius(soft_ball, radius, both)
     q = b**2 * (8.0**-3 + 10.0**-3) * radius
+    theory = layer * round_by_parabola((a / 8.0) ** 2)
     return [
-        judged(
-            "ball-without-friction",
-            hard,
-            layer * round_by_parabola((a / 8.0) ** 2),
-            tolerance=0.01 + 0.1 * a / 8.0,
-            a=a,
-        ),
+        judged("ball-without-friction", hard, theory, tolerance=0.01 + 0.1 * a / 8.0, a=a),
         judged("soft-ball-without-friction", soft, round_by_parabola(q), b=b),
     ]
 

@@ -175,7 +175,8 @@ def run(quick: bool) -> Result:
     creeps = {"section": creep(section, hold)}
     if not quick:
         creeps["20 mm wide"] = creep(held("solid", 4.0), hold)
-    rows = _rows(lifts, dropped(section, lifts)) + [_creep_row(name, hold, mm) for name, mm in creeps.items()]
+    rows = _rows(lifts, dropped(section, lifts))
+    rows += [judged("largest-change-of-any-pose-gap", mm, count=hold, name=name) for name, mm in creeps.items()]
     return Result(tuple(rows), columns(COLUMNS, lifts), lambda figure: _draw(figure, lifts))
 
 
@@ -207,10 +208,6 @@ def _rows(lifts: list[Lift], said: Float) -> list[Row]:
         judged("objects-held-at-0-999", float(np.isnan(said).sum()), count=len(lifts)),
         judged("largest-force-that-these-can-hold", float(said[np.argmax(np.abs(said - 1.0))])),
     ]
-
-
-def _creep_row(name: str, count: int, mm: float) -> Row:
-    return judged("largest-change-of-any-pose-gap", mm, count=count, name=name)
 
 
 def _draw(figure: Any, lifts: list[Lift]) -> None:

@@ -36,9 +36,9 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
-from ._common import body, contact_axis, convergence, graded, quarter_block, rate
+from ._common import body, contact_axis, convergence, distance, ellipse, graded, quarter_block, rate
 from ._layer import line, point
-from ._rows import Result, Row, exact_columns, together, zero
+from ._rows import Result, Row, exact_columns, rms, together, zero
 
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
 _HERTZ_LINE = "Johnson 1985, sec. 4.2; REFERENCES.md, 1.2"
@@ -69,14 +69,12 @@ def contact(x: Float, p: Float, force: float, modulus: float) -> Contact:
     """Compare nodal pressures p (n,) MPa at ascending x (n,) with Hertz's at `force` (N per mm), modulus E*."""
     a = float(np.sqrt(4.0 * force * RADIUS / (np.pi * modulus)))
     p0 = 2.0 * force / (np.pi * a)
-    inner = np.abs(x) < 0.9 * a
-    slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
+    half_width, peak = ellipse(x, p, 0.9 * a)
     fine = np.linspace(0.0, 1.3 * a, 8001)
     hertz = p0 * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2))
     drawn = np.interp(fine, x, p)
     moment = 2.0 * np.sqrt(np.sum(drawn * fine**2) / np.sum(drawn)) / a
-    away = np.sqrt(np.sum((drawn - hertz) ** 2) / np.sum(hertz**2))
-    return Contact(float(np.sqrt(-top / slope)) / a, float(moment), float(np.sqrt(top)) / p0, float(away))
+    return Contact(half_width / a, float(moment), peak / p0, distance(drawn, hertz))
 
 
 def press(
@@ -131,7 +129,7 @@ def _line(quick: bool) -> Result:
         name = f"{domain.replace('-', ' ')}, nu = {nu:g}"
         levels = [measured_line(domain, nu, n) for n in counts]
         rows += _line_rows(name, levels[-1])
-        errors = np.array([[_rms(c.half_width - 1.0 for c in cs), _rms(c.pressure for c in cs)] for cs in levels])
+        errors = np.array([[rms(c.half_width - 1.0 for c in cs), rms(c.pressure for c in cs)] for cs in levels])
         curves[name] = errors
         slopes.append([rate(1.0 / np.array(counts[-3:]), e) for e in errors[-3:].T])
         table += [(domain, nu, n, *e) for n, e in zip(counts, errors, strict=True)]
@@ -162,10 +160,6 @@ def _line_rows(name: str, last: list[Contact]) -> Iterator[Row]:
             worst = max(abs(ratio - 1.0) for ratio in ratios)
             why = "the edge may lie anywhere between two points; 0.03 % or less measured at 80 points to a"
             yield zero(f"P/P_Hertz(a), {name}, worst of 20 depths", _HERTZ_LINE, worst, 0.01, why)
-
-
-def _rms(values: Any) -> float:
-    return float(np.sqrt(np.mean(np.square(list(values)))))
 
 
 def draw_line(figure: Any, counts: tuple[int, ...], curves: dict[str, Float]) -> None:

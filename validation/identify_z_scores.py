@@ -23,7 +23,7 @@ from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 from finger3d.io import write_csv
 
-from ._rows import Result, Row, columns, listed
+from ._rows import Result, Row, columns, listed, rms
 
 judged = listed(__file__)
 
@@ -149,9 +149,8 @@ def _rows(found: list[Fitted], quick: bool) -> Iterator[Row]:
             share = float(np.mean(np.abs(z) <= 2.0))
             yield judged("share-within-two-stated-deviations", share, what=what)
         if len(some) >= 8:
-            rms, of_noise = (float(np.sqrt(np.mean(v**2))) for v in (z, bare))
-            yield judged("rms-of-z", rms, what=what)
-            yield judged("rms-of-z-noise-alone", of_noise, what=what)
+            yield judged("rms-of-z", rms(z), what=what)
+            yield judged("rms-of-z-noise-alone", rms(bare), what=what)
 
 
 def _draw(figure: Any, found: list[Fitted]) -> None:

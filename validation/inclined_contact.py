@@ -23,6 +23,7 @@ from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere
 
 from ._press import converged
 from ._rows import Result, exact_columns, grouped, listed, together
+from .triangulated_objects import box
 
 judged = listed(__file__)
 
@@ -151,11 +152,7 @@ def on_flanks(angles: tuple[float, float], size: float) -> dict[str, list[float]
 
 def cube_corner(size: float) -> Float:
     """Components (3,) N of the force on a cube's corner along the normals of its faces: what each face carries."""
-    half = 5.0
-    corner = np.array([[x, y, z] for x in (-half, half) for y in (-half, half) for z in (-half, half)])
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    faces = np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])])
-    turned = MeshObject(surface=Triangles(corner, faces), turn_x=math.pi / 4.0, turn_z=math.atan(1.0 / math.sqrt(2.0)))
+    turned = MeshObject(surface=box(5.0, 5.0, 5.0), turn_x=math.pi / 4.0, turn_z=math.atan(1.0 / math.sqrt(2.0)))
     block = designs()["block"](half_length_mm=4.0, height_mm=4.0, width_mm=8.0)
     mesh = MeshOptions(size, 1.5, "swept")
     problem = build(Model(block, Isotropic(E, NU), mesh, (Leg(CORNER_DEPTH, steps=3),), object=turned))

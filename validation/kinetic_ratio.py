@@ -21,6 +21,7 @@ import numpy as np
 from finger3d.contact.friction import FrictionLaw, TwoCoefficients
 from finger3d.mechanics.discretise.problem import Problem
 
+from ._common import ticks_at
 from ._halfplane import compliance, line, loading, under
 from ._increments import PlainCoulomb
 from ._rows import Kind, Result, Row, at_least, exact_columns
@@ -94,8 +95,7 @@ def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -
                 values = [found[branch, 0.7, points, n][k] for n in counts]
                 ax.semilogx(counts, values, colour + mark + "-", mfc="w", label=f"{branch}, {points} points to a")
         ax.axhline(exact, color="k", ls="--", lw=1, label="exact, mu_k alone")
-        ax.set_xticks(counts, [str(n) for n in counts])
-        ax.set_xticks([], minor=True)
+        ticks_at(ax, counts)
         ax.set(xlabel="increments", ylabel=label)
     best = found["keep", 0.7, meshes[-1], counts[-1]]
     figure.suptitle(f"mu_k/mu_s = .7; keep: error of int q/P {100 * abs(best[0] / 0.0773 - 1):.1f} %")

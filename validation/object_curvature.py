@@ -73,19 +73,12 @@ def run(quick: bool) -> Result:
     true = float(np.interp(TRUE, mus, curve))
     monotonic = all(_is_monotonic(c[:, 1]) for c in (coarse, calibration))
     what = "mu read on a bar of radius 100 mm with the plane's calibration, true 0.25"
+    words = {"what": what, "coarsest": sizes[0], "steps": steps, "value": steps // 2}
     rows = [
         judged("strain-on-a-bar-of-radius", found[1e5][1] / true),
         judged("calibration-on-the-plane-is-monotonic", float(monotonic)),
         judged("mu-read-on-a-bar-of", read[100.0], rough[100.0]),
-        judged(
-            "mu-read-by-increments",
-            rough[100.0],
-            fewer[100.0],
-            what=what,
-            coarsest=sizes[0],
-            steps=steps,
-            value=steps // 2,
-        ),
+        judged("mu-read-by-increments", rough[100.0], fewer[100.0], **words),
     ]
     rows += _solid_rows((4.0,) if quick else (3.0, 2.0), 4 if quick else 40)
     table = {

@@ -22,7 +22,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
-from ._common import body, body_load, cube, held_at, shuffled, solve
+from ._common import body, body_load, cube, held_at, shuffled, solve, ticks_at
 from ._rows import Result, exact_columns, zero
 
 _PATCH = "Irons and Razzaque 1972; REFERENCES.md, 5.1"
@@ -128,7 +128,6 @@ def draw(figure: Any, table: list[tuple[str, int, int, float]]) -> None:
             n, e = np.array([(t[2], t[3]) for t in table if t[:2] == (case, dim)]).T
             axes.loglog(n, np.maximum(e, 1e-17), "o-", markersize=4.5, label=case)
         axes.axhline(1e-12, color="k", linestyle="--", linewidth=1.0)
-        axes.set_xticks(n, [f"{v:g}" for v in n])
-        axes.set_xticks([], minor=True)
+        ticks_at(axes, n)
         axes.set(xlabel="cells along a side", title=f"{dim}D: errors are round-off (dashed: 1e-12)", ylim=(1e-17, 1e-2))
     figure.axes[0].set_ylabel("largest error (mm, or relative pressure)")

@@ -22,6 +22,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
 from . import _halfspace
+from ._common import ticks_at
 from ._halfplane import Profile, compliance, line, loading, under
 from ._rows import Result, Row, exact_columns, grouped, listed
 
@@ -121,8 +122,7 @@ def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], show
         middle.loglog(t["increments"], 100.0 * np.abs(t["work_over_lost"] - 1.0), "o-", label=f"cylinder, nu = {nu:g}")
     counts = sorted(set(t["increments"]))
     middle.set(xlabel="increments each way", ylabel="|work/work lost - 1|, %", title="energy balance")
-    middle.set_xticks(counts, [f"{int(n)}" for n in counts])
-    middle.set_xticks([], minor=True)
+    ticks_at(middle, counts)
     less = f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"
     for profile, name in ((shown[0], "loaded"), (shown[-1], less)):
         inside = (profile.x >= 0.0) & (profile.status != OPEN)

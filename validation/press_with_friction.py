@@ -13,6 +13,7 @@ import numpy as np
 from finger3d.contact.friction import SLIP
 
 from . import _halfspace, _rings
+from ._common import ticks_at
 from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
 from ._increments import PlainCoulomb
 from ._rows import Result, Row, exact_columns, listed, together
@@ -201,8 +202,7 @@ def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], f
                 middle.loglog(t["points_per_a"][which], error, marker + "-", label=f"{name}, nu = {nu:g}")
     middle.loglog([10, 40], [2, 0.5], "k:", label="slope -1")
     middle.set(xlabel="points per a", ylabel="error, %", title="a/h = 1/200")
-    middle.set_xticks([10, 20, 40], ["10", "20", "40"], minor=False)
-    middle.set_xticks([], minor=True)
+    ticks_at(middle, [10, 20, 40])
     middle.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
     of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
     for height in HEIGHTS:
@@ -335,8 +335,7 @@ def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
     middle.set(xlabel="points per a", ylabel="error, %", title="3D, mu = .25")
     right.set(xlabel="points per a", ylabel="D/(P depth), 40 increments", title="dissipation, mu = .25")
     for axes in (middle, right):
-        axes.set_xticks(points, [str(n) for n in points])
-        axes.set_xticks([], minor=True)
+        ticks_at(axes, points)
 
 
 def run(quick: bool) -> Result:

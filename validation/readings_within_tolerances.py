@@ -26,7 +26,7 @@ from finger3d.mechanics.readings import Taxel
 from finger3d.sensor import Estimate, estimate
 
 from ._press import changed, converged, fig9_finger
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, at_least, at_most, columns, rms
 
 Domain = Literal["solid", "plane-strain"]
 
@@ -149,11 +149,10 @@ def _honest(name: str, some: list[Judged], kind: Literal["verification", "statem
     inside = float(np.mean([one.inside for one in some]))
     why = "goal of this project; readings of one press share its error"
     if len(z) >= FEWEST:
-        rms = float(np.sqrt(np.mean(z**2)))
         what = f"rms of z of mu, not {{}}: {name}, {len(z)} of {len(some)} with an estimate"
         one = "1 if stated rightly"
-        yield at_most(what.format("above"), one, 1.2, rms, why, kind)
-        yield at_least(what.format("below"), one, 0.8, rms, why, kind)
+        yield at_most(what.format("above"), one, 1.2, rms(z), why, kind)
+        yield at_least(what.format("below"), one, 0.8, rms(z), why, kind)
     what = f"share of 90 % sets that contain mu: {name}, {len(some)} readings"
     yield at_least(f"{what}, not below", "0.9 if stated rightly", 0.85, inside, why, kind)
     yield at_most(f"{what}, not above", "0.9 if stated rightly", 0.95, inside, why, kind)

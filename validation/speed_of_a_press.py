@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -26,7 +25,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg
 
 from ._paper import STRAIN, fig9, said
-from ._press import changed, converged, under
+from ._press import under
 from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
@@ -109,8 +108,7 @@ def _extended(value: float, x: Float, y: Float) -> float:
 
 def _pressed(problem: Problem, mu: float) -> StepResult:
     """Last frame of a press."""
-    last = converged(changed(problem, friction=Coulomb(mu)))[-1]
-    return last
+    return under(problem, mu)[-1]
 
 
 def _force(frame: StepResult) -> float:

@@ -28,12 +28,12 @@ from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 
 from ._paper import said
-from ._press import fig9_finger
+from ._press import fig9_finger, paper_gauges
 from ._rows import Result, Row, columns, listed
 from ._strain_maps import StrainMap, resolution_panel, slope_panel
 
@@ -55,9 +55,8 @@ Found = dict[tuple[Domain, str], Calibration]
 
 def model(domain: Domain, sizes: tuple[float, float], length: float, quick: bool = False) -> Model:
     """The finger with its gauge, and the mirror image of it."""
-    gauges = (Gauge("g", 36.0, 40.0, 0.0, TURN, length), Gauge("m", -36.0, 40.0, 0.0, math.pi - TURN, length))
-    leg = Leg(10.0, steps=4 if quick else "auto")
-    return Model(fig9_finger(), Isotropic(1.0, NU), MeshOptions(*sizes, "swept"), (leg,), gauges=gauges, domain=domain)
+    leg, mesh, gauges = Leg(10.0, steps=4 if quick else "auto"), MeshOptions(*sizes, "swept"), paper_gauges(length)
+    return Model(fig9_finger(), Isotropic(1.0, NU), mesh, (leg,), gauges=gauges, domain=domain)
 
 
 def run(quick: bool) -> Result:
@@ -79,16 +78,8 @@ def run(quick: bool) -> Result:
     for (domain, kind), calibration in found.items():
         c = calibration.readings[0]
         spread = calibration.mu_sd(c.mu) if c.tolerances else np.full(len(c.mu), np.nan)
-        each = (
-            c.mu,
-            c.reading,
-            c.fit.at(c.mu),
-            c.slope(c.mu),
-            c.resolution(c.mu),
-            _resolution_of_fit(c, c.mu),
-            spread,
-        )
-        lines += [(domain, kind, *map(float, line)) for line in zip(*each, strict=True)]
+        from_curve = (c.reading, c.fit.at(c.mu), c.slope(c.mu), c.resolution(c.mu), _resolution_of_fit(c, c.mu))
+        lines += [(domain, kind, *map(float, line)) for line in zip(c.mu, *from_curve, spread, strict=True)]
     return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
 
 
@@ -111,18 +102,11 @@ def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> li
     # what the set allows for, drawn whole
     answers = estimate(quiet, c.at(mu) + random.normal(0.0, 1.0, count) * c.reading_sd(mu))
     hit = np.mean([any(low <= m <= high for low, high in e.intervals) for m, e in zip(mu, answers, strict=True)])
-    share = CREDIBLE
+    scatter = math.sqrt(CREDIBLE * (1.0 - CREDIBLE) / count)
     return [
         judged("strain-map-at-36-5-40", float(near.along(TURN)[1, i, j]), float(row[1]), last=last, here=here),
         judged("strain-from-the-reduced-model-mu", reduced, float(c.reading[-1]), last=last, here=here),
-        judged(
-            "90-sets-that-contain-the-true",
-            float(hit),
-            share,
-            tolerance=3.0 * math.sqrt(share * (1.0 - share) / count),
-            count=count,
-            here=here,
-        ),
+        judged("90-sets-that-contain-the-true", float(hit), CREDIBLE, tolerance=3.0 * scatter, count=count, here=here),
     ]
 
 
@@ -196,13 +180,3 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
     for axes in panels[1]:
         axes.plot(36.0, 40.0, "ko", mfc="none", ms=8)
         axes.set(xlabel="x (mm)", ylabel="y (mm)")
-
-
-def _edges(at: Float) -> Float:
-    """Return the n + 1 edges of the squares around n equidistant positions."""
-    half = 0.5 * (at[1] - at[0])
-    return np.append(at - half, at[-1] + half)
-
-
-def _colour_bar(figure: Any, axes: Any, drawn: Any, label: str, extend: str) -> None:
-    figure.colorbar(drawn, ax=axes, label=label, extend=extend, location="bottom", shrink=0.8, aspect=35)

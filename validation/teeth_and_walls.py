@@ -85,6 +85,7 @@ def _gear(quick: bool) -> Result:
     found = [pressed(angle, size) for angle in angles]
     further, back = pressed(angles[1] + PITCH, size), pressed(-angles[1], size)
     some, scale = found[1], abs(found[1]["force_y_N"])
+    away = max(abs(f["torque_Nmm"] - f["of_points_Nmm"]) / abs(f["force_y_N"]) for f in found)
     rows = [
         judged("change-of-by-a-turn-of", abs(further[name] - some[name]) / scale, name=name)
         for name in ("force_x_N", "force_y_N")
@@ -96,10 +97,7 @@ def _gear(quick: bool) -> Result:
     rows += [
         judged("sideways-over-vertical-force-of-a", abs(found[0]["force_x_N"]) / abs(found[0]["force_y_N"])),
         judged("the-same-at-deg", abs(some["force_x_N"]) / scale, value=angles[1]),
-        judged(
-            "torque-reported",
-            max(abs(f["torque_Nmm"] - f["of_points_Nmm"]) / abs(f["force_y_N"]) for f in found) / size,
-        ),
+        judged("torque-reported", away / size),
     ]
     table: dict[str, Any] = {"angle_deg": list(angles)} | {key: [f[key] for f in found] for key in found[0]}
     return Result(tuple(rows), table, lambda figure: _draw_gear(figure, table))
@@ -167,21 +165,19 @@ def slid(size: float) -> dict[str, Any]:
     steps = converged(problem)
     last = steps[-1]
     force, at = problem.world_force(last.meshed_state.contact), problem.points.points
-    touching = (last.state.status != OPEN) & (problem.points.face == WALLS)
+    before, walls = problem.world_force(steps[0].meshed_state.contact), problem.points.face == WALLS
+    touching = (last.state.status != OPEN) & walls
     mouth = problem.system.first_contact_mm - depth
     return {
-        "wall_N": float(force[problem.points.face == WALLS, 0].sum()),
+        "wall_N": float(force[walls, 0].sum()),
         "face_N": float(force[problem.points.face == 0, 0].sum()),
         "lowest": float(at[touching, 1].min() - mouth),
         "highest": float(at[touching, 1].max() - mouth),
         "penetration_mm": check_surface(problem, [last])[0].penetration_mm,
-        "wall_before_N": float(
-            np.abs(problem.world_force(steps[0].meshed_state.contact)[problem.points.face == WALLS]).sum()
-        ),
-        "pressure": (at[problem.points.face == WALLS], last.state.force[problem.points.face == WALLS, 0]
-                     / problem.points.area[problem.points.face == WALLS]),
+        "wall_before_N": float(np.abs(before[walls]).sum()),
+        "pressure": (at[walls], last.state.force[walls, 0] / problem.points.area[walls]),
         "mouth": mouth,
-    }  # fmt: skip
+    }
 
 
 def _slot(quick: bool) -> Result:

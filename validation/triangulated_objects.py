@@ -72,9 +72,9 @@ def bar(sectors: int) -> Triangles:
     return Triangles(points + [3.0, -2.0, 1.0], np.vstack([*sides, *caps]))
 
 
-def box() -> Triangles:
-    """A box with half edges 1, 2, 3."""
-    points = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * [1.0, 2.0, 3.0]
+def box(*half_edges: float) -> Triangles:
+    """A box about the origin."""
+    points = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half_edges
     sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     return Triangles(points, np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]))
 
@@ -127,7 +127,7 @@ def run(quick: bool) -> Result:
 def _distance_rows() -> list[Row]:
     rng = np.random.default_rng(0)
     p = rng.uniform(-4.0, 4.0, (2000, 3))
-    body = box()
+    body = box(1.0, 2.0, 3.0)
     distance, normal = body.signed_distance(p)
     q = np.abs(p) - [1.0, 2.0, 3.0]
     exact = np.linalg.norm(np.maximum(q, 0.0), axis=1) + np.minimum(q.max(axis=1), 0.0)

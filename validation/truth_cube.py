@@ -158,16 +158,10 @@ def _predicted(models: list[Compression], data: Float) -> list[Row]:
     """Distances of the outer beads at the third compression."""
     first = min(models, key=lambda m: m.misfit(data[:2]))
     travel, _ = first.fitted(data[2], slice(0, 1))
-    change = first.at(travel)[2]
-    return [
-        judged(
-            "changes-of-distance-at-18-25",
-            float(np.abs(change - data[2, 2]).max()),
-            value=data[2, 2].min(),
-            other_value=data[2, 2].max(),
-            mu=first.mu,
-        )
-    ]
+    wanted = data[2, 2]
+    away = float(np.abs(first.at(travel)[2] - wanted).max())
+    words = {"value": wanted.min(), "other_value": wanted.max(), "mu": first.mu}
+    return [judged("changes-of-distance-at-18-25", away, **words)]
 
 
 def _draw(figure: Any, models: list[Compression], best: Compression, data: Float) -> None:

@@ -34,7 +34,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Move, ObjectPose, Sphere
 
-from ._press import changed
+from ._press import changed, converged
 from ._rows import Result, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -58,10 +58,8 @@ def block(size: float) -> Problem:
 def twisted(problem: Problem, mu: float, angle: float, steps: int) -> list[tuple[float, float, float, float]]:
     """Angle, torque (N mm), force (N) and stuck share of the contact after every increment of the turn."""
     legs = (Leg(DEPTH, steps=3), Leg(DEPTH, steps=steps, turn_y=angle))
-    model = replace(problem.model, friction=Coulomb(mu), legs=legs)
     out = []
-    for frame in march(replace(problem, model=model)):
-        assert frame.outcome.ok, frame.outcome
+    for frame in converged(changed(problem, friction=Coulomb(mu), legs=legs)):
         found = measure(problem.points, frame)
         stuck = found["stick_area_mm2"] / found["contact_area_mm2"]
         out.append((frame.target.turn_y, found["moment_y_Nmm"], found["normal_force_N"], stuck))
@@ -131,29 +129,21 @@ def run(quick: bool) -> Result:
         once = partial(problem, STUCK[5:6])[0][2]
         table += [(count, c, t, m, torque_of(c), stuck, math.degrees(angle)) for c, t, m, stuck, angle in steps]
     at = f"{edges[-1]} edges to a"
+    stick = torque_of(0.999) * 3.0 * math.pi / 16.0 * 2.0 * math.pi / 3.0 / (16.0 / 3.0 * turn_of(0.999))
     rows = [
         judged("torque-that-sticks-over-16-3", held[-1], tolerance=1.2 / edges[-1], at=at),
         judged("stuck-share", share, at=at),
         judged("torque-of-full-slip-over-3", slips[-1][1] / full, tolerance=0.25 / edges[-1], at=at),
         judged("stuck-share-in-full-slip-friction", slips[-1][3], tolerance=1.0 / edges[-1] ** 2, at=at),
         judged("closed-form-of-full-slip", torque_of(0.0)),
-        judged(
-            "closed-form-of-full-stick",
-            torque_of(0.999) * 3.0 * math.pi / 16.0 * 2.0 * math.pi / 3.0 / (16.0 / 3.0 * turn_of(0.999)),
-        ),
+        judged("closed-form-of-full-stick", stick),
         judged("torque-at-c-0-5-a", once / steps[5][2], at=at),
     ]
     for c, _, torque, stuck, angle in steps[1:8:2]:
-        what = f"at {math.degrees(angle):.3f} deg, c = {c:g} a, {at}"
+        what, share = f"at {math.degrees(angle):.3f} deg, c = {c:g} a, {at}", torque / steps[-1][2]
         rows += [
             judged("torque-over-that-of-full-slip", torque, torque_of(c), tolerance=0.25 / edges[-1], what=what),
-            judged(
-                "the-same-over-the-torque-found",
-                torque / steps[-1][2],
-                torque_of(c),
-                tolerance=0.15 / edges[-1],
-                what=what,
-            ),
+            judged("the-same-over-the-torque-found", share, torque_of(c), tolerance=0.15 / edges[-1], what=what),
             judged("stuck-radius-over-that", stuck, c, tolerance=1.0 / edges[-1], what=what),
         ]
     if not quick:
