@@ -16,7 +16,7 @@ import finger3d
 import finger3d.analyses.press
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
-from finger3d.results.vtu import grid
+from finger3d.results.states import grid
 from tests.scenes import SECTION, SOLID, written
 
 

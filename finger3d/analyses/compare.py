@@ -453,10 +453,10 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
         report.step(done, len(variants), _remark(cases[-1]))
         comparison = _compared(model, cases, folder)
         _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
-    from finger3d.plotting.comparison import draw
+    from finger3d.plotting.analyses import draw_comparison
     from finger3d.report.compare import compare_page
 
-    draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
+    draw_comparison(folder / "compare.png", cases, model.design.width_mm, solid.title)
     compare_page(folder).write(folder)
     return comparison
 

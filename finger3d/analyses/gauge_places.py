@@ -36,9 +36,9 @@ from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings import Kind
 from finger3d.objects import Plane
-from finger3d.plotting.optimise import GaugeMap, draw_places
+from finger3d.plotting.analyses import GaugeMap, draw_places
 from finger3d.progress import Progress
-from finger3d.report.gauge_places import gauge_places_page
+from finger3d.report.optimise import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tree
 from finger3d.scene.derived import largest_spread
 from finger3d.sensor.likelihood import ReadingEffects, mu_sd, prior

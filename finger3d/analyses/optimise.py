@@ -31,7 +31,7 @@ from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.readings import Gauge, strain_columns
-from finger3d.plotting.optimise import draw
+from finger3d.plotting.analyses import draw_optimisation
 from finger3d.progress import QUIET, Progress
 from finger3d.report.optimise import optimise_page
 from finger3d.results.journal import Journal, Row, number_in, opened
@@ -464,7 +464,7 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
     search.report.stage("increments of the best")
     _write_best(search, folder, best, search.increments(best.values))
     known = tuple(search.known.values())
-    draw(
+    draw_optimisation(
         folder / "design.png",
         [f.key for f in problem.free],
         [e.values for e in known],

@@ -28,8 +28,7 @@ from finger3d.mechanics.history import History, StepResult, contact_table, measu
 from finger3d.mechanics.march.grip import FINGERS, Grip, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
 from finger3d.objects import ObjectPose
-from finger3d.results.states import States, facing, states_of, write_states
-from finger3d.results.vtu import write_vtu
+from finger3d.results.states import States, facing, states_of, write_states, write_vtu
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate

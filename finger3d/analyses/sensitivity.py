@@ -346,10 +346,10 @@ def _tolerance(key: str, value: float) -> float | None:
 
 def _write(out: Path, found: Sensitivity) -> None:
     """Write the results and the figure."""
-    from finger3d.plotting.sensitivity import draw  # matplotlib is loaded for a figure only
+    from finger3d.plotting.analyses import draw_sensitivity  # matplotlib is loaded for a figure only
 
     with claimed(out, "sensitivity") as folder:
         write_json(folder / "sensitivity.json", found.as_dict())
         rows = found.rows()
         write_csv(folder / "sensitivity.csv", {name: [row[name] for row in rows] for name in rows[0]})
-        draw(folder / "sensitivity.png", found.title, found.numbers, rows)
+        draw_sensitivity(folder / "sensitivity.png", found.title, found.numbers, rows)

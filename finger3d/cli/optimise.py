@@ -82,7 +82,7 @@ def optimise(
             run(scene, o.free or (), out, o.gauge, mus, o.noise, o.budget, o.seed, sets, report)
     else:
         from finger3d.analyses.gauge_places import place_gauges
-        from finger3d.report.gauge_places import gauge_places_page as page
+        from finger3d.report.optimise import gauge_places_page as page
 
         with job(json_, lambda _: "nothing was written") as report:
             stds = parsed_tolerances(o.tolerance)

@@ -14,7 +14,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import triangulated
 from finger3d.mechanics.readings import Gauge
 from finger3d.mold.body import Body
-from finger3d.mold.layout import Layout
+from finger3d.mold.fasteners import Layout
 from finger3d.mold.options import MoldOptions
 
 if TYPE_CHECKING:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Table, number
-from finger3d.report.scene import how_modelled
+from finger3d.report.build import Figure, HeadlineRow, Page, PageSection, Table, how_modelled, number
 from finger3d.results.summary import read_json, title_of
 
 _FORCE = "force_N_per_mm"

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d._types import Float, TreeView
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.geometry.design import Design
-from finger3d.materials.elastic import ElasticConstants
+from finger3d.materials.modulus import ElasticConstants
 from finger3d.mechanics.model import Leg, contact_path
 from finger3d.objects import PlacedObject, RigidObject
 from finger3d.scene.material import mistakes

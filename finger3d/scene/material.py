@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
-from finger3d.materials.elastic import MODULUS_KEYS, NU
+from finger3d.materials.modulus import MODULUS_KEYS, NU
 from finger3d.materials.silicones import silicone_named
 from finger3d.scene.messages import Place, dotted, shown
 from finger3d.scene.tables import ElasticTable, PartTable

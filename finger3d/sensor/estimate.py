@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.sensor.calibration import Calibration
+from finger3d.sensor.calibration import Calibration, load
 from finger3d.sensor.curve import LARGEST_STRAIN, QUANTITIES
-from finger3d.sensor.files import load
 from finger3d.sensor.likelihood import Estimate
 
 

@@ -34,7 +34,7 @@ from finger3d.analyses.identify.presses import (
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.base import nominal_stress, principal_stretches
 from finger3d.io import claimed, write_csv, write_json, write_text
-from finger3d.plotting.identify import Panel, draw
+from finger3d.plotting.analyses import Panel, draw_identification
 from finger3d.progress import Progress
 from finger3d.report.identify import identify_page
 from finger3d.results.journal import opened
@@ -114,7 +114,7 @@ def write(folder: Path, found: Identification) -> None:
     write_json(folder / "identify.json", found.as_dict())
     write_text(folder / "identified.toml", found.scene.to_toml())
     panels = [*(_of_press(folder, found) if found.measured.columns else []), *_of_tests(folder, found)]
-    draw(folder / "identify.png", panels)
+    draw_identification(folder / "identify.png", panels)
     identify_page(folder).write(folder)
 
 
