@@ -34,8 +34,7 @@ from finger3d.plotting.gauges import COLOUR
 from finger3d.plotting.panels import middle_section
 from finger3d.plotting.solid import COLOURS
 from finger3d.progress import QUIET, Progress
-from finger3d.sensor.curve import NOISE, ReadingCurve
-from finger3d.sensor.model import SensorModel
+from finger3d.sensor.curve import NOISE, ReadingCurve, SensorModel
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

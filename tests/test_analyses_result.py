@@ -73,7 +73,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     from finger3d._notebook import card
     from finger3d.analyses.compare import Comparison
     from finger3d.mechanics.discretise.build import build
-    from finger3d.results.comparison import Case
+    from finger3d.results.summary import Case
     from finger3d.sensor import Calibration, ReadingCurve
 
     scene = finger3d.load(written(tmp_path, SECTION))

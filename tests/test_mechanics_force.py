@@ -29,7 +29,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import forces_on
 from finger3d.mechanics.history import State, StepResult, measure
-from finger3d.mechanics.march.parts import solved_in_turn
+from finger3d.mechanics.march.equilibrium import solved_in_turn
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions
 from finger3d.objects import Cylinder, Move, Plane, Sphere

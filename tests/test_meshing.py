@@ -28,7 +28,7 @@ from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.report import mesh_report
+from finger3d.meshing.limits import mesh_report
 from finger3d.meshing.sizing import Grading, Sizing, count_cells, sizing
 from finger3d.meshing.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild

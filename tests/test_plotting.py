@@ -30,7 +30,7 @@ from finger3d.plotting.figures import (
 from finger3d.plotting.gauges import marks_of
 from finger3d.report.sweep import draw as draw_sweep
 from finger3d.report.sweep import sweep_charts
-from finger3d.results.comparison import Case
+from finger3d.results.summary import Case
 from tests.commands import loaded
 from tests.comparison_cases import case
 from tests.designs import FIG9

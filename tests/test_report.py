@@ -14,6 +14,7 @@ import pytest
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings import strain_columns
+from finger3d.report.analyses import calibrate_page, compare_page, gauge_places_page, identify_page, optimise_page
 from finger3d.report.build import (
     CITE,
     PAPER,
@@ -29,10 +30,6 @@ from finger3d.report.build import (
     how_modelled,
     view_of,
 )
-from finger3d.report.calibrate import calibrate_page
-from finger3d.report.compare import compare_page
-from finger3d.report.identify import identify_page
-from finger3d.report.optimise import gauge_places_page, optimise_page
 from finger3d.report.press import press_page
 from finger3d.report.sweep import picture, sweep_charts
 from finger3d.results.states import load_states

@@ -32,7 +32,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import State
-from finger3d.mechanics.march.parts import frictional_dissipation
+from finger3d.mechanics.march.equilibrium import frictional_dissipation
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Move, ObjectPose
 

@@ -22,7 +22,7 @@ from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import companion_presses, estimate, press_numbers
 from finger3d.accuracy.refine import ALL
-from finger3d.analyses.effects_by_need import settled
+from finger3d.analyses.free_keys import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.companions import coarser

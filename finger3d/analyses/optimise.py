@@ -19,8 +19,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.curve_points import choose_increments, error_of_increments
-from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, scene_with
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, scene_with, settled_tables
 from finger3d.analyses.pressed_body import PressedBody, body_key, kept, under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import claimed, write_csv, write_json, write_text
@@ -33,7 +32,7 @@ from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.readings import Gauge, strain_columns
 from finger3d.plotting.analyses import draw_optimisation
 from finger3d.progress import QUIET, Progress
-from finger3d.report.optimise import optimise_page
+from finger3d.report.analyses import optimise_page
 from finger3d.results.journal import Journal, Row, number_in, opened
 from finger3d.scene import Scene, Source, files, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN

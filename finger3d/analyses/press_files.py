@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
-    from finger3d.analyses.effects_by_need import Need
+    from finger3d.analyses.free_keys import Need
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate

@@ -14,8 +14,7 @@ from finger3d._types import Tree, TreeView
 from finger3d.accuracy.error_bars import spread_error
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.effects_by_need import settled
-from finger3d.analyses.free_keys import scene_with
+from finger3d.analyses.free_keys import scene_with, settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json

@@ -13,7 +13,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.io import atomic
 from finger3d.materials.silicones import Silicone
 from finger3d.mold.body import ANGLE, Shell, write_3mf, write_step, write_stl
-from finger3d.mold.foils import strips
+from finger3d.mold.cover import strips
 from finger3d.mold.parts import HALVES, Mold
 from finger3d.mold.pours import Pour, insert_name
 from finger3d.mold.regions import manifold

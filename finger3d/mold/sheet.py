@@ -29,8 +29,7 @@ import numpy as np
 from finger3d.materials.modulus import youngs_modulus
 from finger3d.materials.silicones import Silicone, silicones
 from finger3d.mold.body import Shell
-from finger3d.mold.cover import Ports
-from finger3d.mold.foils import SLOT_GAP_MM
+from finger3d.mold.cover import SLOT_GAP_MM, Ports
 from finger3d.mold.options import PEG_MM
 from finger3d.mold.parts import Mold
 from finger3d.mold.pours import Pour, insert_name

@@ -15,7 +15,7 @@ from finger3d._types import Float, Tree
 from finger3d.geometry.design import Design
 from finger3d.plotting.layout import WIDEST, finish, sheet
 from finger3d.plotting.panels import middle_section
-from finger3d.results.comparison import FORCE, SHOWN, Case
+from finger3d.results.summary import FORCE, SHOWN, Case
 from finger3d.sensor.calibration import Calibration
 from finger3d.sensor.curve import QUANTITIES, ReadingCurve
 

@@ -20,7 +20,7 @@ from finger3d.mechanics.readings import Gauge, Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
-from finger3d.scene.derived import parts_of, path_of
+from finger3d.scene.material import parts_of, path_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place
 from finger3d.scene.tables import LegsTable, LegTable, SceneTable, record_of

@@ -17,9 +17,8 @@ import numpy as np
 from finger3d._types import Float, Tree, TreeView
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import checksum, write_csv, write_json
-from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, Tolerance
+from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, SensorModel, Tolerance
 from finger3d.sensor.likelihood import Estimate, estimator, ranges_text
-from finger3d.sensor.model import SensorModel
 
 _CUTS = 4  # of the distance between two calibrated mu, for the ends of the ranges
 

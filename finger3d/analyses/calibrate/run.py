@@ -26,7 +26,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
 from finger3d.plotting.analyses import draw_calibration
 from finger3d.progress import Progress
-from finger3d.report.calibrate import calibrate_page
+from finger3d.report.analyses import calibrate_page
 from finger3d.sensor.calibration import Calibration, save, write_table
 from finger3d.sensor.curve import (
     MARKER_NOISE_MM,
@@ -121,9 +121,9 @@ def calibrate(
     MissingError
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
-    from finger3d.analyses.effects_by_need import settled
+    from finger3d.analyses.free_keys import settled
     from finger3d.scene import scene_of
-    from finger3d.scene.derived import largest_spread
+    from finger3d.scene.material import largest_spread
 
     report = report or Progress()
     scene, _ = settled(scene_of(scene, overrides), report)

@@ -13,8 +13,7 @@ from scipy import optimize
 from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, settled_tables, values_at
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.material_tests import CONSTANT_KEYS, LawInTests, is_material_test, read_material_tests
 from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
@@ -36,7 +35,7 @@ from finger3d.fem.laws.base import nominal_stress, principal_stretches
 from finger3d.io import claimed, write_csv, write_json, write_text
 from finger3d.plotting.analyses import Panel, draw_identification
 from finger3d.progress import Progress
-from finger3d.report.identify import identify_page
+from finger3d.report.analyses import identify_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, Source, files, parse, tables_of, tree
 
