@@ -27,7 +27,7 @@ class FrictionNode(Node):
 
     def on_strain(self, message: Float64) -> None:
         """Publish mu, or log why the reading does not determine it."""
-        found = finger3d.sensor.given_readings(self.calibration, message.data)[0]
+        found = finger3d.sensor.estimate(self.calibration, message.data)[0]
         if found.is_determined:
             self.publisher.publish(Float64MultiArray(data=[found.mu, found.std, found.low, found.high]))
         else:

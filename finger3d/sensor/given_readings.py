@@ -160,7 +160,7 @@ class Estimator:
     Attributes
     ----------
     stds : standard deviations by the names of readings; the noise of the calibration where there is none
-    tolerances : see `finger3d.sensor.given_readings`
+    tolerances : see `estimate`
     """
 
     calibration: Calibration
