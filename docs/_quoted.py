@@ -13,7 +13,7 @@ from pathlib import Path
 
 import finger3d
 from finger3d.effects import effect_names, effect_type
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.materials.modulus import youngs_modulus
 from finger3d.materials.silicones import Silicone, silicones, sources
 from finger3d.objects import OBJECTS, RigidObject

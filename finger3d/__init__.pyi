@@ -19,7 +19,7 @@ from finger3d.errors import MissingError as MissingError
 from finger3d.errors import Outcome as Outcome
 from finger3d.fem.laws.material import Isotropic as Isotropic
 from finger3d.fem.mesh import Mesh as Mesh
-from finger3d.geometry.registry import designs as designs
+from finger3d.geometry.design import designs as designs
 from finger3d.mechanics.model import Leg as Leg
 from finger3d.mechanics.model import MeshOptions as MeshOptions
 from finger3d.mechanics.model import Model as Model

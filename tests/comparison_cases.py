@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from finger3d.errors import Outcome
-from finger3d.results.comparison import FORCE, Case
+from finger3d.results.summary import FORCE, Case
 
 
 def case(model: str, width: float, force: float, error: float = 0.0, **more: float) -> Case:

@@ -132,7 +132,7 @@ def paper_finger() -> Design:
 @pytest.fixture(scope="session")
 def paper_mold(paper_finger: Design) -> Mold:
     """The mold of the Fig. 9 finger with slots for `GAUGES`, and all that a mold has by default."""
-    from finger3d.mold.foils import foils
+    from finger3d.mold.cover import foils
     from finger3d.mold.options import MoldOptions
     from finger3d.mold.parts import mold
     from tests.mold_cases import GAUGES

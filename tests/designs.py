@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import MeshOptions
 
 GOOD: dict[str, dict[str, float]] = {

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import Gauge
 from finger3d.mold.body import shell
 from finger3d.mold.options import MoldOptions

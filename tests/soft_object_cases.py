@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import Coulomb
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Plane

@@ -17,7 +17,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Plane, Sphere

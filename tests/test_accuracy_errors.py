@@ -21,7 +21,7 @@ from finger3d.effects.embedded_gauge import Effect as Foil
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.materials.modulus import SPREAD_A
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult

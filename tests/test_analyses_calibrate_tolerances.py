@@ -29,7 +29,7 @@ from finger3d.analyses.reduced import ReducedModel
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import MIXED_FROM, Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import companion
 from finger3d.mechanics.discretise.problem import Problem

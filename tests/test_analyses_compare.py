@@ -28,7 +28,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import FACTOR
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.readings import strain_columns
-from finger3d.results.comparison import FORCE, Case
+from finger3d.results.summary import FORCE, Case
 from finger3d.scene import load
 from tests.comparison_cases import case
 from tests.scenes import SWEPT_FINGER, written

@@ -10,7 +10,7 @@ import pytest
 
 import finger3d
 from finger3d.accuracy.changes import changing_numbers
-from finger3d.analyses.effects_by_need import judge, settled
+from finger3d.analyses.free_keys import judge, settled
 from finger3d.errors import Finger3dError
 from finger3d.progress import QUIET
 from finger3d.scene import Scene, parse

@@ -19,12 +19,12 @@ from finger3d.analyses.calculix import (
     Deck,
     DeckStep,
     ObjectElements,
+    export_mesh,
     facet_lines,
     law_cards,
     object_elements,
     press_deck,
 )
-from finger3d.analyses.export_model import export_mesh
 from finger3d.cli import main
 from finger3d.fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
 from finger3d.fem.laws.material import Isotropic

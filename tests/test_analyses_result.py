@@ -16,7 +16,7 @@ import finger3d
 import finger3d.analyses.press
 from finger3d.analyses.result import PressResult
 from finger3d.errors import Finger3dError
-from finger3d.results.vtu import grid
+from finger3d.results.states import grid
 from tests.scenes import SECTION, SOLID, written
 
 
@@ -73,7 +73,7 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_wh
     from finger3d._notebook import card
     from finger3d.analyses.compare import Comparison
     from finger3d.mechanics.discretise.build import build
-    from finger3d.results.comparison import Case
+    from finger3d.results.summary import Case
     from finger3d.sensor import Calibration, ReadingCurve
 
     scene = finger3d.load(written(tmp_path, SECTION))

@@ -15,9 +15,13 @@ from dash import Dash, html
 
 import finger3d
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
-from finger3d.app.live_body import MU_STEP, STEPS, LiveBody, LivePress, LiveReading
-from finger3d.app.page import (
+from finger3d.app import (
     HOST,
+    MU_STEP,
+    STEPS,
+    LiveBody,
+    LivePress,
+    LiveReading,
     local_server,
     numbers_of,
     page,

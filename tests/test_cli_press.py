@@ -19,7 +19,7 @@ from finger3d.analyses.cost import ERRORS
 from finger3d.cli import main
 from finger3d.errors import MissingError, Outcome
 from finger3d.plotting.renderer import running_child
-from finger3d.results.comparison import Case
+from finger3d.results.summary import Case
 from tests.commands import refused, run
 from tests.pictures import marked, orange, rgb
 from tests.scenes import SECTION, SWEPT_FINGER, written

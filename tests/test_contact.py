@@ -23,7 +23,7 @@ from finger3d.contact.state import ContactState
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march

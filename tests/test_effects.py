@@ -27,7 +27,7 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import FREE_FACES
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import measure

@@ -15,9 +15,8 @@ from finger3d.fem.assembly import Pattern, stiffness
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh, quadratic
-from finger3d.fem.solids.bars import BarRelaxation, Bars
+from finger3d.fem.solids.embedded import BarRelaxation, Bars, InfiniteBody
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian, stretch
-from finger3d.fem.solids.kelvin import InfiniteBody
 from finger3d.fem.tensors import determinant
 from tests.energies import energy_of_body
 from tests.meshes import full, grid

@@ -16,7 +16,7 @@ from finger3d.fem.surface import (
     surface,
     values_over,
 )
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section

@@ -12,8 +12,7 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.geometry.cad import cut, extruded, labelled_faces, sound
-from finger3d.geometry.design import check_core, check_layer
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import check_core, check_layer, designs
 from finger3d.geometry.section import (
     Core,
     block_section,

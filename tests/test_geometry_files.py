@@ -13,10 +13,9 @@ import pytest
 
 from finger3d.cli import main
 from finger3d.errors import Finger3dError
-from finger3d.geometry.cad import cut_part, labelled_faces
+from finger3d.geometry.cad import OUTSIDE, cut_part, glue, labelled_faces
 from finger3d.geometry.files import read_solid, read_step, read_surface, welded
 from finger3d.geometry.imported import imported
-from finger3d.geometry.parts import OUTSIDE, glue
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.geometry.tessellate import tessellate, tessellate_parts

@@ -9,11 +9,10 @@ import pytest
 
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.faceted import coarser
-from finger3d.geometry.implicit import Freeform, ImplicitCylinder, surface_of
 from finger3d.geometry.imported import of_surface
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import crossings, mistake
-from finger3d.geometry.tessellate import tessellate
+from finger3d.geometry.tessellate import Freeform, ImplicitCylinder, surface_of, tessellate
 from finger3d.meshing.unstructured.snap import check_closed, project
 from tests.bodies import ball, box, channel
 from tests.cad_cases import EXACT, body_of, faces_of

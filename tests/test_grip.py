@@ -12,7 +12,7 @@ import pytest
 
 from finger3d.analyses.press import least_grip
 from finger3d.analyses.reduced import ReducedModel
-from finger3d.app.live_body import LiveBody
+from finger3d.app import LiveBody
 from finger3d.cli import main
 from finger3d.contact.friction import STICK
 from finger3d.errors import Finger3dError

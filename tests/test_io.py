@@ -22,7 +22,7 @@ from finger3d.cli import main
 from finger3d.csv_table import read_table
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError, Outcome
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.io import atomic, claimed, holds, write_csv, write_json
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march

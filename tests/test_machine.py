@@ -27,7 +27,7 @@ from finger3d._machine import (
     versions,
 )
 from finger3d.errors import MissingError
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.sizing import sizing
 from finger3d.meshing.unstructured import tetwild
@@ -85,7 +85,7 @@ def _runs(pid: int) -> bool:
 KILLED = """
 import numpy as np
 from finger3d.mechanics.model import MeshOptions
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.meshing.unstructured import tetwild
 from finger3d.meshing.sizing import sizing
 from tests.bodies import CUBE, SIDES

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 
 from finger3d.errors import Finger3dError
-from finger3d.materials.elastic import NU, ElasticConstants, elastic_constants
 from finger3d.materials.modulus import (
     BATCH,
     NEO_HOOKEAN,
+    NU,
     SHOULDERS,
     SOFTER_A,
     SPREAD_00,
     SPREAD_A,
+    ElasticConstants,
+    elastic_constants,
     modulus_of_shore_00,
     modulus_of_shore_A,
     of_shore,

@@ -13,7 +13,7 @@ from finger3d.effects.elastic_object import Effect
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import Mesh, curved_volume, quadratic
 from finger3d.fem.surface import BoundarySurface, surface
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.body_mesh import stretched
 from finger3d.mechanics.discretise.build import build, mesh_part
 from finger3d.mechanics.discretise.contact_points import contact_geometry

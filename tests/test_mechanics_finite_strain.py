@@ -19,7 +19,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import most_distorted
 from finger3d.fem.recovery import displacement
 from finger3d.fem.solids.hyperelastic import Hyperelastic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.finite_strain.body import DeformedBody, FiniteBody

@@ -23,13 +23,13 @@ from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import forces_on
 from finger3d.mechanics.history import State, StepResult, measure
-from finger3d.mechanics.march.parts import solved_in_turn
+from finger3d.mechanics.march.equilibrium import solved_in_turn
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Leg, MeshOptions
 from finger3d.objects import Cylinder, Move, Plane, Sphere

@@ -16,7 +16,7 @@ from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import FREE_FACES
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure

@@ -21,7 +21,7 @@ from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.recovery import displacement
 from finger3d.fem.surface import displacement_row
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure, table_row

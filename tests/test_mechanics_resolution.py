@@ -17,7 +17,7 @@ from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import UnresolvedError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.companions import coarse_companions, coarser, companion
 from finger3d.mechanics.discretise.problem import Problem

@@ -15,7 +15,7 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import Mesh, boundary, quadratic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import Problem

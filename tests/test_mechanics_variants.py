@@ -18,7 +18,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws import NeoHooke
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build, changed
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of

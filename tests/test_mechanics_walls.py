@@ -17,7 +17,7 @@ from finger3d.effects.large_deformation import Effect
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
 from finger3d.fem.mesh import FREE_FACES
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march

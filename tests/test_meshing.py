@@ -21,14 +21,14 @@ from finger3d.fem.mesh import (
     quadratic,
     signed_volumes,
 )
+from finger3d.geometry.design import designs
 from finger3d.geometry.faceted import body as faceted_body
 from finger3d.geometry.imported import imported
-from finger3d.geometry.registry import designs
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing import cache
 from finger3d.meshing.bisection import refined
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.report import mesh_report
+from finger3d.meshing.limits import mesh_report
 from finger3d.meshing.sizing import Grading, Sizing, count_cells, sizing
 from finger3d.meshing.swept import mesh_section, mesh_swept
 from finger3d.meshing.unstructured import tetwild
@@ -111,7 +111,7 @@ def test_the_second_time_the_mesh_comes_from_the_cache(real: tuple[Mesh, Any, li
 
 def test_a_warm_cache_needs_no_cad(real: tuple[Mesh, Any, list[str]]) -> None:
     program = (
-        "from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
+        "from types import SimpleNamespace as N; from finger3d.geometry.design import *;"
         "from finger3d.meshing.generate import *;"
         "d = designs()['clipped_cylinder'](100.0, 50.0, 36.6, 20.0);"
         "o = N(size_mm=5.0, base_size_mm=10.0, mesher='ftetwild', grading=None);"

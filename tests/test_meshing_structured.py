@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh, boundary, cell_angles_deg, curved_jacobians, curved_volume, signed_volumes, unfold
 from finger3d.geometry.cad import sound
-from finger3d.geometry.implicit import ImplicitCylinder, ImplicitPlane, ImplicitSphere
-from finger3d.geometry.registry import designs
-from finger3d.geometry.tessellate import Tessellation, tessellate
+from finger3d.geometry.design import designs
+from finger3d.geometry.tessellate import ImplicitCylinder, ImplicitPlane, ImplicitSphere, Tessellation, tessellate
 from finger3d.mechanics.model import MeshOptions
 from finger3d.meshing.generate import mesh_solid
 from finger3d.meshing.swept import mesh_section
@@ -172,7 +171,7 @@ def test_a_design_without_section_cannot_be_swept() -> None:
 
 def test_structured_meshes_load_no_cad() -> None:
     program = (
-        "from types import SimpleNamespace as N; from finger3d.geometry.registry import *;"
+        "from types import SimpleNamespace as N; from finger3d.geometry.design import *;"
         "from finger3d.meshing.generate import *; from finger3d.meshing.swept import *;"
         "d = designs()['half_cylinder'](5.0, 10.0);"
         "o = N(size_mm=0.5, base_size_mm=2.0, mesher='swept', layers=2, grading=None);"

@@ -12,9 +12,9 @@ import pytest
 
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.mesh import Mesh, boundary, curved_jacobians, curved_volume, signed_volumes, unfold
+from finger3d.geometry.cad import OUTSIDE, glue
+from finger3d.geometry.design import designs
 from finger3d.geometry.imported import imported
-from finger3d.geometry.parts import OUTSIDE, glue
-from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.tessellate import tessellate_parts
 from finger3d.mechanics.model import MeshOptions

@@ -11,14 +11,12 @@ import pytest
 from manifold3d import CrossSection
 
 from finger3d.errors import Finger3dError
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import Gauge
 from finger3d.mold.body import Body, shell
-from finger3d.mold.cover import openings, ports
+from finger3d.mold.cover import foils, openings, ports, slot
 from finger3d.mold.demould import check_opening, undercut, undercut_depth
-from finger3d.mold.fasteners import THIN, bolts, half_pegs, lid_pegs, screws
-from finger3d.mold.foils import foils, slot
-from finger3d.mold.layout import layout_of
+from finger3d.mold.fasteners import THIN, bolts, half_pegs, layout_of, lid_pegs, screws
 from finger3d.mold.options import SCREWS, MoldOptions
 from finger3d.mold.parts import mold
 from finger3d.mold.regions import disc, inside, widened

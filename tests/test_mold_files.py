@@ -16,17 +16,20 @@ from finger3d.geometry.imported import imported
 from finger3d.geometry.surface_checks import mistake
 from finger3d.materials.silicones import Mix, Silicone, silicone_named, silicones
 from finger3d.mold.body import Shell, shell
-from finger3d.mold.casting import (
-    flow_ml_min,
-    silicone_lines,
-)
 from finger3d.mold.cover import Ports
 from finger3d.mold.export import export
 from finger3d.mold.options import MoldOptions
-from finger3d.mold.output import mold_page, print_remarks, write_mold
+from finger3d.mold.output import as_printed, in_a_row, islands, mold_page, print_remarks, thickness, write_mold
 from finger3d.mold.parts import Mold
-from finger3d.mold.printing import as_printed, in_a_row, islands, thickness
-from finger3d.mold.sheet import close_lines, open_lines, pour_lines, prepare_lines, sheet
+from finger3d.mold.sheet import (
+    close_lines,
+    flow_ml_min,
+    open_lines,
+    pour_lines,
+    prepare_lines,
+    sheet,
+    silicone_lines,
+)
 from finger3d.progress import Progress
 from finger3d.scene import parse
 from tests.bodies import box

@@ -9,7 +9,7 @@ import pytest
 from manifold3d import CrossSection
 
 from finger3d.errors import Finger3dError
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mold import regions
 from finger3d.mold.body import Body, shell

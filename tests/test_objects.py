@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from finger3d.contact.friction import OPEN
 from finger3d.errors import Finger3dError
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march

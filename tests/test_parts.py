@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic, elasticity_of
 from finger3d.fem.mesh import quadratic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Taxel

@@ -17,8 +17,9 @@ from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings import strain_columns
 from finger3d.plotting import solid as render
-from finger3d.plotting.calibration import draw as draw_calibration
-from finger3d.plotting.comparison import draw as draw_comparison
+from finger3d.plotting.analyses import GaugeMap, Panel, draw_calibration, draw_comparison, draw_places
+from finger3d.plotting.analyses import draw_identification as draw_fit
+from finger3d.plotting.analyses import draw_optimisation as draw_search
 from finger3d.plotting.figures import (
     contact_figure,
     force_figure,
@@ -27,13 +28,9 @@ from finger3d.plotting.figures import (
     zones,
 )
 from finger3d.plotting.gauges import marks_of
-from finger3d.plotting.identify import Panel
-from finger3d.plotting.identify import draw as draw_fit
-from finger3d.plotting.optimise import GaugeMap, draw_places
-from finger3d.plotting.optimise import draw as draw_search
+from finger3d.report.sweep import draw as draw_sweep
 from finger3d.report.sweep import sweep_charts
-from finger3d.report.sweep_figure import draw as draw_sweep
-from finger3d.results.comparison import Case
+from finger3d.results.summary import Case
 from tests.commands import loaded
 from tests.comparison_cases import case
 from tests.designs import FIG9

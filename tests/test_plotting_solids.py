@@ -24,10 +24,7 @@ from finger3d.plotting import solid as render
 from finger3d.plotting.deformed import draw_finger
 from finger3d.plotting.gauges import COLOUR, marks_of
 from finger3d.plotting.mold import scenery, scenery_on_the_bed, standing, taken_apart, write_pictures
-from finger3d.plotting.panels import (
-    palette,
-    sliced,
-)
+from finger3d.plotting.panels import palette, sliced
 from finger3d.plotting.solid import DeformedFinger
 from tests.bodies import ball, box
 from tests.designs import FIG9

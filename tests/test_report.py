@@ -14,19 +14,24 @@ import pytest
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings import strain_columns
-from finger3d.report.build import CITE, PAPER, Code, Figure, HeadlineRow, Page, PageSection, Table
-from finger3d.report.calibrate import calibrate_page
-from finger3d.report.chart import Chart, Line
-from finger3d.report.compare import compare_page
-from finger3d.report.gauge_places import gauge_places_page
-from finger3d.report.html import embedded
-from finger3d.report.identify import identify_page
-from finger3d.report.optimise import optimise_page
+from finger3d.report.analyses import calibrate_page, compare_page, gauge_places_page, identify_page, optimise_page
+from finger3d.report.build import (
+    CITE,
+    PAPER,
+    Chart,
+    Code,
+    Figure,
+    HeadlineRow,
+    Line,
+    Page,
+    PageSection,
+    Table,
+    embedded,
+    how_modelled,
+    view_of,
+)
 from finger3d.report.press import press_page
-from finger3d.report.scene import how_modelled
-from finger3d.report.sweep import sweep_charts
-from finger3d.report.sweep_figure import picture
-from finger3d.report.view3d import view_of
+from finger3d.report.sweep import picture, sweep_charts
 from finger3d.results.states import load_states
 from finger3d.results.summary import title_of
 from finger3d.sensor import save

@@ -13,8 +13,7 @@ import pytest
 from finger3d.analyses.compare import compare
 from finger3d.cli import main
 from finger3d.plotting.layout import DPI
-from finger3d.report.build import Page
-from finger3d.report.chart import Chart, Line
+from finger3d.report.build import Chart, Line, Page
 from finger3d.results.states import load_states
 from tests.scenes import HALF_CYLINDER, SECTION, SOLID, changed, pressed, solid
 

@@ -18,9 +18,8 @@ from finger3d.errors import Finger3dError, MissingError
 from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.results import journal
 from finger3d.results.journal import Journal, Row, number_in, opened
-from finger3d.results.states import load_states
+from finger3d.results.states import load_states, write_vtu
 from finger3d.results.summary import read_json
-from finger3d.results.vtu import write_vtu
 from tests.commands import loaded
 
 TASK = {"scene": {"mu": 0.5}, "points": 3}
@@ -239,7 +238,7 @@ def test_vtu_is_read_back_identical(tmp_path: Path, mesh: Mesh, kind: int) -> No
 
 def test_writing_loads_neither_vtk_nor_pyvista(tmp_path: Path) -> None:
     program = (
-        "import numpy as np; from finger3d.results.vtu import write_vtu; from finger3d.fem.mesh import Mesh;"
+        "import numpy as np; from finger3d.results.states import write_vtu; from finger3d.fem.mesh import Mesh;"
         f"write_vtu({str(tmp_path / 'f.vtu')!r}, Mesh(np.eye(3)[:, :2], np.array([[0, 1, 2]]), {{}}), {{}})"
     )
     assert not loaded(program, "vtk", "vtkmodules", "pyvista", "matplotlib")

@@ -9,10 +9,9 @@ import pytest
 
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
-from finger3d.materials.elastic import elastic_constants
-from finger3d.materials.modulus import SPREAD_A, modulus_of_shore_A
+from finger3d.materials.modulus import SPREAD_A, elastic_constants, modulus_of_shore_A
 from finger3d.scene import load, parse
-from finger3d.scene.derived import check_parts, largest_spread, moduli, parts_of, spreads
+from finger3d.scene.material import check_parts, largest_spread, moduli, parts_of, spreads
 from finger3d.scene.tables import SceneTable
 from tests.commands import refused
 from tests.designs import GOOD

@@ -10,8 +10,7 @@ from pathlib import Path
 from finger3d._types import Tree
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.model import Domain, ElasticObject, Gauge, Leg, MeshOptions, Model
 from finger3d.mechanics.readings import Marker, Taxel
 from finger3d.objects import Cylinder, Plane, Sphere

@@ -23,7 +23,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import Mesh
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import local_rows
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import candidate_points, contact_rows, mesh_part
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints
 from finger3d.mechanics.discretise.problem import CondensedBody, ContactSystem, Problem, free_surface

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finger3d.contact.friction import OPEN
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.formulations import formulation_of
 
 from ._common import free_motion

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Plane, Sphere, Wave, Wedge
 

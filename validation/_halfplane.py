@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult

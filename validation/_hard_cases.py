@@ -25,7 +25,7 @@ from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of

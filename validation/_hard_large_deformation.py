@@ -28,8 +28,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import quadrature
 from finger3d.fem.recovery import displacement
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import Design, designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN

@@ -19,7 +19,7 @@ from finger3d._types import Float
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.recovery import displacement
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, contact_table

@@ -11,8 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from finger3d.contact.friction import Coulomb, FrictionLaw
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult

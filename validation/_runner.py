@@ -24,7 +24,7 @@ import finger3d
 from finger3d._machine import versions
 from finger3d._types import Tree, TreeView
 from finger3d.errors import Finger3dError
-from finger3d.geometry.registry import import_from
+from finger3d.geometry.design import import_from
 from finger3d.io import atomic, write_csv, write_json
 from finger3d.progress import Progress
 

@@ -29,7 +29,7 @@ from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import local_rows, surface
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model

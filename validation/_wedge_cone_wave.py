@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model

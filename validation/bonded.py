@@ -25,7 +25,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model

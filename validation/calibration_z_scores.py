@@ -22,7 +22,7 @@ from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import read
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.step_halving import increment_error
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

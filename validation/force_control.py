@@ -26,7 +26,7 @@ from finger3d._types import Float, Tree
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import measure

@@ -28,7 +28,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult

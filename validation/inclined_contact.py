@@ -13,7 +13,7 @@ import numpy as np
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem

@@ -25,7 +25,7 @@ from finger3d.fem.mesh import Mesh, unfold
 from finger3d.fem.recovery import displacement
 from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface import strain_row
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.meshing.grid import Sizes, rows
 
 from ._paper import MUS, STRAIN, STRESS, Profile, half_cylinder, line_r5, said, strains

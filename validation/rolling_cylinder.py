@@ -27,12 +27,12 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import State
-from finger3d.mechanics.march.parts import frictional_dissipation
+from finger3d.mechanics.march.equilibrium import frictional_dissipation
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Move, ObjectPose
 

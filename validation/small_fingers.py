@@ -22,7 +22,7 @@ from finger3d._types import Float
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._paper import said

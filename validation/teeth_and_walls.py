@@ -15,8 +15,8 @@ from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import FREE_FACES
+from finger3d.geometry.design import designs
 from finger3d.geometry.files import read_surface
-from finger3d.geometry.registry import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import contact_table, measure

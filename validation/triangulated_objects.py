@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure

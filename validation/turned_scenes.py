@@ -25,7 +25,7 @@ from finger3d.contact.state import ContactState
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure

@@ -25,7 +25,7 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.elastic_object import Effect
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.surface import facing_trace, local_rows
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.elastic_object import ObjectBody
 from finger3d.mechanics.discretise.problem import Problem

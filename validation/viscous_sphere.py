@@ -32,7 +32,7 @@ from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.fem.mesh import Mesh
-from finger3d.fem.solids.bars import AddedStiffness
+from finger3d.fem.solids.embedded import AddedStiffness
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.problem import scatter_to_points

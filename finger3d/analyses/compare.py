@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Domain, Model
 from finger3d.mechanics.readings import Quantity, by_key, in_space, of_kind
 from finger3d.objects import PlacedObject
 from finger3d.progress import Progress
-from finger3d.results.comparison import FORCE, SHOWN, Case
+from finger3d.results.summary import FORCE, SHOWN, Case
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
@@ -383,7 +383,7 @@ class Comparison:
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
         from finger3d.report.build import number
-        from finger3d.results.comparison import FORCE
+        from finger3d.results.summary import FORCE
 
         rows = [
             (c.model, f"{c.width_mm:g}", number(c.numbers[FORCE], c.errors.get(FORCE)) if c.ok else str(c.outcome))
@@ -420,7 +420,7 @@ def compare(
     Comparison
         Cases may have failed to converge; the verdict names them.
     """
-    from finger3d.analyses.effects_by_need import settled
+    from finger3d.analyses.free_keys import settled
     from finger3d.scene import scene_of
 
     report = report or Progress()
@@ -453,10 +453,10 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
         report.step(done, len(variants), _remark(cases[-1]))
         comparison = _compared(model, cases, folder)
         _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
-    from finger3d.plotting.comparison import draw
-    from finger3d.report.compare import compare_page
+    from finger3d.plotting.analyses import draw_comparison
+    from finger3d.report.analyses import compare_page
 
-    draw(folder / "compare.png", cases, model.design.width_mm, solid.title)
+    draw_comparison(folder / "compare.png", cases, model.design.width_mm, solid.title)
     compare_page(folder).write(folder)
     return comparison
 

@@ -22,7 +22,7 @@ from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import companion_presses, estimate, press_numbers
 from finger3d.accuracy.refine import ALL
-from finger3d.analyses.effects_by_need import settled
+from finger3d.analyses.free_keys import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
 from finger3d.mechanics.discretise.companions import coarser
@@ -184,11 +184,13 @@ def cost(
     tabled = tuple(of) if of and ALL not in of else forecasts.main[:_MOST_COLUMNS]
     found = Costs(scene.title, chosen, rows, tabled, time.perf_counter() - start)
     if png is not None:
-        from finger3d.plotting.cost import draw  # matplotlib is loaded for a figure only
+        from finger3d.plotting.analyses import draw_cost  # matplotlib is loaded for a figure only
 
         timed = [row for row in rows if row.dofs]
         errors = {name: [row.errors[name] for row in timed] for name in found.names}
-        draw(Path(png), found.title, [row.seconds for row in timed], errors, rows[0].seconds if rows[0].dofs else None)
+        draw_cost(
+            Path(png), found.title, [row.seconds for row in timed], errors, rows[0].seconds if rows[0].dofs else None
+        )
     return found
 
 

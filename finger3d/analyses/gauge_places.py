@@ -21,8 +21,7 @@ from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Float, Tree, TreeView
 from finger3d.accuracy.error_bars import gain
 from finger3d.analyses.calibrate.tolerances import deeper, poisson_steps, tilted_mesh, with_defaults, with_modulus
-from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys
+from finger3d.analyses.free_keys import Bounds, FreeKey, free_keys, settled_tables
 from finger3d.analyses.optimise import MUS, check_readings
 from finger3d.analyses.pressed_body import PressedBody, presses, under
 from finger3d.errors import Finger3dError
@@ -36,13 +35,13 @@ from finger3d.mechanics.march.step_halving import with_steps
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings import Kind
 from finger3d.objects import Plane
-from finger3d.plotting.optimise import GaugeMap, draw_places
+from finger3d.plotting.analyses import GaugeMap, draw_places
 from finger3d.progress import Progress
-from finger3d.report.gauge_places import gauge_places_page
+from finger3d.report.analyses import gauge_places_page
 from finger3d.scene import Scene, Source, parse, tree
-from finger3d.scene.derived import largest_spread
+from finger3d.scene.material import largest_spread
+from finger3d.sensor.curve import SHARED
 from finger3d.sensor.likelihood import ReadingEffects, mu_sd, prior
-from finger3d.sensor.model import SHARED
 
 _STEPS, _STEPS_OF_SECTION = 20, 80
 """Number of increments of a leg with automatic increments; few suffice, as places are only compared.  In a section in

@@ -19,8 +19,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.analyses.calibrate.curve_points import choose_increments, error_of_increments
-from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, scene_with
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, scene_with, settled_tables
 from finger3d.analyses.pressed_body import PressedBody, body_key, kept, under
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import claimed, write_csv, write_json, write_text
@@ -31,9 +30,9 @@ from finger3d.mechanics.march.step_halving import automatic, with_steps
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
 from finger3d.mechanics.readings import Gauge, strain_columns
-from finger3d.plotting.optimise import draw
+from finger3d.plotting.analyses import draw_optimisation
 from finger3d.progress import QUIET, Progress
-from finger3d.report.optimise import optimise_page
+from finger3d.report.analyses import optimise_page
 from finger3d.results.journal import Journal, Row, number_in, opened
 from finger3d.scene import Scene, Source, files, parse, tree
 from finger3d.sensor.curve import LARGEST_STRAIN
@@ -464,7 +463,7 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
     search.report.stage("increments of the best")
     _write_best(search, folder, best, search.increments(best.values))
     known = tuple(search.known.values())
-    draw(
+    draw_optimisation(
         folder / "design.png",
         [f.key for f in problem.free],
         [e.values for e in known],

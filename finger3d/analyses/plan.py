@@ -11,7 +11,7 @@ from finger3d.geometry.imported import extent
 from finger3d.mechanics.discretise.resolution import warnings_before_meshing
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.scene import Source, scene_of
-from finger3d.scene.derived import moduli
+from finger3d.scene.material import moduli
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ def press(
     >>> len(finger3d.press("scene.toml", overrides=["material.E_MPa=2.0"]).steps)
     4
     """
-    from finger3d.analyses.effects_by_need import settled
+    from finger3d.analyses.free_keys import settled
     from finger3d.scene import scene_of
 
     started = time.perf_counter()
@@ -299,7 +299,7 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Sta
 def _estimate_errors(record: PressRecord, report: Progress, companions: CompanionThread) -> None:
     """Estimate the errors by mesh and increments."""
     from finger3d.accuracy.estimate import estimate, estimate_with_grid, modulus_errors, press_numbers
-    from finger3d.scene.derived import spreads
+    from finger3d.scene.material import spreads
 
     report.stage("estimating the error")
     grid, of_grid = record.marker_grid, dict[str, float]()

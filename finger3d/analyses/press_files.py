@@ -28,14 +28,13 @@ from finger3d.mechanics.history import History, StepResult, contact_table, measu
 from finger3d.mechanics.march.grip import FINGERS, Grip, two
 from finger3d.mechanics.postprocess.marker_grid import marker_table
 from finger3d.objects import ObjectPose
-from finger3d.results.states import States, facing, states_of, write_states
-from finger3d.results.vtu import write_vtu
+from finger3d.results.states import States, facing, states_of, write_states, write_vtu
 
 if TYPE_CHECKING:
     from finger3d.accuracy.changes import ChangeEstimate
     from finger3d.accuracy.estimate import ErrorEstimate
     from finger3d.accuracy.refine import Refinement
-    from finger3d.analyses.effects_by_need import Need
+    from finger3d.analyses.free_keys import Need
     from finger3d.mechanics.discretise.problem import Problem
     from finger3d.mechanics.formulation import Workspace
     from finger3d.mechanics.march.step_halving import StepEstimate

@@ -14,9 +14,8 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
 from finger3d.mechanics.history import History
-from finger3d.results.states import load_states
+from finger3d.results.states import grid, load_states
 from finger3d.results.summary import PressStep, press_summary, read_columns, steps_of
-from finger3d.results.vtu import grid
 from finger3d.scene import load as load_scene
 
 if TYPE_CHECKING:
@@ -256,7 +255,7 @@ class PressResult:
     def _repr_html_(self) -> str:
         from finger3d._notebook import card
         from finger3d.report.build import number
-        from finger3d.report.press_rows import headline
+        from finger3d.report.press import headline
 
         good, bars = self._good(), ErrorBars.of_summary(self._numbers)
         rows = [

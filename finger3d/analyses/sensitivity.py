@@ -14,8 +14,7 @@ from finger3d._types import Tree, TreeView
 from finger3d.accuracy.error_bars import spread_error
 from finger3d.accuracy.estimate import press_numbers
 from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
-from finger3d.analyses.effects_by_need import settled
-from finger3d.analyses.free_keys import scene_with
+from finger3d.analyses.free_keys import scene_with, settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
 from finger3d.io import claimed, write_csv, write_json
@@ -346,10 +345,10 @@ def _tolerance(key: str, value: float) -> float | None:
 
 def _write(out: Path, found: Sensitivity) -> None:
     """Write the results and the figure."""
-    from finger3d.plotting.sensitivity import draw  # matplotlib is loaded for a figure only
+    from finger3d.plotting.analyses import draw_sensitivity  # matplotlib is loaded for a figure only
 
     with claimed(out, "sensitivity") as folder:
         write_json(folder / "sensitivity.json", found.as_dict())
         rows = found.rows()
         write_csv(folder / "sensitivity.csv", {name: [row[name] for row in rows] for name in rows[0]})
-        draw(folder / "sensitivity.png", found.title, found.numbers, rows)
+        draw_sensitivity(folder / "sensitivity.png", found.title, found.numbers, rows)

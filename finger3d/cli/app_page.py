@@ -38,8 +38,7 @@ def app_(
     """
     require("app", "dash")
     loaded = load(scene, set_)
-    from finger3d.app.live_body import LiveBody
-    from finger3d.app.page import local_server, page
+    from finger3d.app import LiveBody, local_server, page
 
     with job(False, lambda report: "nothing was to be written") as report:
         report.stage("condensing")

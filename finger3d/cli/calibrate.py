@@ -37,9 +37,8 @@ def calibrate(
     loaded = load(scene, set_, out)
     from finger3d.analyses.calibrate.run import calibrate as run
     from finger3d.analyses.calibrate.settings import parsed_mus
-    from finger3d.scene.derived import moduli
-    from finger3d.sensor.calibration import summary
-    from finger3d.sensor.files import as_dict
+    from finger3d.scene.material import moduli
+    from finger3d.sensor.calibration import as_dict, summary
 
     with job(json_, lambda done: f"{done.steps_done} of {done.steps_total} values of mu are kept in {out}") as report:
         calibration = run(

@@ -15,7 +15,7 @@ from finger3d.errors import Finger3dError
 from finger3d.mold.options import MoldOptions
 
 if TYPE_CHECKING:
-    from finger3d.analyses.export_model import ModelFiles
+    from finger3d.analyses.calculix import ModelFiles
     from finger3d.mold.export import Exported
 
 
@@ -73,7 +73,7 @@ def export(
     done: Exported | ModelFiles
     with job(json_, lambda _: f"the files in {out} are complete") as report:
         if what.mesh or what.solver:
-            from finger3d.analyses.export_model import export_deck, export_mesh
+            from finger3d.analyses.calculix import export_deck, export_mesh
 
             done = (export_deck if what.solver else export_mesh)(loaded, out, report)
         else:

@@ -39,7 +39,7 @@ def identify(
         to the measured depth; may be repeated.
     """
     from finger3d.analyses.identify.run import identify as run
-    from finger3d.report.identify import identify_page
+    from finger3d.report.analyses import identify_page
 
     check_writable(out, scene)
     kept = f"every press is kept in {out}; the same command continues"

@@ -76,13 +76,13 @@ def optimise(
     mus = parsed_mus(o.mu) if o.mu else None
     if o.gauges is None:
         from finger3d.analyses.optimise import optimise as run
-        from finger3d.report.optimise import optimise_page as page
+        from finger3d.report.analyses import optimise_page as page
 
         with job(json_, lambda _: f"every evaluated design is kept in {out}; the same command continues") as report:
             run(scene, o.free or (), out, o.gauge, mus, o.noise, o.budget, o.seed, sets, report)
     else:
         from finger3d.analyses.gauge_places import place_gauges
-        from finger3d.report.gauge_places import gauge_places_page as page
+        from finger3d.report.analyses import gauge_places_page as page
 
         with job(json_, lambda _: "nothing was written") as report:
             stds = parsed_tolerances(o.tolerance)

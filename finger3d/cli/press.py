@@ -57,8 +57,8 @@ def press(
     begin = time.perf_counter()
     loaded = load(scene, set_, out)
     from finger3d.analyses.press import press as run
-    from finger3d.report.press_rows import increments_kept, press_rows
-    from finger3d.scene.derived import moduli
+    from finger3d.report.press import increments_kept, press_rows
+    from finger3d.scene.material import moduli
 
     with job(json_, lambda report: increments_kept(out, report)) as report:
         result = run(loaded, out, report, **asdict(options))

@@ -1,18 +1,25 @@
-"""Shape of a finger: the protocol of designs, base classes of the designs in geometries/, and checks of dimensions."""
+"""Shape of a finger: the protocol of designs, their base classes and checks, and the designs of geometries/ by name."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+import importlib
 import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
+from importlib.machinery import ModuleSpec
+from importlib.util import module_from_spec
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from finger3d._ranges import LARGEST_MM, SMALLEST_MM, at_most
 from finger3d._types import Float
-from finger3d.errors import Finger3dError
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.geometry.section import Arc, Section, largest_core_mm, largest_layer_mm
 
 if TYPE_CHECKING:
@@ -227,3 +234,42 @@ def check_core(design: str, section: Section, half_length_mm: float, height_mm: 
         what = "runs into the skin" if section.layer else "reaches the contact face"
         allowed = f"below {at_most(limit)} mm for core_half_length_mm = {half_length_mm:g}"
         raise Finger3dError(f"{design}: core_height_mm = {height_mm:g}: the core {what}; allowed: {allowed}")
+
+
+def import_from(folder: Path, package: str, name: str) -> ModuleType:
+    """Import the file `name`.py of a folder as the module `package`.`name`; its relative imports find its neighbours.
+
+    The folder becomes a namespace package, as if its parent were on the module path. A package of that name from
+    another folder is dropped.
+    """
+    known = sys.modules.get(package)
+    if known is None or list(known.__path__) != [str(folder)]:
+        for module in [m for m in sys.modules if m == package or m.startswith(f"{package}.")]:
+            del sys.modules[module]
+        spec = ModuleSpec(package, None, is_package=True)
+        spec.submodule_search_locations = [str(folder)]
+        sys.modules[package] = module_from_spec(spec)
+    return importlib.import_module(f"{package}.{name}")
+
+
+@functools.cache
+def designs() -> dict[str, type]:
+    """Return the designs by name: one file each in geometries/, beside the package in a checkout, inside it in a wheel.
+
+    Raises
+    ------
+    MissingError
+        If there is no such folder.
+    """
+    package = Path(__file__).resolve().parents[1]
+    folders = [package / "geometries", package.parent / "geometries"]
+    folder = next((f for f in folders if f.is_dir()), None)
+    if folder is None:
+        raise MissingError(f"no folder of designs: looked for {folders[0]} and {folders[1]}; reinstall finger3d")
+    found: dict[str, type] = {}
+    for file in sorted(folder.glob("[a-z]*.py")):
+        module = import_from(folder, "finger3d.geometries", file.stem)
+        for value in vars(module).values():
+            if isinstance(value, type) and value.__module__ == module.__name__ and issubclass(value, ParametricDesign):
+                found[value.name] = value
+    return found

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
+from finger3d.geometry.cad import apart, check_gaps, glue
 from finger3d.geometry.design import Design
 from finger3d.geometry.files import STEP, StepBody, content, read_step, read_surface, tessellated
-from finger3d.geometry.parts import apart, check_gaps, glue
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 

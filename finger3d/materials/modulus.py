@@ -1,4 +1,4 @@
-"""Young's modulus of a silicone at small strain, and its spread, from what its sources measured or its Shore hardness.
+"""Young's modulus of a silicone at small strain, and its spread, from measurements or its Shore hardness.
 
 A data sheet gives the engineering stress s at 100 % strain. A linear curve up to there has E = s; a
 neo-Hookean one, s = G (l - 1 / l^2) at the stretch l = 2 with E = 3 G, has E = 12 s / 7. The estimate is the geometric
@@ -43,9 +43,10 @@ Rubber Chem. Technol. 76, 419-435.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from finger3d.materials.silicones import Silicone
+from finger3d.materials.silicones import Silicone, silicone_named
 
 LOWEST, HIGHEST = 5.0, 90.0
 """Shore readings that are converted; a durometer is little reliable at the ends of its scale."""
@@ -174,3 +175,71 @@ def _estimates(silicone: Silicone) -> list[tuple[float, float, str]]:
 def _between(low: float, ratio: float) -> tuple[float, float]:
     """Return the geometric mean of `low` and `ratio low`, and the standard deviation of a uniform logarithm between."""
     return low * math.sqrt(ratio), math.log(ratio) / math.sqrt(12.0)
+
+
+MODULUS_KEYS = ("E_MPa", "shore_A", "shore_00", "silicone")
+"""Keys of which exactly one gives Young's modulus."""
+
+NU = 0.49
+"""Poisson's ratio of a silicone: its bulk modulus is about 50 times its shear modulus or more."""
+
+
+@dataclass(frozen=True)
+class ElasticConstants:
+    """Young's modulus and Poisson's ratio, and where they come from.
+
+    Attributes
+    ----------
+    E_MPa, nu : the constants
+    spread : relative standard deviation of E_MPa; None if the user gave it
+    origin : where E_MPa comes from, "given" if the user gave it
+    """
+
+    E_MPa: float
+    nu: float
+    spread: float | None
+    origin: str
+
+    def __str__(self) -> str:
+        """Young's modulus with its spread and origin, in one line."""
+        spread = "" if self.spread is None else f" +- {100.0 * self.spread:.0f} %"
+        return f"{self.E_MPa:.3g} MPa{spread}, {self.origin}"
+
+
+def elastic_constants(table: Mapping[str, object]) -> ElasticConstants:
+    """Return the elastic constants that the keys of a table give, such as [material].
+
+    Parameters
+    ----------
+    table : exactly one of `MODULUS_KEYS`, and ``nu``, which only E_MPa needs; keys that are None count as absent
+
+    Raises
+    ------
+    Finger3dError
+        If the silicone is unknown.
+
+    Examples
+    --------
+    >>> elastic_constants({"E_MPa": 1.0, "nu": 0.4})
+    ElasticConstants(E_MPa=1.0, nu=0.4, spread=None, origin='given')
+    >>> print(elastic_constants({"shore_00": 30.0}))
+    0.103 MPa +- 45 %, Shore 00-30 by Hertz's solution
+    """
+    nu = table.get("nu")
+    found = _modulus(table)
+    return ElasticConstants(found.E_MPa, NU if nu is None else _number(nu), found.spread, found.origin)
+
+
+def _modulus(table: Mapping[str, object]) -> YoungsModulus:
+    ((key, value),) = [(key, table[key]) for key in MODULUS_KEYS if table.get(key) is not None]
+    if key == "silicone":
+        return youngs_modulus(silicone_named(str(value)))
+    if key == "E_MPa":
+        return YoungsModulus(_number(value), None, "given")
+    return of_shore(key.removeprefix("shore_"), _number(value))
+
+
+def _number(value: object) -> float:
+    if not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is no number")
+    return float(value)

@@ -12,8 +12,7 @@ from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing import cache
 from finger3d.meshing.given import GivenMesh, mesh_given
-from finger3d.meshing.limits import check_sizes, is_possible
-from finger3d.meshing.report import MeshReport, mesh_report
+from finger3d.meshing.limits import MeshReport, check_sizes, is_possible, mesh_report
 from finger3d.meshing.sizing import MeshSizes, Zone, count_cells, rounded_zone, sizing
 from finger3d.meshing.swept import cell_count, mesh_swept
 from finger3d.meshing.unstructured.solids import box

@@ -18,9 +18,8 @@ from finger3d.geometry.files import content, welded
 from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
 from finger3d.geometry.surface import Triangles
 from finger3d.meshing.bisection import TOO_LONG, refined
-from finger3d.meshing.limits import check_count
+from finger3d.meshing.limits import MeshReport, check_count, mesh_report
 from finger3d.meshing.mesh_files import MAIN_BODY, MeshContents, read_contents
-from finger3d.meshing.report import MeshReport, mesh_report
 from finger3d.meshing.sizing import RATE, MeshSizes, SizedPlaces, Zone
 
 if TYPE_CHECKING:

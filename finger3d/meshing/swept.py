@@ -15,8 +15,7 @@ from finger3d.fem.mesh import Mesh, boundary, quadratic, unfold
 from finger3d.geometry.design import Design, lacks_section
 from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.grid import GridLayout, Sizes, folded_zone, rows
-from finger3d.meshing.limits import check_count, check_sizes
-from finger3d.meshing.report import MeshReport, mesh_report
+from finger3d.meshing.limits import MeshReport, check_count, check_sizes, mesh_report
 from finger3d.meshing.sizing import MeshSizes, Zone
 
 _AXIS = {"x": 0, "z": 2}

@@ -171,7 +171,7 @@ def _clear(out: Path) -> None:
 
 
 def _mold(scene: Scene, shape: Solid | Triangles, options: MoldOptions) -> Mold:
-    from finger3d.mold.foils import SECTION_MM, foils
+    from finger3d.mold.cover import SECTION_MM, foils
     from finger3d.mold.parts import mold
 
     embedded = scene.effects.get("embedded_gauge")

@@ -22,11 +22,9 @@ from typing import TYPE_CHECKING
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles
 from finger3d.mold.body import Body, Shell, shell
-from finger3d.mold.cover import Ports
+from finger3d.mold.cover import FoilSlot, Ports, check_foils, slot
 from finger3d.mold.demould import Undercut, check_opening, undercut_depth
-from finger3d.mold.fasteners import Bolts, bolts, half_pegs, lid_pegs, screws
-from finger3d.mold.foils import FoilSlot, check_foils, slot
-from finger3d.mold.layout import Layout, layout_of
+from finger3d.mold.fasteners import Bolts, Layout, bolts, half_pegs, layout_of, lid_pegs, screws
 from finger3d.mold.options import MoldOptions
 from finger3d.mold.pours import MAIN, Pour, check_strips, lid_parts, pour_order, pours
 from finger3d.mold.solids import Feature, between, one, part

@@ -21,11 +21,9 @@ import numpy as np
 
 from finger3d.errors import Finger3dError
 from finger3d.mold.body import Body
-from finger3d.mold.cover import Ports, openings, ports
+from finger3d.mold.cover import FoilSlot, Ports, openings, ports
 from finger3d.mold.demould import undercut_depth
-from finger3d.mold.fasteners import pegs
-from finger3d.mold.foils import FoilSlot
-from finger3d.mold.layout import Layout
+from finger3d.mold.fasteners import Layout, pegs
 from finger3d.mold.options import LID_MM, PEG_MM, MoldOptions
 from finger3d.mold.regions import base_region, nearest
 from finger3d.mold.solids import Feature, between, common, cylinder, one, part

@@ -11,8 +11,7 @@ from annotated_types import Gt, Lt
 
 from finger3d._ranges import Length, Radians, Zero
 from finger3d._types import Float
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import Design, designs
 from finger3d.geometry.surface import Triangles
 from finger3d.objects.rigid import CROSSWISE, DRAWN, Axis, Detail, HeldBody, Prism, RigidObject, sheet
 

@@ -18,8 +18,7 @@ from finger3d.plotting.panels import palette
 from finger3d.plotting.renderer import unshared
 from finger3d.plotting.show import finger_of, found, mesh_of
 from finger3d.plotting.solid import BODY, OBJECT_OPACITY, OBJECT_TINT, skin_of
-from finger3d.results.states import States, captions
-from finger3d.results.vtu import grid
+from finger3d.results.states import States, captions, grid
 
 if TYPE_CHECKING:
     import pyvista as pv

@@ -3,20 +3,163 @@
 from __future__ import annotations
 
 import base64
+import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from finger3d._machine import versions as installed
+from finger3d._types import Array
 from finger3d.accuracy.error_bars import with_error
+from finger3d.contact.zones import facet_borders
+from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.io import atomic
-from finger3d.report.html import asset
+from finger3d.mechanics.readings import Gauge
+from finger3d.plotting.gauges import marks_of
+from finger3d.results.states import States, chosen, label
 
-if TYPE_CHECKING:
-    from finger3d.report.chart import Chart
-    from finger3d.report.view3d import View3D
+
+def asset(name: str) -> str:
+    """Return the text of a file of this package."""
+    return resources.files("finger3d.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def embedded(data: object) -> str:
+    """Return JSON for a script element, with "<" escaped, which could end the element or begin a comment."""
+    return json.dumps(data).replace("<", "\\u003c")
+
+
+@dataclass(frozen=True)
+class Line:
+    """Line through points with coordinates x and y, shape (n,); NaN leaves a gap."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Chart of lines in common axes.
+
+    Attributes
+    ----------
+    caption : caption of the chart
+    x, y : titles of the axes, with units
+    lines : at least one line; labels are shown if there are several
+    legend : title of the legend: the quantity whose values the labels are
+    more : number of omitted lines
+    joined : whether the points of a line are joined
+    """
+
+    caption: str
+    x: str
+    y: str
+    lines: Sequence[Line]
+    legend: str = ""
+    more: int = 0
+    joined: bool = True
+
+    def html(self) -> str:
+        """Return the HTML element that holds the chart."""
+        text = escape(self.caption, quote=True)
+        left_out = f"; {self.more} more lines are left out" if self.more else ""
+        return (
+            f'<figure class="chart"><div role="img" aria-label="{text}"></div>'
+            f"<noscript>Curves need JavaScript; their numbers are in the tables.</noscript>"
+            f"<figcaption>{text}{left_out}</figcaption></figure>"
+        )
+
+
+def script(charts: Sequence[Chart]) -> str:
+    """Return the scripts with the data of all charts of a page and the code that draws them."""
+    data = [
+        {
+            "caption": chart.caption,
+            "x": chart.x,
+            "y": chart.y,
+            "legend": chart.legend,
+            "joined": chart.joined,
+            "lines": [{"label": line.label, "x": _known(line.x), "y": _known(line.y)} for line in chart.lines],
+        }
+        for chart in charts
+    ]
+    numbers = f'<script type="application/json" id="chart-data">{embedded(data)}</script>\n'
+    return f"{numbers}<script>{asset('chart.js')}</script>\n"
+
+
+def _known(values: Sequence[float]) -> list[float | None]:
+    """Replace NaN and infinity, which JSON lacks, by None."""
+    return [value if math.isfinite(value) else None for value in values]
+
+
+_TABLES = ("finger", "material", "object", "friction", "press", "grip", "contact", "model", "mesh")
+
+
+def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
+    """Return the scene as a table, with the active effects, and the text of scene.toml.
+
+    Parameters
+    ----------
+    summary : JSON object with the key ``scene``
+    folder : results folder
+    """
+    scene = _mapping(summary["scene"])
+    rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
+    rows += _modulus("", scene.get("material"))
+    for part, settings in _mapping(scene.get("parts")).items():
+        rows += [(f"part {part}", _settings(settings)), *_modulus(f" of {part}", settings)]
+    gauges = scene.get("gauge")
+    for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
+        rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
+    named = _mapping(scene.get("effects")).items()
+    effects = {name: settings for name, settings in named if isinstance(settings, Mapping)}
+    rows += [(f"effect {name}", _settings(settings) or "on") for name, settings in effects.items()]
+    parts: list[Part] = [Table(("", "settings, with defaults"), rows)]
+    if not effects:
+        parts.append(
+            "No effect beyond the baseline: small strain, linear elasticity, a rigid object, Coulomb friction."
+        )
+    file = folder / "scene.toml"
+    if file.exists():
+        parts.append(Code(file.read_text(encoding="utf-8"), "scene.toml"))
+    return parts
+
+
+def _modulus(of: str, table: object) -> list[tuple[str, str]]:
+    """Return the row of a Young's modulus that follows from a hardness or a silicone, with its spread and origin."""
+    E, spread, origin = (_mapping(table).get(key) for key in ("E_MPa", "E_spread", "E_origin"))
+    if not (isinstance(E, float) and isinstance(spread, float) and origin):
+        return []
+    return [(f"Young's modulus{of}", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
+
+
+def _mapping(value: object) -> Mapping[str, object]:
+    """Return a JSON object, empty if it is missing."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def _settings(settings: object) -> str:
+    """Return a table of a scene in one line."""
+    if not isinstance(settings, Mapping):
+        return str(settings)
+    # the spread and the origin of a modulus have a row of their own
+    told = {k: v for k, v in settings.items() if v is not None and k not in ("E_spread", "E_origin")}
+    return ", ".join(f"{k} = {_value(v)}" for k, v in told.items())
+
+
+def _value(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"({_settings(value)})"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
 
 # Content security policy: only scripts, styles and pictures inside the page; no network access.
 _POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -133,8 +276,6 @@ class Page:
         before, after = _document(self.title, self._body(target.parent))
         scripts = [self.view.script()] if self.view is not None else []
         if self.charts:
-            from finger3d.report.chart import script
-
             scripts.append(script(self.charts))
         with atomic(target) as temporary, temporary.open("wb") as stream:
             stream.write(before.encode())
@@ -242,3 +383,138 @@ def _document(title: str, body: str) -> tuple[str, str]:
         f"<title>{escape(title)} - finger3d</title>\n<style>\n{asset('style.css')}</style>\n</head>\n"
         f"<body>\n<main>\n{body}\n</main>\n<script>{_UNFOLD}</script>\n"
     ), "</body>\n</html>\n"
+
+
+_MOST_BYTES = 1_500_000  # of the data of a view; plotly.js has 1.8 MB
+
+
+@dataclass(frozen=True)
+class View3D:
+    """Surface of a solid at several increments, reduced to the corners of its facets.
+
+    Attributes
+    ----------
+    rest : (v, 3) undeformed vertices, mm
+    body, contact : (t, 3) triangles of faces that cannot touch, and of those that may; they share no vertices
+    moved : (s, v, 3) deformed vertices at each increment, mm
+    pressure : (s, v) contact pressure, MPa
+    status : (s, v) 0 open, 1 stick, 2 slip
+    border : (s, t, 3) where the status changes along the sides of each contact triangle, as a share of their length
+    labels : (s,) label of each increment
+    gauges : (s, g, 3, 3) start, middle and end of each gauge at each increment, projected onto the front face (+z), mm
+    gauge_labels : (g,) label of each gauge
+    object_points, object_faces : (o, 3) mm, (f, 3) triangles of the object in its own coordinates
+    object_poses : (s, 3, 4) its rotation and place at each increment
+    """
+
+    rest: Array
+    body: Array
+    contact: Array
+    moved: Array
+    pressure: Array
+    status: Array
+    border: Array
+    labels: tuple[str, ...]
+    gauges: Array
+    gauge_labels: tuple[str, ...]
+    object_points: Array
+    object_faces: Array
+    object_poses: Array
+
+    def html(self) -> str:
+        """Return the HTML element that holds the view and its controls."""
+        last = len(self.labels) - 1
+        hidden = " hidden" if last == 0 else ""
+        none = "" if self.gauge_labels else " hidden"
+        no_object = "" if len(self.object_faces) else " hidden"
+        return (
+            '<div class="view"><div class="controls">'
+            '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
+            '<option value="status">stick and slip</option><option value="moved">displacement</option></select></label>'
+            f'<label{hidden}>increment <input id="view-step" type="range" min="0" max="{last}" value="{last}"></label>'
+            f'<label{none}><input id="view-gauges" type="checkbox"{"" if none else " checked"}>gauges</label>'
+            f'<label{no_object}><input id="view-object" type="checkbox"{"" if no_object else " checked"}>object</label>'
+            '<output id="view-label"></output>'
+            '<span class="key"><span class="zone"><i style="background:#1f3f77"></i>stick</span>'
+            '<span class="zone"><i style="background:#f28e2b"></i>slip</span>'
+            '<span class="open"><i style="background:#c4c4c4"></i>open, no contact</span></span>'
+            '</div><div class="stage" id="view-stage"></div>'
+            "<p>Deformed, to scale. Drag to rotate, scroll or pinch to zoom; hover over the contact surface for values."
+            f"{' Gauges are projected onto the front face.' if self.gauge_labels else ''}"
+            "<noscript> The 3D view needs JavaScript; the pictures below show the last increment.</noscript></p></div>"
+        )
+
+    def script(self) -> str:
+        """Return the scripts with the data and the code that draws them."""
+        data = {
+            "labels": self.labels,
+            "vertices": len(self.rest),
+            "rest": _packed(self.rest, "<f4"),
+            "moved": _packed(self.moved, "<f4"),
+            "pressure": _packed(self.pressure, "<f4"),
+            "status": _packed(self.status, "u1"),
+            "border": _packed(np.round(255.0 * self.border), "u1"),
+            "body": _packed(self.body, "<u4"),
+            "contact": _packed(self.contact, "<u4"),
+            "gauges": np.round(self.gauges, 3).tolist(),
+            "gaugeLabels": self.gauge_labels,
+            "objectPoints": _packed(self.object_points, "<f4"),
+            "objectFaces": _packed(self.object_faces, "<u4"),
+            "objectPoses": np.round(self.object_poses, 6).tolist(),
+        }
+        numbers = f'<script type="application/json" id="view-data">{embedded(data)}</script>\n'
+        return f"{numbers}<script>{asset('view3d.js')}</script>\n"
+
+
+def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BYTES) -> View3D | None:
+    """Return a view of a solid with as many increments as `budget`, in bytes, allows; None if none fits, or for 2D."""
+    if states.dim != 3:
+        return None
+    # a vertex on a crease has a pressure on each face
+    faces = np.where(states.on_contact, states.facet_face.astype(int), -1)
+    key = states.corners.astype(np.int64) * (len(FREE_FACES) + 1) + (faces + 1)[:, None]
+    keys, index = np.unique(key, return_inverse=True)
+    corners, face_of = keys // (len(FREE_FACES) + 1), keys % (len(FREE_FACES) + 1) - 1
+    triangles = index.reshape(states.corners.shape)
+    budget -= (states.object_points.size + states.object_faces.size) * 16 // 3
+    each = (len(corners) * (3 * 4 + 4 + 1) + states.contact_facets.size) * 4 // 3
+    most = (budget - triangles.size * 16 // 3) // each
+    if most < 1:
+        return None
+    kept = chosen(len(states.step), most)
+    rest = states.points[corners]
+    marks = marks_of(Mesh(states.points.astype(float), states.cells, {}), gauges, near=True)
+    at = [[mark.of(states.points + states.displacement[k]) for mark in marks] for k in kept]
+
+    def values(name: str, k: int) -> Array:
+        out = np.zeros(len(corners))
+        for face in np.unique(faces[faces >= 0]):
+            own = face_of == face
+            out[own] = states.on_points(name, k, int(face))[corners[own]]
+        return out
+
+    places = states.points[states.nodes].astype(float)
+
+    def borders(k: int) -> Array:
+        return facet_borders(states.contact_facets, states.status[k], states.zones(k), places)
+
+    return View3D(
+        rest=rest,
+        body=triangles[~states.on_contact],
+        contact=triangles[states.on_contact],
+        moved=rest + states.displacement[kept][:, corners],
+        pressure=np.array([values("pressure", k) for k in kept]),
+        status=np.array([values("status", k) for k in kept]),
+        border=np.array([borders(k) for k in kept]),
+        labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
+        gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
+        gauge_labels=tuple(mark.label for mark in marks),
+        object_points=states.object_points,
+        object_faces=states.object_faces,
+        object_poses=np.concatenate([states.object_rotation, states.object_place[:, :, None]], axis=2)[kept],
+    )
+
+
+def _packed(values: Array, kind: str) -> str:
+    """Return numbers of a NumPy type `kind` in base64."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,7 +1,6 @@
 """Scenes: a TOML file, strictly checked, turned into a model, and written back with its defaults filled in."""
 
-from finger3d.scene.scene import Scene, parse
-from finger3d.scene.source import Source, load, scene_of, tables_of
+from finger3d.scene.scene import Scene, Source, load, parse, scene_of, tables_of
 
 __all__ = [
     "Scene",

@@ -12,9 +12,8 @@ from finger3d._ranges import PathName, one_line
 from finger3d._types import Tree, TreeView
 from finger3d.effects import effect_names, effect_type
 from finger3d.errors import Finger3dError
-from finger3d.geometry.design import Design
+from finger3d.geometry.design import Design, designs
 from finger3d.geometry.files import SUFFIXES
-from finger3d.geometry.registry import designs
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import files
 from finger3d.scene.messages import Place, choose, described, dotted, listed, messages_from, nearest, shown, unknown

@@ -22,7 +22,7 @@ from finger3d.mechanics.readings import (
     strain_columns,
 )
 from finger3d.meshing.given import GivenMesh
-from finger3d.scene.derived import check_parts
+from finger3d.scene.material import check_parts
 from finger3d.scene.mesh_sizes import smallest_mm
 from finger3d.scene.messages import Place, dotted, shown
 from finger3d.scene.tables import GaugeTable, LegTable, MarkerTable, MeshTable, SceneTable, TaxelTable

@@ -1,4 +1,4 @@
-"""Construction of a Scene from a tree of tables, and of a Model from a Scene."""
+"""Construction of a Scene from a file or a tree of tables, and of a Model from a Scene."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
-from finger3d.materials.elastic import ElasticConstants
+from finger3d.geometry.design import Design, designs
+from finger3d.materials.modulus import ElasticConstants
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model, first_contact
 from finger3d.mechanics.readings import Gauge, Marker, Taxel
 from finger3d.objects import OBJECTS, RigidObject
 from finger3d.scene import checks, files, material, messages, tree
 from finger3d.scene.checked_tables import checked, design_of, effects_of, named, object_of, press_of, shaped
-from finger3d.scene.derived import parts_of, path_of
+from finger3d.scene.material import parts_of, path_of
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.messages import Place
 from finger3d.scene.tables import LegsTable, LegTable, SceneTable, record_of
@@ -255,3 +254,62 @@ def _mesh(
     # where increments factor the stiffness, or a companion mesh gives the error bars, a first press costs as much
     quick = linear and tables.friction.mu > 0.0 and not any(leg.is_under_force for leg in path)
     return mesh_options(tables.mesh, design, domain, obj, box, quick)
+
+
+Source = Scene | TreeView | str | Path
+"""A scene: loaded, as the tables of a scene file, or the path of the file."""
+
+
+def load(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : TOML file
+    overrides : texts such as ``friction.mu=0.5``, applied before anything is checked
+
+    Raises
+    ------
+    Finger3dError
+        With one line that names the file, the key, the value and what is allowed.
+    """
+    return scene_of(Path(path), overrides)
+
+
+def scene_of(source: Source, overrides: Iterable[str] = ()) -> Scene:
+    """Return the scene that an argument stands for, with values of other keys as for ``--set``.
+
+    Raises
+    ------
+    Finger3dError
+        If it has a mistake, or is no scene.
+    """
+    overrides = list(overrides)
+    if isinstance(source, Scene) and not overrides:
+        return source
+    document, path = tables_of(source)
+    changed, keys = tree.overridden(document, overrides)
+    return parse(changed, path, keys)
+
+
+def tables_of(source: Source, overrides: Sequence[str] = ()) -> tuple[TreeView, Path | None]:
+    """Return the tables of a scene, with values of other keys as for ``--set``, and the path of its file if it has one.
+
+    Raises
+    ------
+    Finger3dError
+        If the file cannot be read, a key cannot be set, or the argument is no scene.
+    """
+    if isinstance(source, Scene):
+        document, path = source.given, source.path
+    elif isinstance(source, Mapping):
+        document, path = tree.frozen(source), None
+    elif isinstance(source, str | Path):
+        path = Path(source)
+        document = tree.read(path)
+    else:
+        raise Finger3dError(
+            f"a {type(source).__name__} is no scene: give the path of a scene file, a dict with its tables, or what "
+            "finger3d.load returns (a Model is solved by build and march of finger3d.mechanics)"
+        )
+    return tree.override(document, overrides), path

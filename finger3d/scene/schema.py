@@ -13,9 +13,9 @@ from typing import Any
 
 from finger3d._types import Tree
 from finger3d.effects import effect_names, effect_type
+from finger3d.geometry.design import designs
 from finger3d.geometry.files import SUFFIXES
-from finger3d.geometry.registry import designs
-from finger3d.materials.elastic import MODULUS_KEYS
+from finger3d.materials.modulus import MODULUS_KEYS
 from finger3d.meshing.mesh_files import MESH_SUFFIXES
 from finger3d.objects import OBJECTS
 from finger3d.scene import tables

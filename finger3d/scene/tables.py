@@ -34,7 +34,7 @@ from finger3d._ranges import (
 )
 from finger3d._types import Tree
 from finger3d.contact.solve import RuleName
-from finger3d.materials.elastic import MODULUS_KEYS, ElasticConstants, elastic_constants
+from finger3d.materials.modulus import MODULUS_KEYS, ElasticConstants, elastic_constants
 from finger3d.mechanics.model import Domain
 from finger3d.meshing.sizing import Mesher
 

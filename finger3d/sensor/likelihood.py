@@ -31,7 +31,7 @@ from typing import Literal
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.sensor.model import Errors, SensorModel
+from finger3d.sensor.curve import Errors, SensorModel
 
 Status = Literal["ok", "coarse", "ambiguous", "above", "below", "outside", "blind", "contradiction"]
 

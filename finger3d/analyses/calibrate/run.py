@@ -24,10 +24,10 @@ from finger3d.io import claimed, write_csv, write_text
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Model
-from finger3d.plotting.calibration import draw
+from finger3d.plotting.analyses import draw_calibration
 from finger3d.progress import Progress
-from finger3d.report.calibrate import calibrate_page
-from finger3d.sensor.calibration import Calibration
+from finger3d.report.analyses import calibrate_page
+from finger3d.sensor.calibration import Calibration, save, write_table
 from finger3d.sensor.curve import (
     MARKER_NOISE_MM,
     NOISE,
@@ -38,7 +38,6 @@ from finger3d.sensor.curve import (
     ReadingCurve,
     Tolerance,
 )
-from finger3d.sensor.files import save, write_table
 
 if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
@@ -77,7 +76,7 @@ def write_curve(folder: Path, calibration: Calibration) -> None:
     """Write the curve, its figure and its page."""
     write_table(calibration, folder / "calibration.csv")
     save(calibration, folder / "calibration.json")
-    draw(folder / "calibration.png", calibration)
+    draw_calibration(folder / "calibration.png", calibration)
     calibrate_page(folder).write(folder)
 
 
@@ -122,9 +121,9 @@ def calibrate(
     MissingError
         If fewer than four values of mu converge; the others are in calibration.csv.
     """
-    from finger3d.analyses.effects_by_need import settled
+    from finger3d.analyses.free_keys import settled
     from finger3d.scene import scene_of
-    from finger3d.scene.derived import largest_spread
+    from finger3d.scene.material import largest_spread
 
     report = report or Progress()
     scene, _ = settled(scene_of(scene, overrides), report)

@@ -13,8 +13,7 @@ from scipy import optimize
 from scipy.linalg import block_diag, solve_triangular
 
 from finger3d._types import Float, Tree, TreeView
-from finger3d.analyses.effects_by_need import settled_tables
-from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, values_at
+from finger3d.analyses.free_keys import Bounds, FreeKey, check_distinct, free_keys, settled_tables, values_at
 from finger3d.analyses.identify.emulator import Emulator
 from finger3d.analyses.identify.material_tests import CONSTANT_KEYS, LawInTests, is_material_test, read_material_tests
 from finger3d.analyses.identify.posterior import FittedValues, Samples, fitted_values, sampled
@@ -34,9 +33,9 @@ from finger3d.analyses.identify.presses import (
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.base import nominal_stress, principal_stretches
 from finger3d.io import claimed, write_csv, write_json, write_text
-from finger3d.plotting.identify import Panel, draw
+from finger3d.plotting.analyses import Panel, draw_identification
 from finger3d.progress import Progress
-from finger3d.report.identify import identify_page
+from finger3d.report.analyses import identify_page
 from finger3d.results.journal import opened
 from finger3d.scene import Scene, Source, files, parse, tables_of, tree
 
@@ -114,7 +113,7 @@ def write(folder: Path, found: Identification) -> None:
     write_json(folder / "identify.json", found.as_dict())
     write_text(folder / "identified.toml", found.scene.to_toml())
     panels = [*(_of_press(folder, found) if found.measured.columns else []), *_of_tests(folder, found)]
-    draw(folder / "identify.png", panels)
+    draw_identification(folder / "identify.png", panels)
     identify_page(folder).write(folder)
 
 

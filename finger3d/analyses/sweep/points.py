@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Tree, TreeView
-from finger3d.analyses.effects_by_need import settled
-from finger3d.analyses.free_keys import FreeKey, check_distinct
+from finger3d.analyses.free_keys import FreeKey, check_distinct, settled
 from finger3d.analyses.pressed_body import Variant, body_key, finest
 from finger3d.csv_table import read_table
 from finger3d.errors import Finger3dError

@@ -23,8 +23,7 @@ from finger3d.geometry.design import Design
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Gauge
 from finger3d.meshing.bisection import refined
-from finger3d.meshing.limits import check_count
-from finger3d.meshing.report import MeshReport, mesh_report
+from finger3d.meshing.limits import MeshReport, check_count, mesh_report
 from finger3d.meshing.sizing import SizedPlaces
 from finger3d.meshing.swept import mesh_section
 

@@ -38,8 +38,7 @@ from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import targets
 from finger3d.mechanics.readings import MeshedBody
 from finger3d.meshing.generate import mesh_solid
-from finger3d.meshing.limits import check_rows
-from finger3d.meshing.report import MeshReport
+from finger3d.meshing.limits import MeshReport, check_rows
 from finger3d.meshing.swept import mesh_section
 from finger3d.objects import DistanceTracker, ObjectPose, PlacedObject, vertical_frame
 from finger3d.progress import QUIET, Progress

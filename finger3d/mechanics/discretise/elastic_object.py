@@ -23,8 +23,7 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import Mesh, axis_numbers, reflected
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import facing_trace
-from finger3d.geometry.design import Design
-from finger3d.geometry.registry import designs
+from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.discretise.body_mesh import stretched_object, with_points_of
 from finger3d.mechanics.discretise.problem import MeshedObject, Problem
 from finger3d.mechanics.discretise.symmetry import held_dofs

@@ -18,14 +18,14 @@ from finger3d.fem.assembly import Stiffness
 from finger3d.fem.laws.material import LinearElasticity, moduli_of
 from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.fem.recovery import strain_and_stress
-from finger3d.fem.solids.bars import AddedStiffness
+from finger3d.fem.solids.embedded import AddedStiffness
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface import BoundarySurface, joined, surface
 from finger3d.mechanics.discretise.contact_points import ContactPoints, contact_geometry, may_touch
 from finger3d.mechanics.discretise.symmetry import Symmetry
 from finger3d.mechanics.model import Model
 from finger3d.mechanics.readings import Column, MeshedBody
-from finger3d.meshing.report import MeshReport
+from finger3d.meshing.limits import MeshReport
 from finger3d.objects import ObjectPose, PlacedObject, SecondFinger, vertical_frame
 
 _AT_ONCE = 8_000_000  # unknowns solved for at once: 64 MB, and a few times as much in between

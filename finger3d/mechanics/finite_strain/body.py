@@ -13,7 +13,7 @@ from finger3d.fem.assembly import Pattern, Stiffness
 from finger3d.fem.laws.base import Inhomogeneous, least_stiffness, unstable_from
 from finger3d.fem.laws.relaxation import InternalVariables, Relaxation, Step
 from finger3d.fem.recovery import displacement
-from finger3d.fem.solids.bars import BarRelaxation, Bars
+from finger3d.fem.solids.embedded import BarRelaxation, Bars
 from finger3d.fem.solids.hyperelastic import Hyperelastic, Relaxing, TotalLagrangian
 from finger3d.fem.solvers.condense import Condensation
 from finger3d.fem.surface import BoundarySurface, DeformedContact, deformed_contact

@@ -40,9 +40,8 @@ from finger3d.mechanics.finite_strain.increment import FiniteIncrement, Incremen
 from finger3d.mechanics.formulation import Loads
 from finger3d.mechanics.generalised import GeneralisedForces, forces_on
 from finger3d.mechanics.history import State
-from finger3d.mechanics.passing import moves_too_far, passes_through, pulls
 from finger3d.mechanics.readings import Column, of_kind
-from finger3d.mechanics.small_strain import carried_by_object
+from finger3d.mechanics.small_strain import carried_by_object, moves_too_far, passes_through, pulls
 from finger3d.objects import Move, ObjectPose
 
 T = TypeVar("T")

@@ -19,9 +19,8 @@ from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.generalised import GeneralisedForces, forces_on
 from finger3d.mechanics.history import State, StepResult
-from finger3d.mechanics.march.equilibrium import ToForces
+from finger3d.mechanics.march.equilibrium import FIRST_PARTS, Advanced, Substep, ToForces, energies, solved_in_turn
 from finger3d.mechanics.march.grip import Grip
-from finger3d.mechanics.march.parts import FIRST_PARTS, Advanced, Substep, energies, solved_in_turn
 from finger3d.mechanics.path import Load, Station, stations
 from finger3d.mechanics.readings import Column, in_order, strain_columns
 from finger3d.objects import Move, ObjectPose

@@ -33,7 +33,7 @@ from finger3d.meshing.unstructured.solids import (
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
-    from finger3d.geometry.parts import Glued
+    from finger3d.geometry.cad import Glued
 
 _EDGE_SHARE = 0.88  # netgen's size over the mean edge length; measured 1 / 1.13 to 1 / 1.19 on Fig. 9 and a hemisphere
 _CHORD_ERROR = 2e-4  # of the triangles, over the diagonal; nodes are moved onto the surfaces themselves

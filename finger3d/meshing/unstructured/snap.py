@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float, Int
 from finger3d.fem.mesh import FACETS, TET4, TRI3, Mesh, cell_angles_deg, curved_jacobians, quadratic
+from finger3d.geometry.cad import OUTSIDE
 from finger3d.geometry.faceted import Faceted, moved_onto
-from finger3d.geometry.implicit import ImplicitPlane
-from finger3d.geometry.parts import OUTSIDE
 from finger3d.geometry.surface import Triangles
-from finger3d.geometry.tessellate import CadFace, Tessellation
+from finger3d.geometry.tessellate import CadFace, ImplicitPlane, Tessellation
 
 _MOST_SAMPLES = 20_000
 """Largest number of points with which the surface of a part is sampled."""

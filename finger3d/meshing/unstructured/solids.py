@@ -18,7 +18,7 @@ from finger3d.geometry.design import Design
 from finger3d.meshing.sizing import Grading, Sizing
 
 if TYPE_CHECKING:
-    from finger3d.geometry.parts import Glued
+    from finger3d.geometry.cad import Glued
     from finger3d.geometry.tessellate import Tessellation
 
 VOLUME_TOLERANCE = 0.01
@@ -37,8 +37,7 @@ def box(design: Design, symmetry: tuple[str, ...]) -> tuple[Float, Float]:
 
 def glued_solids(design: Design, symmetry: tuple[str, ...]) -> Glued:
     """Return the CAD solids of the meshed part; those of a body of several parts share the faces between them."""
-    from finger3d.geometry.cad import cut, cut_part, labelled_faces
-    from finger3d.geometry.parts import OUTSIDE, Glued, GluedFace, glue
+    from finger3d.geometry.cad import OUTSIDE, Glued, GluedFace, cut, cut_part, glue, labelled_faces
 
     if design.part_labels:
         return glue({label: cut_part(part, symmetry) for label, part in design.solids().items()}, design.name)
@@ -107,7 +106,7 @@ def on_cad(points: Float, tets: Int, body: Tessellation, mesher: str) -> Mesh:
 
 def _in_parts(points: Float, tets: Int, body: Tessellation) -> tuple[Float, Int, Int]:
     """Return the points and tets inside the body, and the part (t,) of each tet."""
-    from finger3d.geometry.parts import OUTSIDE
+    from finger3d.geometry.cad import OUTSIDE
     from finger3d.meshing.unstructured.snap import parts_of
 
     part = parts_of(points[tets].mean(axis=1), body)

@@ -36,7 +36,7 @@ from finger3d.meshing.unstructured.solids import (
 from finger3d.progress import Progress
 
 if TYPE_CHECKING:
-    from finger3d.geometry.parts import Glued
+    from finger3d.geometry.cad import Glued
     from finger3d.geometry.tessellate import Tessellation
 
 
@@ -90,7 +90,7 @@ def new_mesh(
 def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tessellation, float]:
     """Return the tessellated part, and fTetWild's envelope over its diagonal."""
     from finger3d.geometry.faceted import coarser
-    from finger3d.geometry.implicit import surface_of
+    from finger3d.geometry.tessellate import surface_of
 
     faceted = design.tessellation()
     glued = None if faceted else glued_solids(design, symmetry)

@@ -1,0 +1,316 @@
+"""Pages of the analyses: calibration, comparison, identification and optimisation."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from finger3d.report.build import Code, Figure, HeadlineRow, Page, PageSection, Table, how_modelled, number
+from finger3d.results.summary import read_json, read_rows, title_of
+
+
+def calibrate_page(folder: str | Path) -> Page:
+    """Return the page of a calibration, from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If calibration.json cannot be read.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "calibration.json")
+    mu, sd, status, readings = data["mu"], data["mu_sd"], data["status"], data["readings"]
+    known = [i for i, what in enumerate(status) if what in ("ok", "coarse")]
+    best = min(known, key=lambda i: sd[i], default=len(mu) // 2)
+    ranges = {
+        key: ", ".join(f"{s['low']:.3g} to {s['high']:.3g}" for s in data[key]) or "none"
+        for key in ("trusted", "usable")
+    }
+    shown = ["" if s is None else s for s in sd]
+    headline = [
+        HeadlineRow(f"mu found within {data['resolution_limit']:g}, all tolerances", ranges["trusted"]),
+        HeadlineRow("the same by the noise alone", ranges["usable"]),
+        HeadlineRow(f"mu \u00b1 at mu = {mu[best]:.3g}, all tolerances", f"{sd[best]:.2g}" if known else "unknown"),
+    ]
+    each = Table(
+        ("reading", "unit", "noise", f"at mu = {mu[0]:g}", f"at mu = {mu[-1]:g}", "second-order fit, residual rms"),
+        [
+            (name, r["unit"], r["noise"], r["curve"][0], r["curve"][-1], r["fit"]["residual_rms"])
+            for name, r in readings.items()
+        ],
+    )
+    curve = Table(
+        ("mu", *readings, "standard deviation of mu", "an estimate there is"),
+        list(zip(mu, *(r["curve"] for r in readings.values()), shown, status, strict=True)),
+    )
+    causes = Table(
+        ("uncertain quantity", f"fall of the variance of mu at {mu[best]:.3g} if it were known exactly"),
+        [(name, f"{100.0 * share[best]:.1f} %") for name, share in data["variance_reductions"].items()],
+    )
+    given = " ".join(f"--strain {name}={r['curve'][best]:.5g}" for name, r in readings.items())
+    failed = [f"mu = {f['mu']:g}: {f['why']}" for f in data["failed"]]
+    note = data["about"].get("mesh", {}).get("note")
+    return Page(
+        f"{title_of(data['scene'])}: {', '.join(readings)} against friction",
+        headline,
+        [
+            PageSection("Verdict", [data["verdict"]]),
+            PageSection("Readings", [each, curve, causes]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(f"finger3d estimate {folder}/calibration.json {given}")]),
+        ],
+        [Figure("calibration.png", "Readings, standard deviation of mu, and what would reduce its variance")],
+        command="calibrate",
+        outcome="converged" if not failed else f"{len(failed)} values of mu gave no numbers",
+        good=not failed,
+        notes=[*failed, *([note] if note else [])],
+        versions=data["about"].get("versions"),
+    )
+
+
+_FORCE = "force_N_per_mm"
+
+
+def compare_page(folder: str | Path) -> Page:
+    """Return the page of a comparison, from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If compare.json cannot be read.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "compare.json")
+    numbers = data.get("table", ())
+    own = data["scene"]["finger"].get("width_mm")
+    cases = [c for c in data["cases"] if c["numbers"]]
+    headline = [
+        HeadlineRow(f"force per width, {c['model']}", c["numbers"][_FORCE], "N/mm", c["errors"].get(_FORCE))
+        for c in cases
+        if c["width_mm"] == own
+    ]
+    keys = list(dict.fromkeys(k for c in cases for k in c["numbers"]))
+    rows = [
+        (
+            c["model"],
+            c["width_mm"],
+            c["size_mm"],
+            *(number(c["numbers"][k], c["errors"].get(k)) if k in c["numbers"] else "" for k in keys),
+            c["seconds"],
+            c["outcome"],
+        )
+        for c in data["cases"]
+    ]
+    head = ("model", "width (mm)", "edges (mm)", *keys, "seconds", "outcome")
+    proof = (
+        "Each case is a separate press. It has numbers only if every increment satisfies Eqs. (1)-(4) of Maeno 2004, "
+        "and friction opposes slip, to 1e-8. finger3d press reports the increments of a scene."
+    )
+    return Page(
+        f"{title_of(data['scene'])}: 2D against 3D",
+        headline,
+        [
+            PageSection("Verdict", [*data["verdict"], *([Table(numbers[0], numbers[1:])] if numbers else [])]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Every case", [proof, _BARS, Table(head, rows)]),
+        ],
+        [Figure("compare.png", "Force against width, tractions along x, and all quantities relative to the solid")],
+        command="compare",
+        outcome=data["outcome"],
+        good=data["outcome"] == "converged",
+        versions=data["versions"],
+    )
+
+
+_BARS = (
+    "The number after ± is the error of mesh and increments. It is estimated, as by finger3d press, from a mesh with "
+    "edges about twice as long (half as long if no coarser mesh is possible), and from more increments. Solids and "
+    "sections of one width have the same edge lengths; on swept meshes the difference of their forces is therefore "
+    "more accurate than either force. The verdict calls a deviation significant if it exceeds two error bars."
+)
+
+
+_STABLE = (
+    "To these stretches the nominal stress of the fitted law rises and it satisfies Drucker's postulate; 10, and 0.1 "
+    "in compression, are the last that were tried. Tension, shear and equibiaxial tension all count as measured to the "
+    "largest stretch of any test."
+)
+
+
+def identify_page(folder: str | Path) -> Page:
+    """Return the page of an identification, from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If identify.json or task.json cannot be read.
+    """
+    folder = Path(folder)
+    data, task = read_json(folder / "identify.json"), read_json(folder / "task.json")
+    values, bounds = data["values"], {key: (low, high) for key, low, high in task["free"]}
+    headline = [
+        *(HeadlineRow(key, f"{v['value']:.4g} \u00b1 {v['std']:.2g}") for key, v in values.items()),
+        HeadlineRow("presses solved", str(data["presses"])),
+    ]
+    stable = data.get("stable")
+    if stable:
+        within = "over the measured range" if stable["over_measured_range"] else "not over the measured range"
+        headline.append(HeadlineRow("law is stable", within))
+    found = Table(
+        ("key", "from", "to", "value", "standard deviation", "68 % interval"),
+        [(key, *bounds[key], v["value"], v["std"], f"{v['low']:.4g} to {v['high']:.4g}") for key, v in values.items()],
+    )
+    correlation = Table(
+        ("correlation", *values),
+        [(key, *(f"{r:.3f}" for r in row.values())) for key, row in data["correlation"].items()],
+    )
+    columns = Table(
+        ("measured column", "residual, rms", "standard deviation, rms", "from"),
+        [
+            (n, rms, data["std_of_columns"][n]["rms"], data["std_of_columns"][n]["from"])
+            for n, rms in data["residual_rms"].items()
+        ],
+    )
+    stability = Table(
+        ("mode", "stable to a stretch of", "measured to"),
+        [(mode, to, stable["measured_to"][mode]) for mode, to in stable["rises_to"].items()] if stable else [],
+    )
+    sources = [path for path in (data["measured"], *data.get("material_tests", ())) if path]
+    told = f"Standard deviations are {data['deviations']}."
+    scene = folder / "identified.toml"
+    return Page(
+        f"{title_of(data['scene'])}: values from {', '.join(Path(path).name for path in sources)}",
+        headline,
+        [
+            PageSection("Values", [told, *data["notes"], found, *([correlation] if len(values) > 1 else [])]),
+            PageSection("Fit", [columns]),
+            *([PageSection("Stability", [_STABLE, stability])] if stable else []),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(f"finger3d press {scene} --out {folder / 'pressed'}")]),
+        ],
+        [Figure("identify.png", "Measured points over the fitted scene, and residuals")],
+        command="identify",
+        notes=list(data["notes"]),
+    )
+
+
+_MOST_ROWS = 10  # of the table of the best designs
+_NEAR_BOUND = 0.01  # distance of a value from its bound, relative to the distance of the bounds
+_SENSITIVITY = (
+    "The sensitivity is the least slope of strain against mu over all mu, divided by the noise of a strain reading; "
+    "its reciprocal is the resolution of mu. It is negative if strain is not monotonic, so that two values of mu have "
+    "the same strain."
+)
+
+
+def optimise_page(folder: str | Path) -> Page:
+    """Return the page of a design search, from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If design.json or search.json cannot be read.
+    """
+    folder = Path(folder)
+    found, search = read_json(folder / "design.json"), read_json(folder / "search.json")
+    rows = read_rows(folder / "evaluations.csv")
+    good = sorted((r for r in rows if r["outcome"] == "converged"), key=lambda r: -float(r["objective"]))
+    bounds = {key: (low, high) for key, low, high in search["free"]}
+    objective = Path(found["objective"]).name
+    increments = found.get("increments") or {}
+    headline = [
+        HeadlineRow(f"objective ({objective})", found["best"]),
+        HeadlineRow("objective at the start", "none" if found["start"] is None else found["start"]),
+        *(HeadlineRow(key, value) for key, value in found["values"].items()),
+        HeadlineRow("designs evaluated", str(len(rows))),
+        HeadlineRow("bodies condensed", str(found["bodies"])),
+    ]
+    if steps := increments.get("steps"):
+        name = f"error of the strain with {', '.join(map(str, steps))} increments"
+        headline.append(HeadlineRow(name, f"{increments.get('strain_error') or math.nan:.2g}"))
+    free = [
+        (key, *bounds[key], found["start_values"][key], value, _at_a_bound(value, *bounds[key]))
+        for key, value in found["values"].items()
+    ]
+    best = [tuple(float(r[k]) for k in (*bounds, "objective")) for r in good[:_MOST_ROWS]]
+    parts = [Table((*bounds, "objective"), best)]
+    without = len(rows) - len(good)
+    failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
+    explanation = [_SENSITIVITY] if objective == "sensitivity" else []
+    best_scene = folder / "best.toml"
+    return Page(
+        f"{title_of(search['scene'])}: design for {objective}",
+        headline,
+        [
+            PageSection("Free keys", [*explanation, Table(("key", "from", "to", "start", "best", ""), free)]),
+            PageSection("The best designs", [*failures, *parts]),
+            PageSection(
+                "Use it",
+                [
+                    Code(f"finger3d press {best_scene} --out {folder / 'pressed'}"),
+                    Code(best_scene.read_text(encoding="utf-8"), "best.toml"),
+                ],
+            ),
+        ],
+        [Figure("design.png", "Convergence of the search, and the objective against each free key")],
+        command="optimise",
+        outcome=f"{len(good)} of {len(rows)} designs have a number",
+        good=bool(good),
+    )
+
+
+def _at_a_bound(value: float, low: float, high: float) -> str:
+    near = _NEAR_BOUND * (high - low)
+    return "at its bound; a wider range may hold a better design" if min(value - low, high - value) < near else ""
+
+
+def gauge_places_page(folder: str | Path) -> Page:
+    """Return the page of placed gauges, from the files in its folder.
+
+    Raises
+    ------
+    Finger3dError
+        If gauges.json cannot be read.
+    """
+    folder = Path(folder)
+    data = read_json(folder / "gauges.json")
+    gauges, names = data["gauges"], ",".join(g["name"] for g in data["gauges"])
+    headline = [
+        HeadlineRow(f"mu \u00b1, mean over mu = {data['mu'][0]:g} to {data['mu'][-1]:g}", f"{data['mean_mu_sd']:.3g}"),
+        *(
+            HeadlineRow(
+                f"{g['name']}",
+                f"x {g['x_mm']:.1f}, y {g['y_mm']:.1f}, z {g['z_mm']:.1f} mm, {g['angle_deg']:.1f}\u00b0",
+            )
+            for g in gauges
+        ),
+    ]
+    each = Table(
+        ("gauge", "x (mm)", "y (mm)", "z (mm)", "angle (degree)", "mean sd of mu alone", "with those before"),
+        [
+            (
+                g["name"],
+                g["x_mm"],
+                g["y_mm"],
+                g["z_mm"],
+                g["angle_deg"],
+                g["mean_mu_sd_alone"],
+                g["mean_mu_sd_with_those_before"],
+            )
+            for g in gauges
+        ],
+    )
+    spread = Table(("mu", "sd of mu"), list(zip(data["mu"], data["mu_sd"], strict=True)))
+    best = folder / "best.toml"
+    return Page(
+        f"{title_of(data['scene'])}: places of {len(gauges)} gauge{'s' if len(gauges) > 1 else ''}",
+        headline,
+        [
+            PageSection("Gauges", [each]),
+            PageSection("Standard deviation of mu", [spread]),
+            PageSection("Scene", how_modelled(data, folder)),
+            PageSection("Use it", [Code(f"finger3d calibrate {best} --gauge {names} --out {folder / 'calibration'}")]),
+        ],
+        [Figure("map.png", "Mean standard deviation of mu with a gauge at each place, in its best direction")],
+        command="optimise",
+    )
