@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +30,10 @@ from ._rows import Result, Row, at_most, columns
 BY_NAME = True
 GOAL = "goal of this project"
 HOURS, SAMPLES, ERROR = 10.0, 1e5, 0.03
-FINER, ORDER, FEW, ALONE = 0.5, 1.2, 16, 334
+FINER, ORDER, FEW = 0.5, 1.2, 16
+SAMPLES_EACH, ALONE = 667, 334
+LARGE_SIZE, LARGE_SAMPLES = 1.5, 200
+NUMBERS = "normal_force_N", "tangential_force_x_N", "external_work_mJ", "contact_area_mm2"
 OBJECTS: dict[str, tuple[dict[str, Any], dict[str, tuple[float, float]]]] = {
     "ball": ({"shape": "sphere", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
     "cylinder": ({"shape": "cylinder", "radius_mm": 4.0}, {"object.radius_mm": (3.0, 8.0)}),
@@ -45,23 +49,47 @@ DRAWN = {
 }  # fmt: skip
 
 
-class Measured(NamedTuple):
+class Swept(NamedTuple):
     """Samples of one object.
 
     Attributes
     ----------
-    seconds : of the whole sweep, meshing and condensation included
-    force, finer : normal force of some samples, N, and of the same on shorter edges
-    alone : largest relative difference of the numbers of samples pressed again alone
+    ranges : of the keys that were drawn
+    size_mm, large : edges at the contact, and whether at large deformation
+    seconds, body_seconds : of the whole sweep, and of meshing and condensation, which are part of it
+    numbers : of all samples by name, from the finished file
     """
 
     name: str
-    samples: int
+    ranges: dict[str, tuple[float, float]]
+    size_mm: float
+    large: bool
     seconds: float
     body_seconds: float
-    force: Float
-    finer: Float
-    alone: float
+    numbers: dict[str, Float]
+
+    @property
+    def samples(self) -> int:
+        return len(self.numbers["normal_force_N"])
+
+    def pressed(self, count: int, finer: float, folder: Path) -> Mapping[str, Sequence[Any]]:
+        """Return the table of the first samples, pressed again on edges that are longer by a factor."""
+        points, count = folder / "points.csv", min(count, self.samples)
+        lines = [",".join(repr(float(self.numbers[key][k])) for key in self.ranges) for k in range(count)]
+        points.write_text("\n".join([",".join(self.ranges), *lines]) + "\n", encoding="utf-8")
+        out = folder / f"{self.name} {self.large} {finer}"
+        return sweep(scene(self.name, finer * self.size_mm, self.large), points, out).columns
+
+    def errors(self, folder: Path) -> Float:
+        """Return the relative errors of the normal force of some samples."""
+        finer = np.array(self.pressed(FEW, FINER, folder)["normal_force_N"])
+        return np.abs(self.numbers["normal_force_N"][: len(finer)] / finer - 1.0) / (1.0 - FINER**ORDER)
+
+    def difference(self, count: int, folder: Path) -> float:
+        """Return the largest relative difference of numbers of samples that are pressed again alone."""
+        again = self.pressed(count, 1.0, folder)
+        pairs = [(np.array(again[key]), self.numbers[key]) for key in NUMBERS]
+        return max(float(np.abs(one / other[: len(one)] - 1.0).max()) for one, other in pairs)
 
 
 def scene(name: str, size: float, large: bool) -> dict[str, Any]:
@@ -80,25 +108,28 @@ def scene(name: str, size: float, large: bool) -> dict[str, Any]:
 
 def run(quick: bool) -> Result:
     """Quick: three samples of a ball."""
-    size, count, deformed = (1.0, 3, 0) if quick else (0.7, 1200, 24)
-    names = list(OBJECTS)[:1] if quick else list(OBJECTS)
-    with tempfile.TemporaryDirectory() as folder:
-        found = [_measured(name, size, count // len(names), False, Path(folder)) for name in names]
-        large = [_measured("ball", 1.5, deformed, True, Path(folder))] if deformed else []
-    rows = [_hours(found, "small strain")]
-    rows += [_error(one) for one in found]
-    rows.append(at_most("numbers of samples pressed again alone, largest relative difference", "the same press", 1e-9,
-                        max(one.alone for one in found), "round-off"))  # fmt: skip
+    names, count, alone = (["ball"], 3, 3) if quick else (list(OBJECTS), SAMPLES_EACH, ALONE)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        small = [_swept(name, SIZES[name], count, False, folder) for name in names]
+        large = [] if quick else [_swept("ball", LARGE_SIZE, LARGE_SAMPLES, True, folder)]
+        errors = [one.errors(folder) for one in small + large]
+        apart = max(one.difference(alone, folder) for one in small)
+    rows = [_hours(small, "small strain")]
+    rows += [_error(one, error) for one, error in zip(small, errors, strict=False)]
+    what = f"numbers of {alone * len(small)} samples pressed again alone, largest relative difference"
+    rows.append(at_most(what, "the same press", 1e-9, apart, "round-off"))
     if large:
-        rows.append(_hours(large, "large deformation, edges of 1.5 mm"))
+        rows.append(_hours(large, f"large deformation, edges of {LARGE_SIZE} mm"))
     lines = [
-        (one.name, one.samples, one.seconds, one.body_seconds, float(np.nanmedian(_off(one)))) for one in found + large
+        (one.name, one.samples, one.size_mm, one.seconds, one.body_seconds, float(np.nanmedian(error)))
+        for one, error in zip(small + large, errors, strict=True)
     ]
-    table = columns("object samples seconds body_seconds median_error", lines)
+    table = columns("object samples size_mm seconds body_seconds median_error", lines)
     return Result(tuple(rows), table, lambda figure: _draw(figure, lines))
 
 
-def _measured(name: str, size: float, count: int, large: bool, folder: Path) -> Measured:
+def _swept(name: str, size: float, count: int, large: bool, folder: Path) -> Swept:
     ranges = DRAWN | OBJECTS[name][1]
     out = folder / f"{name} {large}"
     began = time.perf_counter()
@@ -106,25 +137,10 @@ def _measured(name: str, size: float, count: int, large: bool, folder: Path) -> 
     seconds = time.perf_counter() - began
     with h5py.File(out / "labels.h5") as file:
         numbers = {key: values[:] for key, values in file["body_1/numbers"].items()}
-    few = min(count, FEW)
-    points = folder / f"{name} {large}.csv"
-    lines = [",".join(ranges), *(",".join(repr(float(numbers[key][k])) for key in ranges) for k in range(few))]
-    points.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    finer = sweep(scene(name, FINER * size, large), points, folder / f"{name} {large} finer").columns
-    same = sweep(scene(name, size, large), points, folder / f"{name} {large} again").columns
-    keys = "normal_force_N", "tangential_force_x_N", "external_work_mJ", "contact_area_mm2"
-    alone = max(float(np.abs(np.array(same[key]) / numbers[key][:few] - 1.0).max()) for key in keys)
-    force = numbers["normal_force_N"][:few]
-    build = float(result.columns["build_seconds"][0])
-    return Measured(name, count, seconds, build, force, np.array(finer["normal_force_N"]), alone)
+    return Swept(name, ranges, size, large, seconds, float(result.columns["build_seconds"][0]), numbers)
 
 
-def _off(one: Measured) -> Float:
-    """Return the relative errors of the forces."""
-    return np.abs(one.force / one.finer - 1.0) / (1.0 - FINER**ORDER)
-
-
-def _hours(found: list[Measured], what: str) -> Row:
+def _hours(found: list[Swept], what: str) -> Row:
     """Return the hours that 1e5 samples take on as many cores as this machine has."""
     each = sum(one.seconds - one.body_seconds for one in found) / sum(one.samples for one in found)
     name = (
@@ -133,30 +149,24 @@ def _hours(found: list[Measured], what: str) -> Row:
     return Row(name, GOAL, HOURS, each * SAMPLES / 3600.0, 0.0, "a goal", "statement", "at most")
 
 
-def _error(one: Measured) -> Row:
-    what = f"error of the normal force, {one.name}, median of {len(one.force)} samples, by edges {FINER} times as long"
-    return Row(
-        what,
-        "order of convergence of forces",
-        ERROR,
-        float(np.nanmedian(_off(one))),
-        0.0,
-        "a goal",
-        "statement",
-        "at most",
-    )
+def _error(swept: Swept, errors: Float) -> Row:
+    """Return the median error of the normal force."""
+    what = f"error of the normal force, {swept.name}, median of {len(errors)} samples, edges of {swept.size_mm} mm"
+    got = float(np.nanmedian(errors))
+    return Row(what, "order of convergence of forces", ERROR, got, 0.0, "a goal", "statement", "at most")
 
 
-def _draw(figure: Any, lines: list[tuple[str, int, float, float, float]]) -> None:
+def _draw(figure: Any, lines: list[tuple[str, int, float, float, float, float]]) -> None:
     """Draw hours and errors by object; the last bar, after the three objects, is the ball at large deformation."""
     left, right = figure.subplots(1, 2)
-    names = [*(name for name, *_ in lines[:3]), *(f"{name}, large\ndeformation" for name, *_ in lines[3:])]
-    hours = [(seconds - body) / count * SAMPLES / 3600.0 for _, count, seconds, body, _ in lines]
+    names = [f"{name},\n{size} mm" for name, _, size, *_ in lines[:3]]
+    names += [f"{name},\n{size} mm,\nlarge\ndeformation" for name, _, size, *_ in lines[3:]]
+    hours = [(seconds - body) / count * SAMPLES / 3600.0 for _, count, _, seconds, body, _ in lines]
     left.bar(names, hours, color="#2166ac")
     left.axhline(HOURS, color="#222222", lw=0.8, label="goal")
     left.set(ylabel="hours on two cores", title="100 000 samples with labels")
     right.bar(names, [100.0 * line[-1] for line in lines], color="#67a9cf")
     right.axhline(100.0 * ERROR, color="#222222", lw=0.8, label="goal")
-    right.set(ylabel="error of the normal force, median (%)", title="edges of 0.7 mm, 1.5 mm at large deformation")
+    right.set(ylabel="error of the normal force, median (%)", title="by edges half as long")
     for axes in (left, right):
         axes.legend(frameon=False)
