@@ -3,10 +3,10 @@
 from finger3d.analyses.calibrate.run import calibrate as calibrate
 from finger3d.analyses.compare import compare as compare
 from finger3d.analyses.cost import cost as cost
+from finger3d.analyses.cost import plan as plan
 from finger3d.analyses.gauge_places import place_gauges as place_gauges
 from finger3d.analyses.identify.run import identify as identify
 from finger3d.analyses.optimise import optimise as optimise
-from finger3d.analyses.plan import plan as plan
 from finger3d.analyses.press import press as press
 from finger3d.analyses.reduced import ReducedModel as ReducedModel
 from finger3d.analyses.result import PressResult as PressResult

@@ -16,7 +16,7 @@ from werkzeug.serving import BaseWSGIServer, make_server
 from finger3d._types import Array, Float, freeze_arrays
 from finger3d.accuracy.changes import changing_numbers, two_digits
 from finger3d.accuracy.model_error import Judgement, at_large_deformation
-from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
+from finger3d.analyses.calibrate import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.tolerances import displaced_gauges, tolerance_of
 from finger3d.analyses.pressed_body import PressedBody, under
 from finger3d.contact.friction import STATUS_NAMES

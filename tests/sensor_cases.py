@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.scene import parse
 from finger3d.sensor import Calibration, ReadingCurve, Tolerance
 

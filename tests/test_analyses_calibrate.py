@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.curve_points import SHARE, choose_mesh, mesh_share
 from finger3d.analyses.calibrate.run import calibrate, calibrated
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main
 from finger3d.contact.friction import Coulomb

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.curve_points import choose_increments, error_of_increments
 from finger3d.analyses.calibrate.run import calibrate, calibrated
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import (
     displaced_gauges,
     poisson_steps,

@@ -14,7 +14,7 @@ import pytest
 from dash import Dash, html
 
 import finger3d
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.app import (
     HOST,
     MU_STEP,

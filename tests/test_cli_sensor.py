@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 
 from finger3d.analyses import pressed_body as pressing
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate import run as runs
 from finger3d.analyses.calibrate.run import calibrate
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.identify.presses import Simulation
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.cli import main

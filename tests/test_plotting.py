@@ -28,8 +28,8 @@ from finger3d.plotting.figures import (
     zones,
 )
 from finger3d.plotting.gauges import marks_of
-from finger3d.report.sweep import draw as draw_sweep
-from finger3d.report.sweep import sweep_charts
+from finger3d.report.analyses import draw as draw_sweep
+from finger3d.report.analyses import sweep_charts
 from finger3d.results.summary import Case
 from tests.commands import loaded
 from tests.comparison_cases import case

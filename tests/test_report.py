@@ -14,7 +14,15 @@ import pytest
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.mechanics.model import Gauge
 from finger3d.mechanics.readings import strain_columns
-from finger3d.report.analyses import calibrate_page, compare_page, gauge_places_page, identify_page, optimise_page
+from finger3d.report.analyses import (
+    calibrate_page,
+    compare_page,
+    gauge_places_page,
+    identify_page,
+    optimise_page,
+    picture,
+    sweep_charts,
+)
 from finger3d.report.build import (
     CITE,
     PAPER,
@@ -31,7 +39,6 @@ from finger3d.report.build import (
     view_of,
 )
 from finger3d.report.press import press_page
-from finger3d.report.sweep import picture, sweep_charts
 from finger3d.results.states import load_states
 from finger3d.results.summary import title_of
 from finger3d.sensor import save

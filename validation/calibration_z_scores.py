@@ -18,8 +18,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.run import calibrated
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.calibrate.tolerances import read
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs

@@ -29,9 +29,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Outcome
 from finger3d.fem.laws.material import Isotropic

@@ -17,8 +17,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.run import calibrated
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model

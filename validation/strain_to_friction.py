@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
+from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.curve_points import CurvePoints
 from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
-from finger3d.analyses.calibrate.tolerance_table import TOLERANCES
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
 from finger3d.fem.laws.material import Isotropic

@@ -1,4 +1,4 @@
-"""What accuracy costs: mesh, time and memory of a scene for several relative errors, forecast from two coarse presses.
+"""What accuracy costs: the error, time and memory of a press on finer meshes, and the plan of a press.
 
 Both coarse presses have error bars.  Those of a number fall as a power of the edge length: of the usual order,
 corrected by the order between both presses, and through the mean of both.  The edge lengths for a wanted error follow.
@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Self
 
 from finger3d._cost import factor_mb
 from finger3d._ranges import four_digits
-from finger3d._types import Tree
+from finger3d._types import Tree, TreeView
 from finger3d.accuracy.cost import forecast, without_output_s
 from finger3d.accuracy.error_bars import relative_error
 from finger3d.accuracy.estimate import companion_presses, estimate, press_numbers
@@ -25,13 +25,17 @@ from finger3d.accuracy.refine import ALL
 from finger3d.analyses.free_keys import settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError, UnresolvedError
+from finger3d.geometry.imported import extent
 from finger3d.mechanics.discretise.companions import coarser
+from finger3d.mechanics.discretise.resolution import warnings_before_meshing
+from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.march.step_halving import march_automatic, with_increments_of
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.readings import AREAS, MAIN, ORDER, by_key, kinds_of
 from finger3d.meshing.given import GivenMesh
 from finger3d.progress import QUIET, Progress
 from finger3d.scene import Source, scene_of
+from finger3d.scene.material import moduli
 
 ERRORS = (0.1, 0.03, 0.01, 0.003)
 """Relative errors that `cost` forecasts a press for."""
@@ -379,3 +383,72 @@ def _line(row: CostRow, names: Sequence[str]) -> list[str]:
         *size,
         *(f"{100 * row.errors[name]:.2g} %" if name in row.errors else "" for name in names),
     ]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Forecast of a press.
+
+    Attributes
+    ----------
+    title : of the scene
+    moduli : Young's modulus of the finger and of its parts in words, with spread and origin
+    effects : settings by name of the effects that are on
+    forecast : printable values by name: model, size, seconds of each stage, memory
+    warnings : unusual values of the scene, and what the mesh will not resolve
+    """
+
+    title: str
+    moduli: Mapping[str, str]
+    effects: Mapping[str, TreeView]
+    forecast: TreeView
+    warnings: tuple[str, ...]
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknowns."""
+        return int(self.forecast["dofs"])
+
+    @property
+    def contact_points(self) -> int:
+        """Number of contact points of the meshed part."""
+        return int(self.forecast["contact_points"])
+
+    @property
+    def total_s(self) -> float:
+        """Time of the press, s; the real time is 0.5 to 2.5 times this."""
+        return float(self.forecast["total_s"])
+
+    @property
+    def memory_MB(self) -> float:
+        """Peak memory, MB; the real one is 0.8 to 1.3 times this."""
+        return float(self.forecast["memory_MB"])
+
+    def summary(self) -> Tree:
+        """Return what `finger3d plan --json` prints."""
+        return asdict(self)
+
+
+def plan(scene: Source, overrides: Sequence[str] = ()) -> Plan:
+    """Forecast size, time and memory of a press without solving anything.
+
+    Parameters
+    ----------
+    scene : path of a TOML file, a dict with its tables, or a loaded scene
+    overrides : other keys to set, such as ``"mesh.size_mm=1.0"``
+
+    Returns
+    -------
+    Plan
+        For instance ``plan.dofs``, ``plan.total_s`` and ``plan.memory_MB``.
+    """
+    scene = scene_of(scene, overrides)
+    model = scene.with_effects([*scene.fixed_effects, *scene.open_effects]).model()  # at the most
+    expected = forecast(model, bars=True)
+    warnings = [*model.warnings, *warnings_before_meshing(model, symmetry(model))]
+    expected = {"finger": extent(model.design)} | expected
+    tolerance = scene.tables.mesh.tolerance
+    if tolerance is not None:
+        expected = {"mesh": f"the first of those refined to tolerance = {tolerance:g}"} | expected
+    effects = {name: settings for name, settings in scene.as_dict()["effects"].items() if name in scene.effects}
+    return Plan(scene.title, moduli(scene.tables), effects, expected, tuple(warnings))

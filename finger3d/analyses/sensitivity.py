@@ -13,7 +13,7 @@ import numpy as np
 from finger3d._types import Tree, TreeView
 from finger3d.accuracy.error_bars import spread_error
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
+from finger3d.analyses.calibrate import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.free_keys import scene_with, settled
 from finger3d.analyses.pressed_body import PressedBody
 from finger3d.errors import Finger3dError
@@ -143,7 +143,7 @@ def sensitivity(
     report : receives the progress
     overrides : other keys to set, such as ``"friction.mu=0.5"``
     tolerances : changes by key, such as ``{"friction.mu": 0.02}``; else that of a careful set-up where one is known
-        (`finger3d.analyses.calibrate.tolerance_table`), and 1 % of the value
+        (`finger3d.analyses.calibrate`), and 1 % of the value
 
     Returns
     -------

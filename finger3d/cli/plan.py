@@ -25,7 +25,7 @@ def plan(scene: Path, /, *, set_: Set = None, json_: Json = False) -> None:
         The scene file (TOML).
     """
     loaded = load(scene, set_)
-    from finger3d.analyses.plan import plan as run
+    from finger3d.analyses.cost import plan as run
 
     result = run(loaded)
     if json_:

@@ -43,7 +43,7 @@ def show(
     if (folder / "sweep.json").is_file():
         if step is not None:
             raise Finger3dError(f"show: {folder} holds a sweep: give --png alone, or nothing for its page")
-        from finger3d.report.sweep import picture
+        from finger3d.report.analyses import picture
 
         picture(folder, png)
     else:

@@ -92,8 +92,8 @@ def sweep(
     options = options or SweepOptions()
     options.check()
     from finger3d.analyses.sweep.run import sweep as run
+    from finger3d.report.analyses import points_table, sweep_page
     from finger3d.report.build import number
-    from finger3d.report.sweep import points_table, sweep_page
 
     def kept(done: Progress) -> str:
         if not done.steps_done:

@@ -23,9 +23,9 @@ from scipy.interpolate import PchipInterpolator
 from finger3d._types import Float
 from finger3d.accuracy.error_bars import gain
 from finger3d.accuracy.estimate import times_modulus
+from finger3d.analyses.calibrate import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.calibrate.curve_points import CurvePoints, error_of_increments
 from finger3d.analyses.calibrate.settings import CalibratedReading, CalibrationSettings
-from finger3d.analyses.calibrate.tolerance_table import GAUGE_PLACES, TOLERANCES
 from finger3d.analyses.pressed_body import presses, under
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import MIXED_FROM

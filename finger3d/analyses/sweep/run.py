@@ -13,7 +13,7 @@ from finger3d.analyses.sweep import worker
 from finger3d.analyses.sweep.points import Point, checked_points, drawn, rows_of, varied
 from finger3d.analyses.sweep.store import BodyPoints, ResultStore, SweepProgress
 from finger3d.progress import Progress
-from finger3d.report.sweep import sweep_page
+from finger3d.report.analyses import sweep_page
 from finger3d.scene import Source
 
 if TYPE_CHECKING:
