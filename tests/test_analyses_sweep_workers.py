@@ -15,6 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -209,11 +211,12 @@ def test_a_scheduler_and_two_workers_of_their_own(root, paper_scene, tmp_path) -
 
 
 @pytest.mark.slow
-def test_a_sweep_goes_on_when_a_nanny_starts_its_worker_again(root, paper_scene, tmp_path) -> None:
+@pytest.mark.parametrize("labels", [(), ("--set", "labels.grid_mm=5")], ids=["plain", "labels"])
+def test_a_sweep_goes_on_when_a_nanny_starts_its_worker_again(labels, root, paper_scene, tmp_path) -> None:
     """As after a death for lack of memory; Dask itself keeps the batch for the address that is gone."""
     env, out = environment(root, str(tmp_path)), tmp_path / "out"
     with dask(1, env, tmp_path, "--nanny", "--local-directory", str(tmp_path)) as (address, _, (nanny,)):
-        command = sweeping(paper_scene, out, 30, 2, "--scheduler", address, *SLOW)
+        command = sweeping(paper_scene, out, 30, 2, "--scheduler", address, *SLOW, *labels)
         with started(command, env, tmp_path, tmp_path / "log") as parent:
             until(lambda: len(lines(out)) >= 3, "three points")
             spawned = [n for n in children(nanny.pid) if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text()]
@@ -222,6 +225,11 @@ def test_a_sweep_goes_on_when_a_nanny_starts_its_worker_again(root, paper_scene,
             assert len(spawned) == 1
             assert parent.wait(timeout=200) == 0, (tmp_path / "log").read_text()
     assert_nothing_repeated_or_lost(out, 60)
+    if labels:
+        with h5py.File(out / "labels.h5") as file:
+            samples = [file[body] for body in file]
+            assert sorted(np.concatenate([body["sample"][:] for body in samples])) == list(range(60))
+            assert all(np.isfinite(body["pressure_MPa"][:, -1]).any(axis=(1, 2)).all() for body in samples)
 
 
 def test_a_worker_without_finger3d_is_named(root, paper_scene, tmp_path) -> None:
