@@ -37,6 +37,8 @@ Domain = Literal["solid", "plane-strain"]
 
 NOISE, LIMIT = 1.5e-4, 0.1
 MUS = tuple(float(mu) for mu in np.linspace(0.05, 1.0, 11).round(4))
+UNKNOWN = (MUS[-1] - MUS[0]) / 12.0**0.5
+"""Standard deviation of mu if every value between the first and the last is as likely."""
 SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (1.0, 4.0), "solid": (3.0, 9.0)}
 QUICK: dict[Domain, tuple[float, float]] = {"plane-strain": (3.0, 10.0)}
 SMALL, LARGE = "small strain", "large deformation"
@@ -139,7 +141,7 @@ def _inside(body: Model, gauge: Gauge) -> Gauge:
 
 def _sd(joint: Calibration) -> Float:
     """Return the standard deviation of mu, at most that of a mu that may lie anywhere from 0.05 to 1."""
-    return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + 12.0 / (MUS[-1] - MUS[0]) ** 2))
+    return np.asarray(1.0 / np.sqrt(joint.mu_sd(np.array(MUS)) ** -2 + UNKNOWN**-2))
 
 
 def _rows(spread: Spread) -> Iterator[Row]:
@@ -161,8 +163,8 @@ def _rows(spread: Spread) -> Iterator[Row]:
 
 def _draw(figure: Any, spread: Spread) -> None:
     cases = list(dict.fromkeys((key[0], key[1]) for key in spread))
-    figure.set_size_inches(5.2 * len(cases), 5.0)
-    panels = np.atleast_1d(figure.subplots(1, len(cases), sharey=True))
+    figure.set_size_inches(10.0, 4.0 * -(-len(cases) // 2))
+    panels = figure.subplots(-(-len(cases) // 2), min(len(cases), 2), sharey=True, squeeze=False).ravel()
     colours = {PAPER: "#b2182b", MARKERS: "#1b7837"}
     blues = dict(zip((n for n in dict.fromkeys(key[2] for key in spread) if "best" in n),
                      ("#92c5de", "#4393c3", "#053061"), strict=False))  # fmt: skip
@@ -173,8 +175,11 @@ def _draw(figure: Any, spread: Spread) -> None:
                 label = f"{key[2]}, as foils" if key[3] == READ else key[2]
                 axes.semilogy(MUS, sd, style, color=(colours | blues)[key[2]], lw=1.8, label=label)
         axes.axhline(LIMIT, color="#222222", lw=0.8)
-        axes.text(0.06, LIMIT * 1.08, "the paper's 0.1", fontsize=8)
+        axes.text(1.0, LIMIT * 1.08, "the paper's 0.1", fontsize=8, ha="right")
+        axes.axhline(UNKNOWN, color="#888888", lw=0.8, ls=":")
+        axes.text(1.0, UNKNOWN * 1.08, "nothing known", fontsize=8, ha="right")
         axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(2e-3, 0.4))
-    panels[0].set_ylabel("standard deviation of mu")
+    for axes in panels[::2]:
+        axes.set_ylabel("standard deviation of mu")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)

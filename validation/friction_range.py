@@ -136,6 +136,9 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
     return rows
 
 
+ROUND_OFF = 1e-12  # mm
+
+
 def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) -> None:
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     names = [f"{mu:g}" for mu in table["mu"]]
@@ -151,17 +154,15 @@ def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) ->
         left.plot(names, 100.0 * share, style, ms=size, label=label)
     left.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
     left.set_title("increments that settle; peers: share of the press")
-    values = np.maximum(list(creeps.values()), 1e-16)
-    bars = right.bar(list(creeps), values, color=["C0"] + ["C4"] * (len(creeps) - 1))
-    right.bar_label(bars, [_told(v) for v in creeps.values()], fontsize=8)
-    right.set(yscale="log", ylim=(1e-16, 1e5), ylabel="creep in a minute (mm)")
-    right.tick_params(axis="x", labelsize=8)
+    seen = {name: mm for name, mm in creeps.items() if mm > ROUND_OFF}
+    right.semilogx(list(seen.values()), [name.replace("\n", " ") for name in seen], "o", color="C4")
+    for number, mm in enumerate(seen.values()):
+        right.annotate(f"{mm:.2g}", (mm, number), (6, 0), textcoords="offset points", va="center")
+    none = [name for name in creeps if name not in seen]
+    right.set(xlim=(1e-5, 1e3), xlabel="creep in a minute (mm)", ylim=(len(seen) - 0.5, -0.5))
+    right.text(0.5, 0.03, f"{', '.join(none)}: none" if none else "", transform=right.transAxes, ha="center")
     right.set_title("object of 45 g held with 12 N, mu = 1")
     total, settled, paper = (int(t[k].sum()) for k in ("increments", "settled", "paper_settled"))
     figure.supxlabel(
         f"finger3d settles {settled} of {total} increments, the paper's rule {paper} up to its first cycles", fontsize=9
     )
-
-
-def _told(mm: float) -> str:
-    return "0 (round-off)" if 0.0 < mm < 1e-12 else f"{mm:.2g}"

@@ -181,8 +181,8 @@ def _draw(figure: Any, models: list[Model], best: Model) -> None:
                            fmt="osv"[i], ms=4, lw=0.8, color=f"C{j}", label=f"{law}, nu = {nu:g}")  # fmt: skip
     middle.axhline(100.0 * FITS, color="#222222", lw=0.8)
     middle.set(xscale="log", xlabel="mu that is assumed", ylabel="largest distance from a force (%)", ylim=(0.0, None))
-    middle.legend(fontsize=6.5, frameon=False, ncols=2)
+    middle.legend(fontsize=7.5, frameon=False, ncols=2, handlelength=4.0)
     right.axhline(FORCES[3], color="k", lw=1.0)
     right.set(xlabel="Young's modulus that is identified (MPa)", ylabel="force at 2 mm from the first three (N)")
     right.set_title("with two standard deviations; line: measured")
-    right.legend(fontsize=6.5, frameon=False, ncols=2)
+    right.legend(fontsize=7.5, frameon=False, ncols=2)

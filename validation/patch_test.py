@@ -129,5 +129,5 @@ def draw(figure: Any, table: list[tuple[str, int, int, float]]) -> None:
             axes.loglog(n, np.maximum(e, 1e-17), "o-", markersize=4.5, label=case)
         axes.axhline(1e-12, color="k", linestyle="--", linewidth=1.0)
         ticks_at(axes, n)
-        axes.set(xlabel="cells along a side", title=f"{dim}D: errors are round-off (dashed: 1e-12)", ylim=(1e-17, 1e-2))
+        axes.set(xlabel="cells along a side", title=f"{dim}D patch tests (dashed: 1e-12)", ylim=(1e-17, 1e-2))
     figure.axes[0].set_ylabel("largest error (mm, or relative pressure)")

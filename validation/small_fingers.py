@@ -27,7 +27,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._paper import said
 from ._rows import Result, Row, columns
-from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, best_gauges, markers, spreads, with_foils
+from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, UNKNOWN, best_gauges, markers, spreads, with_foils
 
 RADII = (5.0, 10.0)
 FOIL, FOIL_MM = EmbeddedGauge(3000.0, 0.02, 1.5), 2.0
@@ -104,6 +104,8 @@ def _draw(figure: Any, found: Spread) -> None:
                 label = readings if radius == RADII[0] else None
                 axes.semilogy(MUS, sd, color=colour, lw=width, label=label)
         axes.axhline(LIMIT, color="#222222", lw=0.8)
+        axes.axhline(UNKNOWN, color="#888888", lw=0.8, ls=":")
+        axes.text(1.0, UNKNOWN * 1.08, "nothing known", fontsize=8, ha="right")
         axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4), title=f"{measure}, {tolerances}")
     panels[0].set_ylabel("standard deviation of mu")
     lines = {line.get_label(): line for axes in panels for line in axes.get_legend_handles_labels()[0]}

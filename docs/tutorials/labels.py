@@ -19,8 +19,9 @@
 #
 # All samples share one pad, whatever their object, friction coefficient and path: it is meshed and condensed
 # ([glossary](../glossary.md#condensation)) once, with edges of one length all over its contact face. A sample then
-# costs only its increments. On edges of 0.7 mm of a pad of 20 x 16 mm a sample takes 0.4 s on two cores, 100 000 take
-# eleven hours, and forces are 1.5 to 6 % off ([label_rate](../../validation/label_rate.py)).
+# costs only its increments. On edges of 0.6 to 1 mm of a pad of 20 x 16 mm a sample takes a quarter of a second on two
+# cores, 100 000 take six and a half hours, and forces are 1 to 2 % off
+# ([label_rate](../../validation/label_rate.py)).
 
 # %%
 from pathlib import Path
