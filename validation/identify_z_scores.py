@@ -28,7 +28,7 @@ from ._rows import Result, Row, columns, listed, rms
 judged = listed(__file__)
 
 FREE = {"material.E_MPa": (0.05, 5.0), "friction.mu": (0.02, 1.0), "material.nu": (0.3, 0.495)}
-CASES, IF_QUICK = {"plane-strain": 80, "solid": 20, "drawn": 24}, {"plane-strain": 12, "drawn": 6}
+CASES, IF_QUICK = {"plane-strain": 80, "solid": 20, "drawn": 72}, {"plane-strain": 12, "drawn": 6}
 SIZES = {"plane-strain": (1.0, 3.0), "solid": (3.5, 5.0)}
 FINER = {"plane-strain": (1.5, 4.0), "solid": (1.5, 2.0), "drawn": (2.0, 3.3)}
 NOISE = 1e-3, 2e-2  # of the largest value of a column
@@ -168,3 +168,4 @@ def _draw(figure: Any, found: list[Fitted]) -> None:
         axes.axhline(1.0, color="k", lw=0.8)
         axes.set(xscale="log", yscale="log", xlabel="noise over the largest value", title=title, ylim=(1e-3, None))
     left.set_ylabel("|identified - true| / standard deviation")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
