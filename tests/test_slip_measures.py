@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finger3d.accuracy.estimate import estimate
 from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import contact_table, measure, slip_events
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg
+from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.readings import Taxel
 from finger3d.objects import Plane, Sphere
 from tests.held_cases import MU, PRESS, N, held
@@ -66,9 +67,7 @@ def test_the_stick_ratio_of_a_line_contact_follows_its_margin() -> None:
 
 
 def _events(problem: Problem) -> dict[str, Any]:
-    steps = list(march(problem))
-    margin = [measure(problem.points, step)["slip_margin"] for step in steps]
-    return slip_events(problem.points, steps, margin, problem.model.readings)
+    return slip_events(problem.points, list(march(problem)), problem.model.readings)
 
 
 def _slid_ball(steps: int) -> dict[str, Any]:
@@ -88,6 +87,24 @@ def test_a_ball_that_slides_slips_at_its_rim_then_in_the_middle_then_as_a_whole(
     assert coarse["gross_slip"]["slide_x_mm"] == pytest.approx(fine["gross_slip"]["slide_x_mm"], abs=0.5 * increment)
     middles = [found["first_slip"]["taxel_t1"]["slide_x_mm"] for found in (coarse, fine)]
     assert middles[0] == pytest.approx(middles[1], abs=0.5 * increment)
+
+
+def test_the_error_of_gross_slip_is_that_of_mesh_and_increments() -> None:
+    """A mesh of half the edges and increments of a third give an event within two bars, which are less than 0.1 mm."""
+
+    def slid(size: float, times: int) -> Problem:
+        legs = (Leg(0.2, steps=4 * times), Leg(0.2, steps=8 * times, slide_x_mm=0.4))
+        mesh = MeshOptions(size, 1.5 * size, "swept")
+        return build(block(object=Sphere(radius_mm=4.0), legs=legs, friction=Coulomb(MU), mesh=mesh))
+
+    problem, fine = slid(0.6, 1), slid(0.3, 3)
+    steps = list(march(problem))
+    errors = estimate(problem, steps).slip
+    found = slip_events(problem.points, steps, (), errors)["gross_slip"]
+    assert found["error"].keys() == {"slide_x_mm"}
+    assert 0.5 * 0.4 / 8 <= found["error"]["slide_x_mm"] <= 0.1
+    missed = abs(found["slide_x_mm"] - _events(fine)["gross_slip"]["slide_x_mm"])
+    assert missed <= 2.0 * found["error"]["slide_x_mm"]
 
 
 def test_under_a_force_beyond_the_limit_gross_slip_is_the_last_pose_that_held() -> None:

@@ -17,7 +17,7 @@ distance^lambda (Williams 1952).  Numbers that depend less on the corners have a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -94,6 +94,12 @@ def spacing(problem: Problem, step: StepResult) -> float:
     return min(1.0, distance / reach) if reach > 0.0 else 1.0
 
 
+def spread(kind: Kind, value: float, others: Sequence[tuple[float, float]]) -> float:
+    """Return the error bar of a number of a kind from edge lengths over that of the mesh, and its values there."""
+    errors = [(value - other) / gain(ratio, kind.order) for ratio, other in others]
+    return kind.bar_factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
+
+
 def spread_error(
     numbers: Mapping[str, float],
     companions: Iterable[tuple[float, Mapping[str, float]]],
@@ -117,8 +123,7 @@ def spread_error(
     kinds, told = kinds_of(readings), list(companions)
     found = {}
     for name, value in numbers.items():
-        errors = [(value - other[name]) / gain(ratio, kinds[name].order) for ratio, other in told]
-        bar = kinds[name].bar_factor * math.sqrt(sum(error**2 for error in errors) / len(errors))
+        bar = spread(kinds[name], value, [(ratio, other[name]) for ratio, other in told])
         scale = scale_of(numbers, kinds, name)
         if kinds[name] is Kind.DISSIPATION and abs(value) < scale:  # nothing slips
             scale *= _LEAST_SLIP

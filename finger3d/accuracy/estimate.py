@@ -24,16 +24,17 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from finger3d._cost import INCREMENT_ERRORS_S, INCREMENT_ERRORS_SHARE
-from finger3d.accuracy.error_bars import ErrorBars, spacing, spread_error
+from finger3d.accuracy.error_bars import ErrorBars, spacing, spread, spread_error
 from finger3d.contact.acceleration import one_thread
 from finger3d.errors import FAILURES, Finger3dError, MissingError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.companions import coarse_companions, companion, finer_companions
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import StepResult, measure
+from finger3d.mechanics.history import StepResult, measure, slips
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
     StepEstimate,
+    all_steps,
     errors_of_runs,
     last_step,
     rough_workspace,
@@ -51,6 +52,7 @@ from finger3d.mechanics.readings import (
     MEASURED,
     RESULTANTS,
     SLIP,
+    Kind,
     by_key,
     in_space,
     quantities,
@@ -60,11 +62,11 @@ from finger3d.progress import QUIET, Progress
 
 
 class CompanionPress(NamedTuple):
-    """Edge length of a companion over that of the mesh, its problem, and its last increment."""
+    """Edge length of a companion over that of the mesh, its problem, and its increments."""
 
     ratio: float
     problem: Problem
-    end: StepResult
+    steps: Sequence[StepResult]
 
 
 def companion_presses(
@@ -86,22 +88,22 @@ def companion_presses(
     found = []
     for ratio, beside in coarse_companions(problem, report, chosen.beside if chosen else None, unknowns):
         try:
-            found.append(CompanionPress(ratio, beside, _end_of(beside, chosen, cancel)))
+            found.append(CompanionPress(ratio, beside, _pressed(beside, chosen, cancel)))
         except FAILURES:
             continue
     if not found:
         finer = finer_companions(problem, report)
-        found = [CompanionPress(ratio, beside, _end_of(beside, None, cancel)) for ratio, beside in finer]
+        found = [CompanionPress(ratio, beside, _pressed(beside, None, cancel)) for ratio, beside in finer]
     return found
 
 
-def _end_of(beside: Problem, chosen: StepEstimate | None, cancel: Event | None) -> StepResult:
-    """Return the last increment of a companion, pressed roughly unless it is known."""
+def _pressed(beside: Problem, chosen: StepEstimate | None, cancel: Event | None) -> Sequence[StepResult]:
+    """Return the increments of a companion, pressed roughly unless they are known."""
     if chosen and chosen.beside and chosen.beside.mesh is beside.mesh:
         count, steps = chosen.runs[-1]
         if all(leg.steps == count for leg in beside.model.legs):
-            return steps[-1]
-    return last_step(beside, rough_workspace(beside), FEW_CUTS, cancel)
+            return steps
+    return all_steps(beside, rough_workspace(beside), FEW_CUTS, cancel)
 
 
 class CompanionThread:
@@ -140,6 +142,9 @@ class CompanionThread:
             self._running.close()
 
 
+_WITHIN_INCREMENT = 0.5
+"""Error of the place of an event within its increment, in increments."""
+
 Measure = Callable[[Problem, StepResult], dict[str, float]]
 
 Companions = Callable[[Problem, StepEstimate | None, Progress], list[CompanionPress]]
@@ -154,10 +159,12 @@ class ErrorEstimate(ErrorBars):
     ----------
     companion_numbers : numbers of the companion by name; empty without a companion mesh
     ratio : edge length of the companion over that of the mesh; below 1 for a finer companion
+    slip : errors of the events of `finger3d.mechanics.history.slips`, in increments
     """
 
     companion_numbers: dict[str, float] = field(default_factory=dict)
     ratio: float = math.nan
+    slip: dict[str, float] = field(default_factory=dict)
 
 
 def main_numbers(problem: Problem, step: StepResult) -> dict[str, float]:
@@ -322,7 +329,7 @@ def discretisation(
     where : what that press differs in, in words
     """
     pressed = companions(own, chosen, report)
-    told = [(one.ratio, numbers(one.problem, one.end)) for one in pressed]
+    told = [(one.ratio, numbers(one.problem, one.steps[-1])) for one in pressed]
     ratio, beside, _ = pressed[0]
     kind = "coarse" if ratio > 1.0 else "finer"
     found = ErrorEstimate(
@@ -332,8 +339,21 @@ def discretisation(
         method=_on_meshes([one.problem for one in pressed], kind),
         companion_numbers=told[0][1],
         ratio=ratio,
+        slip=_errors_of_slip(own, steps, pressed),
     )
     return found, beside, f"on the {kind} mesh"
+
+
+def _errors_of_slip(own: Problem, steps: Sequence[StepResult], pressed: Sequence[CompanionPress]) -> dict[str, float]:
+    """Return the errors, in increments, of slip events that all companions have, half an increment at least."""
+    events = slips(own.points, steps, own.model.readings)
+    others = [(one.ratio, slips(one.problem.points, one.steps, own.model.readings)) for one in pressed]
+    found = {}
+    for name, event in events.items():
+        told = [(ratio, there.increments) for ratio, one in others if (there := one.get(name))]
+        if event and len(told) == len(others):
+            found[name] = _WITHIN_INCREMENT + spread(Kind.FRICTION_SUM, event.increments, told)
+    return found
 
 
 def _marching_cost(problem: Problem) -> float:

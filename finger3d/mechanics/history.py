@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -340,6 +340,10 @@ def contact_table(points: ContactPoints, step: StepResult) -> Tree:
 
 Mask = NDArray[np.bool_]
 
+GROSS_SLIP = "gross_slip"
+
+_PLACE = "x_mm", "y_mm", "z_mm"
+
 ROUND_OFF = 1e-9
 """Motion, mm and rad, that is round-off."""
 
@@ -363,8 +367,32 @@ def regions_of(points: ContactPoints, readings: Sequence[Reading]) -> dict[str, 
     return regions | {FREE_FACES[face]: points.face == face for face in np.unique(points.face)}
 
 
+class SlipEvent(NamedTuple):
+    """Slip that begins in an increment, numbered from 1, after a share of it, at one of the points (m,) or at all."""
+
+    step: int
+    share: float
+    point: int | None = None
+
+    @property
+    def increments(self) -> float:
+        """Increments that are over by then."""
+        return self.step - 1 + self.share
+
+
+def slips(
+    points: ContactPoints, steps: Sequence[StepResult], readings: Sequence[Reading]
+) -> dict[str, SlipEvent | None]:
+    """Return the first slip of every region, and, under `GROSS_SLIP`, that of the whole contact."""
+    regions, good = regions_of(points, readings), [step for step in steps if step.outcome.ok]
+    return {**_first_slips(points, good, regions), GROSS_SLIP: _gross_slip(points, steps)}
+
+
 def slip_events(
-    points: ContactPoints, steps: Sequence[StepResult], margin: Sequence[float], readings: Sequence[Reading]
+    points: ContactPoints,
+    steps: Sequence[StepResult],
+    readings: Sequence[Reading],
+    errors: Mapping[str, float] | None = None,
 ) -> Tree:
     """Return the entries of summary.json on slip.
 
@@ -372,21 +400,26 @@ def slip_events(
     ----------
     points : of the whole finger, m of them
     steps : increments in order; the last may have failed
-    margin : the slip margins after them
     readings : those of the model; the patches of its taxels are regions
+    errors : of the events, in increments, by the names of `slips`
 
     Returns
     -------
     dict
-        ``first_slip``, by region the pose at which one of its points first slips, with the increment and the place of
-        that point (mm, at rest), or None; ``slip_margins``, by region the margin after the last increment, None without
-        contact; ``gross_slip``, the pose at which the whole contact first slips, with the increment, or None.
+        ``first_slip``, by region the pose at which one of its points first slips, with the increment, the place of that
+        point (mm, at rest) and the error of the pose if it is known, or None; ``slip_margins``, by region the margin
+        after the last increment, None without contact; ``gross_slip``, the pose at which the whole contact first slips,
+        with the increment and the error, or None.
     """
-    regions, good = regions_of(points, readings), [step for step in steps if step.outcome.ok]
+    good = [step for step in steps if step.outcome.ok]
+    found = {
+        name: e and _entry(points, steps, e, (errors or {}).get(name))
+        for name, e in slips(points, steps, readings).items()
+    }
     return {
-        "first_slip": _first_slips(points, good, regions),
-        "gross_slip": _gross_slip(points, steps, np.array(margin)),
-        "slip_margins": {name: _margin(points, good, region) for name, region in regions.items()},
+        GROSS_SLIP: found.pop(GROSS_SLIP),
+        "first_slip": found,
+        "slip_margins": {name: _margin(points, good, region) for name, region in regions_of(points, readings).items()},
     }
 
 
@@ -398,34 +431,34 @@ def _margin(points: ContactPoints, steps: Sequence[StepResult], region: Mask) ->
 
 def _first_slips(
     points: ContactPoints, steps: Sequence[StepResult], regions: Mapping[str, Mask]
-) -> dict[str, Tree | None]:
+) -> dict[str, SlipEvent | None]:
     """Return the first slip of every region."""
-    found: dict[str, Tree | None] = dict.fromkeys(regions)
+    found: dict[str, SlipEvent | None] = dict.fromkeys(regions)
     left = [_left(points, step) for step in steps]
     for number, step in enumerate(steps):
-        slips = (step.state.status == SLIP) & (limits(points, step.state, step.friction) > 0.0)
-        shares = np.ones(len(slips))
+        slipping = (step.state.status == SLIP) & (limits(points, step.state, step.friction) > 0.0)
+        shares = np.ones(len(slipping))
         if number > 1:
             same = left[number - 1][1] == left[number - 2][1]
             trend = _share(left[number - 2][0], left[number - 1][0], _ratio(steps, number))
             shares = np.where(same, trend, 1.0)
         for name, region in regions.items():
-            if found[name] is None and (there := np.flatnonzero(slips & region)).size:
+            if found[name] is None and (there := np.flatnonzero(slipping & region)).size:
                 first = there[np.argmin(shares[there])]
-                place = {f"{axis}_mm": float(points.points[first, k]) for k, axis in enumerate("xyz")}
-                found[name] = _event(steps, number, float(shares[first])) | place
+                found[name] = SlipEvent(number + 1, float(shares[first]), int(first))
     return found
 
 
-def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Float) -> Tree | None:
+def _gross_slip(points: ContactPoints, steps: Sequence[StepResult]) -> SlipEvent | None:
     """Return the event in which no point of the contact sticks any more while the object moves along it.
 
     Under a prescribed force that the contact cannot hold it is the last pose at which it held.
     """
+    margin = np.array([slip_margin(points, step.state, step.friction) for step in steps])
     left = margin ** _MARGIN_POWER[points.dim]
     for number, step in enumerate(steps):
         if step.outcome is Outcome.SLIPS:
-            return _event(steps, number, 0.0)
+            return SlipEvent(number + 1, 0.0)
         along = np.delete(Move(_pose_before(steps, number), step.target).change, [0, TIME])
         if (
             margin[number] > 0.0
@@ -435,7 +468,7 @@ def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Floa
             continue
         known = number > 1 and margin[number - 1] > 0.0
         share = _share(left[number - 2], left[number - 1], _ratio(steps, number)) if known else 1.0
-        return _event(steps, number, float(share))
+        return SlipEvent(number + 1, float(share))
     return None
 
 
@@ -468,6 +501,20 @@ def _ratio(steps: Sequence[StepResult], number: int) -> float | None:
     return moves[1].length_ratio(moves[0])
 
 
-def _event(steps: Sequence[StepResult], number: int, share: float) -> Tree:
-    pose = Move(_pose_before(steps, number), steps[number].target).at(share)
-    return {"step": number + 1, **pose_entry(pose)}
+def _entry(points: ContactPoints, steps: Sequence[StepResult], event: SlipEvent, error: float | None) -> Tree:
+    """Return the pose of an event, its increment and place, and the error of every coordinate that changes there."""
+
+    def pose(increments: float) -> Tree:
+        number = min(int(max(increments, 0.0)), len(steps) - 1)
+        move, share = Move(_pose_before(steps, number), steps[number].target), increments - number
+        return pose_entry(move.at(min(max(share, 0.0), 1.0)))
+
+    at, where = (
+        pose(event.increments),
+        {} if event.point is None else dict(zip(_PLACE, points.points[event.point].tolist(), strict=True)),
+    )
+    if error is None:
+        return {"step": event.step, **at, **where}
+    ends = [pose(event.increments - error), pose(event.increments + error)]
+    errors = {name: max(abs(end[name] - value) for end in ends) for name, value in at.items()}
+    return {"step": event.step, **at, **where, "error": {name: e for name, e in errors.items() if e > 0.0}}

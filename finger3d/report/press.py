@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,17 @@ def headline(step: PressStep, bars: ErrorBars) -> list[HeadlineRow]:
     return rows + [row_of(Quantity.of(c), value, bars) for c, value in read if value != 0.0 or c.kind != "marker"]
 
 
+def slip_rows(summary: TreeView) -> Iterator[HeadlineRow]:
+    """Yield the pose of the first slip of the contact and that of gross slip, as far as it is not 0 or fixed there."""
+    events = {"first slip": summary.get("first_slip", {}).get("whole"), "gross slip": summary.get("gross_slip")}
+    for title, event in events.items():
+        errors = event.get("error", {}) if event else {}
+        for one in named("depth_mm", *_SIDEWAYS[2:]) if event else ():
+            if one.name in errors or (event[one.name] and not errors):
+                row = row_of(one, event[one.name], ErrorBars(discretisation=errors))
+                yield replace(row, name=f"{title}, {row.name}")
+
+
 def spelt(text: str) -> str:
     """Return a text with units as they are printed."""
     return text.replace("mm2", "mm²").replace("Nmm", "N mm")
@@ -106,6 +118,7 @@ def _numbers(summary: TreeView, last: TreeView, bars: ErrorBars) -> Iterator[tup
     for one, value in numbers.items():
         row = row_of(one, value, bars)
         yield row.name, row.text + _of_model(summary, one, bars)
+    yield from ((row.name, row.text) for row in slip_rows(summary))
 
 
 def _of_model(summary: TreeView, one: Quantity, bars: ErrorBars) -> str:
@@ -171,7 +184,7 @@ def press_page(folder: str | Path) -> Page:
     ]
     return Page(
         title_of(summary["scene"]),
-        headline(good[-1], bars) if good else (),
+        [*headline(good[-1], bars), *slip_rows(summary)] if good else (),
         sections,
         [Figure(name, text) for name, text in _PICTURES.items()],
         view_of(states, gauges_of(summary["scene"])) if states else None,

@@ -402,23 +402,30 @@ def errors_of_runs(runs: Sequence[tuple[int, Mapping[str, float]]]) -> dict[str,
     return largest
 
 
-def last_step(
+def all_steps(
     problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS, cancel: Event | None = None
-) -> StepResult:
-    """Solve all increments and return the result of the last; for the workspace, cuts and cancel see `march`.
+) -> list[StepResult]:
+    """Solve all increments and return their results; for the workspace, cuts and cancel see `march`.
 
     Raises
     ------
     Finger3dError
         If an increment does not converge.
     """
-    result = None
-    for result in march(problem, workspace=workspace, cancel=cancel, cuts=cuts):
-        if not result.outcome.ok:
-            raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({result.outcome})")
-    if result is None:
+    results = list(march(problem, workspace=workspace, cancel=cancel, cuts=cuts))
+    if not results:
         raise Finger3dError("there are no increments to march")
-    return result
+    if not results[-1].outcome.ok:
+        failed = results[-1].outcome
+        raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({failed})")
+    return results
+
+
+def last_step(
+    problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS, cancel: Event | None = None
+) -> StepResult:
+    """Return the last of `all_steps`."""
+    return all_steps(problem, workspace, cuts, cancel)[-1]
 
 
 def with_increments_of(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
