@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,7 @@ from finger3d.mechanics.march.step_halving import (
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.mechanics.path import targets
 from finger3d.objects import Cylinder, Plane
+from tests.logs import Log
 from tests.models import block, fig9, last, run
 from validation import _increment_errors
 
@@ -128,7 +130,9 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
 
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
     monkeypatch.setitem(RULES, "projection", timid)
-    (cut,) = march(problem)
+    (cut,) = march(problem, report=(log := Log()))
+    depths = [re.findall(r"depth of (\S+) mm: halved", line) for line in log.lines]
+    assert depths == [["0.3"], ["0.1875"], ["0.3"]]  # contact begins in a quarter of the increment
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
     with pytest.raises(Finger3dError, match="did not converge"):
         last_step(problem, cuts=FEW_CUTS)  # as for an estimate: two halvings are needed

@@ -17,6 +17,7 @@ from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.history import B, State
 from finger3d.mechanics.readings import Column
 from finger3d.objects import DistanceTracker, Move, ObjectPose
+from finger3d.progress import QUIET, Progress
 
 W = TypeVar("W", bound="Workspace")
 
@@ -26,7 +27,7 @@ _ROUND_OFF = 20.0 * np.finfo(float).eps
 
 @dataclass
 class Workspace:
-    """Factors and sparsity patterns that one increment leaves for the next; formulations add fields of their own.
+    """What the increments of a press share: factors, sparsity patterns, progress; formulations add fields of their own.
 
     Several presses of one problem may share a workspace in turn, but not at once.
 
@@ -34,10 +35,12 @@ class Workspace:
     ----------
     factorizations : number of factorisations made with this workspace
     tracker : distances of the finger's surface from the object
+    report : receives remarks on parts of an increment
     """
 
     factorizations: int = 0
     tracker: DistanceTracker = field(default_factory=DistanceTracker)
+    report: Progress = QUIET
 
 
 class Loads(NamedTuple):

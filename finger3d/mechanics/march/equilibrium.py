@@ -24,7 +24,6 @@ from finger3d.mechanics.history import State
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.small_strain import SmallStrain, transported
 from finger3d.objects import TIME, ContactPath, Move, ObjectPose, PlacedObject, first_touch
-from finger3d.progress import Progress
 
 FIRST_PARTS = 1.0 / 16.0, 0.25
 """Shares at which an increment that begins without contact is cut: of its depth, quarters and halves of the contact's
@@ -98,6 +97,7 @@ def _solved(
     whole = formulation_of(problem.model).increment(problem, state, move, guess, workspace)
     if whole.outcome.ok or cuts == 0:
         return whole, [Substep(state, whole.state, move, whole.residual)]
+    workspace.report.remark(f"no equilibrium in one step to a depth of {move.end.depth_mm:.4g} mm: halved")
     halves, parts = solved_in_turn(problem, workspace, state, move.cut(0.5), cuts - 1)
     method = SNAPPED if halves.method == SNAPPED else "cut back"
     return replace(halves, iterations=whole.iterations + halves.iterations, method=method), parts
@@ -250,7 +250,6 @@ class ToForces:
     last : part of the increment before, if there is one
     guess : function that returns the contact forces (c, d) N expected at a pose, if any are
     cuts : times that it is halved, at most
-    report : receives a remark on the depth of each part
     """
 
     problem: Problem
@@ -259,7 +258,6 @@ class ToForces:
     last: Substep | None
     guess: Callable[[ObjectPose], Float | None]
     cuts: int
-    report: Progress
 
     def run(self, move: Move, before: GeneralisedForces, after: GeneralisedForces) -> Advanced:
         """Return the end of an increment as the forces change from those before to those after.
@@ -357,13 +355,15 @@ class ToForces:
         if problem.system.second is not None:  # the normal force is that of both
             asked, fingers = "equilibrium", 2
         if not solution.outcome.ok:
-            self.report.remark(f"{asked} wanted, no solution near a depth of {begin.end.depth_mm:.4g} mm")
+            self.workspace.report.remark(f"{asked} wanted, no solution near a depth of {begin.end.depth_mm:.4g} mm")
             return failed
         there = _reached_by(solution)
         reached = self._forces(solution.state, there.end)
         missing = wanted.values - reached[list(wanted.numbers)]
         error, round_off = np.abs(missing / wanted.scale(problem.model.design.height_mm)).max(), self._round_off
-        self.report.remark(f"{asked} wanted, {reached[0] / fingers:.5g} N at a depth of {there.end.depth_mm:.4g} mm")
+        self.workspace.report.remark(
+            f"{asked} wanted, {reached[0] / fingers:.5g} N at a depth of {there.end.depth_mm:.4g} mm"
+        )
         if error > round_off:
             return replace(failed, solution=replace(failed.solution, outcome=Outcome.NO_CONVERGENCE))
         if there.end.depth_mm > self._deepest:

@@ -97,7 +97,7 @@ class Press:
         self.problem = problem = self._grip.problem if self._grip else problem
         self.workspace = workspace or self.formulation.workspace()
         self.state, self.pose = self.formulation.start(problem), problem.origin
-        self.has_failed, self._cancel, self._report = False, cancel, report
+        self.has_failed, self._cancel, self.workspace.report = False, cancel, report
         self._cuts = 0 if model.rule in STEP_DEPENDENT_RULES else cuts
         self._previous: tuple[Move, Float] | None = None
         self._last_part: Substep | None = None
@@ -249,8 +249,7 @@ class Press:
         asked = float(load.forces[0]), float(np.linalg.norm(np.nan_to_num(load.forces[1:3])))
         before, after = (GeneralisedForces(numbers, values[free], size, asked) for values in (forces, wanted))
         known = self.problem, self.workspace, self.state, self._last_part
-        way = ToForces(*known, self.expected_force, self._cuts, self._report)
-        return way.run(move, before, after)
+        return ToForces(*known, self.expected_force, self._cuts).run(move, before, after)
 
     def _least_force(self, move: Move) -> float:
         """Return the force (N) on a single point that is displaced as far as the depth changes in an increment."""
