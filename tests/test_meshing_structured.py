@@ -357,6 +357,14 @@ def test_where_faces_join_smoothly_a_node_goes_onto_the_nearest(rounded: tuple[T
     assert np.hypot(moved[0] - 4.5, moved[1] - 3.5) == pytest.approx(1.5, abs=1e-12)
 
 
+def test_a_node_beside_short_edges_stays_on_the_face_and_the_base(
+    rounded: tuple[Tessellation, dict[str, int]],
+) -> None:
+    moved, on = placed_on(rounded, [6.03, 0.001, 1.0], "wall base", reach=0.01)
+    assert on == {"wall", "base"}
+    np.testing.assert_allclose(moved, [6.0, 0.0, 1.0], atol=1e-12)
+
+
 def test_points_without_a_place_are_reported() -> None:
     axis = np.array([0.0, 1.0, 0.0])
     faces = faces_of(ImplicitPlane(np.zeros(3), axis), ImplicitPlane(axis, axis))

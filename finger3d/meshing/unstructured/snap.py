@@ -301,7 +301,8 @@ def snap_nodes(
     """Return points (n, 3) moved onto the CAD faces of their sets (n, f), and the faces that each lies on.
 
     A point that cannot be moved to where its faces meet, or only by more than its reach (n,), mm, is moved onto the
-    nearest of them.  It does not leave the base and the symmetry planes.
+    nearest of them.  It does not leave the base and the symmetry planes, and leaves the nearest face for one of these
+    only if there is no place on both within twice its distance from them.
 
     Raises
     ------
@@ -316,6 +317,9 @@ def snap_nodes(
             rows = rows.copy()
             rows[again] = reduced(points[again], rows[again])
             projected[again], failed[again] = project(points[again], rows[again], seams.faces)
+            reach = reach.copy()
+            node, face = np.nonzero(rows & again[:, None])
+            np.maximum.at(reach, node, 2.0 * seams.distance(points, node, face))
     if failed.any():
         raise UnusableMeshError("a surface node finds no place on its CAD faces")
     return projected, rows
