@@ -183,7 +183,7 @@ def test_a_misspelt_required_key_is_one_mistake(scene, capsys) -> None:
         ("friction.mu=-1", ["--set friction.mu: friction.mu = -1", "from 0 to 1e6"]),
         ("frction.mu=1", ["frction", '"friction"']),
         ("friction.mu", ["--set", "KEY=VALUE"]),
-        ("gauge.1.x_mm=3", ["--set gauge.1.x_mm", "0 to 0"]),
+        ("gauge.1.x_mm=3", ["--set gauge.1.x_mm", "0 to 0", "gauge.0"]),
         ("press.leg.0.depth_mm=3", ["press.depth_mm = 10.0", "beside [[press.leg]]"]),
         ("title.first=3", ["--set title.first", 'title = "test"']),
     ],

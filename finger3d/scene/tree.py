@@ -156,8 +156,9 @@ def _set(node: Any, parts: list[str], value: Any, key: str) -> None:
         last = depth == len(parts) - 1
         if isinstance(node, list):
             if not _is_index(part, node):
-                allowed = f"0 to {len(node) - 1}" if node else "none, the list is empty"
-                raise Finger3dError(f"{key}: no item {shown(part)} in {'.'.join(parts[:depth])} ({allowed})")
+                name = ".".join(parts[:depth])
+                allowed = f"0 to {len(node) - 1}, as {name}.0" if node else "none, the list is empty"
+                raise Finger3dError(f"{key}: no item {shown(part)} in {name} ({allowed})")
             index: Any = int(part)
         elif isinstance(node, dict):
             index = part
