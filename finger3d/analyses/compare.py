@@ -334,7 +334,7 @@ def _sufficient(planes: Sequence[Case], solid: Case) -> str:
         "contact_length_mm": "extent of contact",
         "stick_length_mm": "extent of the stick zone",
         "friction_sum_N_per_mm": "friction sum",
-        "peak_pressure_MPa": "peak pressure",
+        "peak_pressure_MPa": "peak pressure at z = 0",
     }
     names |= {column.key: f"gauge {column.sensor}" for column in solid.strains}
     parts = []

@@ -29,7 +29,8 @@ def compare(
     scene
         The scene file (TOML).
     widths
-        Further widths in mm, separated by commas; default 1, 4, 12 and 24 finger heights.
+        Widths in mm beside that of the scene, separated by commas; default 1, 4, 12 and 24 finger heights. The width of
+        the scene alone, given here, takes the least time.
     """
     try:
         chosen = None if widths is None else [float(part) for part in widths.split(",")]

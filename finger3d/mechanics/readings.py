@@ -488,7 +488,7 @@ OF_WIDTH = (
     Quantity("friction_along_z_N_per_mm", Kind.FORCE, "sum of |friction along z|", "N/mm"),
     Quantity("outward_friction_x_N_per_mm", Kind.FORCE, "outward friction along x", "N/mm"),
     Quantity("moment_y_Nmm_per_mm", Kind.FORCE, "moment about y", "N"),
-    Quantity("peak_pressure_MPa", Kind.PRESSURE, "peak pressure", "MPa"),
+    Quantity("peak_pressure_MPa", Kind.PRESSURE, "peak pressure", "MPa", "at z = 0"),
 )
 """Numbers of a comparison of models, for each mm of width."""
 
