@@ -449,8 +449,8 @@ def moving_part(path: Float, measured: MeasuredPress) -> slice:
         other = "step" if measured.index == "time_s" else "time_s or step"
         verb = "rise" if measured.direction > 0.0 else "fall"
         raise Finger3dError(
-            f"{measured.path}: {measured.index} does not {verb} throughout the path of the scene; give {other} instead, "
-            "or a scene of the measured leg only"
+            f"{measured.path}: {measured.index} does not {verb} throughout the path of the scene; give {other} "
+            "instead, or a scene of the measured leg only"
         )
     return slice(first, None)
 
