@@ -21,8 +21,8 @@ _FLOOR = 1e-5
 
 def draw(figure: Any, lines: Sequence[Line]) -> None:
     """Draw six panels from the lines of the study's table."""
-    figure.set_size_inches(15.0, 8.8)
-    panels = figure.subplots(2, 3).ravel()
+    figure.set_size_inches(10.5, 11.5)
+    panels = figure.subplots(3, 2).ravel()
     runs = [line for line in lines if line["kind"] == "run"]
     for axes, panel in zip(panels, (_elements, _numbers, _grading, _memory, _condensation, _large), strict=True):
         panel(axes, runs)
@@ -63,7 +63,7 @@ def _numbers(axes: Any, runs: Sequence[Line]) -> None:
     for (quantity, name), mark in zip(NAMES.items(), ("o-", "s-", "^-", "D-", "v-"), strict=True):
         _plot(axes, _series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
     axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="processor time, mesh to last increment (s)")
-    axes.set(ylabel="error, %")
+    axes.set(ylabel="error, %", ylim=(None, 200.0))
 
 
 def _grading(axes: Any, _: Sequence[Line]) -> None:

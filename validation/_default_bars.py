@@ -19,7 +19,7 @@ from finger3d.analyses.press import press
 from finger3d.mechanics.history import table_row
 from finger3d.mechanics.readings import kinds_of
 
-from ._rows import Result, Row, at_most, columns
+from ._rows import Result, Row, at_most, columns, words
 
 SCENES = Path(__file__).parents[1] / "geometries"
 COUNTS = {"plane-strain": 12, "plane-stress": 6, "solid": 12}
@@ -114,12 +114,15 @@ def _rows(found: list[Number], named: set[str]) -> Iterator[Row]:
 
 def _draw(figure: Any, found: list[Number]) -> None:
     axes = figure.subplots()
-    names = sorted({n.name for n in found if not n.name.startswith(READINGS)}) + ["readings"]
+    some = [n for n in found if 0.0 < n.relative < np.inf]
+    kinds = ["readings" if n.name.startswith(READINGS) else words(n.name) for n in some]
+    names = sorted(set(kinds))
     figure.set_size_inches(8.0, 0.3 * len(names) + 1.6)
-    for colour, is_solid in (("C0", False), ("C1", True)):
-        some = [n for n in found if (n.domain == "solid") == is_solid and 0.0 < n.relative < np.inf]
-        at = [names.index(n.name if n.name in names else "readings") + (0.15 if is_solid else -0.15) for n in some]
-        label = "solids" if is_solid else "sections"
-        axes.plot([100.0 * n.relative for n in some], at, "|", color=colour, ms=8, label=label)
-    axes.axvline(100.0 * QUARTER, color="k", lw=0.8, ls=":", label="a quarter")
-    axes.set(xscale="log", xlabel="error bar (%)", yticks=range(len(names)), yticklabels=names, xlim=(1e-3, 3e2))
+    for colour, domains, label in (("C0", ("plane-strain", "plane-stress"), "sections"), ("C1", ("solid",), "solids")):
+        own = [(100.0 * n.relative, names.index(k)) for n, k in zip(some, kinds, strict=True) if n.domain in domains]
+        x, y = np.array(own).reshape(-1, 2).T
+        axes.plot(x, y + (0.15 if label == "solids" else -0.15), "|", color=colour, ms=8, label=label)
+    axes.axvline(100.0 * QUARTER, color="k", lw=0.8, ls=":", label="a quarter of the number")
+    axes.set(xscale="log", xlabel="error bar, % of the number", yticks=range(len(names)), yticklabels=names)
+    axes.set(xlim=(1e-3, 3e2), ylim=(len(names) - 0.5, -0.5))
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)

@@ -296,10 +296,10 @@ def _rows(found: list[Compared], failed: int, quick: bool) -> Iterable[Row]:
 
 def _draw(figure: Any, verdicts: list[Verdict]) -> None:
     """Draw the judged over the true change of every effect; decisions that are wrong are crosses."""
-    figure.set_size_inches(15.0, 4.2)
-    panels = figure.subplots(1, len(LABELS), sharey=True)
+    figure.set_size_inches(10.0, 7.2)
+    panels = figure.subplots(2, 3, sharey=True).ravel()
     low, high = 1e-3, 100.0
-    for axes, (effect, label) in zip(panels, LABELS.items(), strict=True):
+    for axes, (effect, label) in zip(panels, LABELS.items(), strict=False):
         here = [v for v in verdicts if v.effect == effect]
         for used, right, colour, marker, text in (
             (True, True, "#2c5d8f", "o", "used"),
@@ -314,6 +314,8 @@ def _draw(figure: Any, verdicts: list[Verdict]) -> None:
         axes.loglog([low, high], [low, high], color="#222222", lw=0.8)
         for line in (axes.axhline, axes.axvline):
             line(tolerance, color="#222222", lw=0.8, ls=":")
-        axes.set(title=label, xlabel="true change (%)", xlim=(0.7 * low, 1.4 * high), ylim=(0.7 * low, 1.4 * high))
-    panels[0].set_ylabel("judged change (%)")
-    panels[0].legend(loc="upper left")
+        axes.set(title=label, xlim=(0.7 * low, 1.4 * high), ylim=(0.7 * low, 1.4 * high))
+    figure.supxlabel("true change (%); on the edges: 0.001 % or less", fontsize=10)
+    figure.supylabel("judged change (%)", fontsize=10)
+    panels[-1].set_axis_off()
+    panels[-1].legend(*panels[0].get_legend_handles_labels(), loc="center", frameon=False)

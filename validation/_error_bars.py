@@ -38,7 +38,7 @@ from finger3d.mechanics.readings import AREAS, MAIN
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids
 from ._press import changed, in_edges
-from ._rows import Result, Row, at_least, at_most, columns
+from ._rows import Result, Row, at_least, at_most, columns, words
 
 DEPTHS = (1.0, 0.6)
 ENERGIES, READINGS = ("external_work_mJ", "dissipation_mJ"), ("gauge", "marker", "taxel")
@@ -305,29 +305,22 @@ def _met(kind: str, steps: list[Judged]) -> Row:
 
 
 def _draw(figure: Any, found: list[Judged], steps: list[Judged]) -> None:
-    parts = [(kind, found, "mesh") for kind in KINDS] + [("friction_sum_N", steps, "steps")]
-    rows = math.ceil(len(parts) / 4)
-    figure.set_size_inches(18.0, 4.2 * rows)
-    panels = figure.subplots(rows, 4).ravel()
-    figure.suptitle("Error bar against true error: below the upper line the true error is within 2 times the bar")
-    for axes in panels[len(parts) :]:
-        axes.remove()
-    for axes, (kind, judged, part) in zip(panels, parts, strict=False):
-        here = [j for j in judged if j.kind == kind]
-        for group, colour in (("section", "#2c5d8f"), ("solid", "#c0392b")):
-            some = [j for j in here if ("solid" in j.scene or "sphere" in j.scene) == (group == "solid")]
-            if not some:
-                continue
-            scale = np.array([_scale(j, here) for j in some])
-            bar = np.array([j.estimate for j in some]) / scale
-            true = np.array([j.error for j in some]) / scale
-            axes.loglog(np.maximum(bar, 1e-6), np.maximum(true, 1e-6), "o", ms=3, alpha=0.5, color=colour, label=group)
-        line = np.array([1e-6, 10.0])
-        axes.loglog(line, line, color="#222222", lw=1.0, label="true error = bar")
-        axes.loglog(line, 2.0 * line, color="#222222", lw=1.0, ls="--", label="2 bars")
-        axes.set(title=f"{kind.replace('_', ' ')}, {part}", xlim=(1e-5, 2.0), ylim=(1e-6, 2.0))
-        axes.set(xlabel="bar, relative", ylabel="true error, relative")
-    panels[0].legend(loc="upper left")
+    full = {"tangential": "tangential force", "outward": "outward friction"}
+    parts = [(full.get(kind, words(kind)), [j for j in found if j.kind == kind], 0.0) for kind in KINDS]
+    parts.append(("friction sum, by increments", [j for j in steps if j.kind == "friction_sum_N"], ROUND))
+    figure.set_size_inches(9.0, 0.4 * len(parts) + 1.2)
+    axes = figure.subplots()
+    for group, colour, up in (("sections", "C0", -0.15), ("solids", "C1", 0.15)):
+        for k, (_, judged, slack) in enumerate(parts):
+            some = [j for j in judged if ("solid" in j.scene or "sphere" in j.scene) == (group == "solids")]
+            share = [max(j.error - slack * abs(j.value), 0.0) / max(j.estimate, 1e-99) for j in some] or [np.nan]
+            low, middle, high = np.clip(np.quantile(share, (0.1, 0.5, 0.9), method="higher"), 1e-4, 1e2)
+            axes.errorbar(middle, k + up, xerr=[[middle - low], [high - middle]], fmt="o", ms=4, capsize=3,
+                          color=colour, label=None if k else f"{group}: median, 10 to 90 % of cases")  # fmt: skip
+    axes.axvline(2.0, color="#222222", lw=1.0, ls="--", label="goal: 90 % below 2")
+    axes.set(xscale="log", xlabel="true error / error bar", xlim=(0.01, 5.0), ylim=(len(parts), -0.7))
+    axes.set_yticks(range(len(parts)), [name for name, *_ in parts])
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
 
 
 def _scale(judged: Judged, group: list[Judged]) -> float:

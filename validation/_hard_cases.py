@@ -212,14 +212,15 @@ def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
         for axes, key in ((left, "iterations_median"), (middle, "iterations_max")):
             for quantile, style, name in ((0.5, "-", "median"), (1.0, "--", "largest")):
                 values = [np.quantile(part[key], quantile) for part in legs.values()]
-                axes.semilogy(names, values, mark + style, label=f"{dim}D, {name} of the legs")
+                axes.plot(names, values, mark + style, label=f"{dim}D, {name} of the legs")
     left.axhline(10, color="k", lw=0.8, ls=":")
-    below = 0.03  # room for the legend
-    left.set(xlabel="mu", ylabel="median iterations per part", ylim=(below, None))
-    middle.set(xlabel="mu", ylabel="largest iterations per part", ylim=(below, None))
+    for axes, what in ((left, "median"), (middle, "largest")):
+        axes.set_yscale("symlog", linthresh=1.0)
+        axes.set(xlabel="mu", ylabel=f"{what} iterations per part", ylim=(-0.1, 500.0))
     for key, label in (("settled", "finger3d"), ("paper_settled", "the paper's rule")):
         share = {mu: 100 * t[key].sum() / t["increments"].sum() for mu, t in grouped(columns, "mu")}
         right.plot([f"{mu:g}" for mu in sorted(share)], [share[mu] for mu in sorted(share)], "o-", label=label)
     right.set(xlabel="mu", ylabel="settled increments, %", ylim=(0, 105))
     for axes in (left, middle, right):
         axes.tick_params(axis="x", rotation=45)
+        axes.legend(loc="upper left" if axes is not right else "lower right")

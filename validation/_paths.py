@@ -30,7 +30,7 @@ from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, fig9, half_cylinder
 from ._press import changed, under
-from ._rows import Result, Row, at_least, columns, zero
+from ._rows import Result, Row, at_least, columns, words, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
 GRID_NU, GRID_MU = (0.0, 0.3, 0.49, 0.5), (0.0, 0.06, 0.25, 1.0, 3.0, 10.0, 1e3, 1e6)
@@ -156,22 +156,21 @@ def _grid_rows(grid: Sequence[tuple[Any, ...]]) -> list[Row]:
 
 
 def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tuple[Any, ...]]) -> None:
-    from matplotlib import colormaps
-
     left, right = figure.subplots(1, 2)
-    cases = list(dict.fromkeys(key[:2] for key in errors))
-    for k, (name, mu) in enumerate(cases):
+    names = list(dict.fromkeys(key[0] for key in errors))
+    for name, mu in dict.fromkeys(key[:2] for key in errors):
         for kind, style in ((PLAIN, ":"), (OWN, "-")):
             counts = [n for *of, n in errors if of == [name, mu, kind]]
             worst = [max(errors[name, mu, kind, n].values()) for n in counts]
-            label = f"{name}, mu = {mu:g}" if kind == OWN else None
-            left.loglog(counts, worst, f"o{style}", ms=3, lw=1, color=colormaps["tab20"](k), label=label)
-    left.set(xlabel="increments", ylabel="largest relative error", title="finger3d's (lines), plain (dotted)")
-    left.legend(fontsize=6)
+            label = name if (kind, mu) == (OWN, MUS[1]) else None
+            left.loglog(counts, worst, f"o{style}", ms=3, lw=1, color=f"C{names.index(name)}", label=label)
+    left.set(xlabel="increments", ylabel="largest relative error, each mu", title="finger3d's (lines), plain (dotted)")
+    left.legend()
     for k, number in enumerate(dict.fromkeys(line[2] for line in automatic)):
         told, true = np.array([(line[5], line[4]) for line in automatic if line[2] == number]).T
-        right.loglog(np.maximum(told, 1e-9), np.maximum(true, 1e-9), "o", ms=4, color=f"C{k}", label=number)
+        right.loglog(np.maximum(told, 1e-9), np.maximum(true, 1e-9), "o", ms=4, color=f"C{k}", label=words(number))
     ends = np.array([1e-9, 10.0])
     right.loglog(ends, WITHIN * ends, "k:", lw=1, label="two estimates")
-    right.set(xlabel="estimated error", ylabel="true error", title="automatic increments")
-    right.legend(fontsize=6)
+    right.set(xlabel="estimated error (N, mJ, strain)", ylabel="true error (N, mJ, strain)")
+    right.set_title("automatic increments; 1e-9: less than that")
+    right.legend()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -208,6 +209,11 @@ def number(value: float) -> str:
     if not math.isfinite(value) or value == 0.0 or 1e-3 <= abs(value) < 1e5:
         return f"{value:.5g}"
     return f"{value:.3e}"
+
+
+def words(key: str) -> str:
+    """Return the name of a number in words, without its unit."""
+    return re.sub("_(N|Nmm|mm|mm2|mJ)$", "", key).replace("_", " ")
 
 
 def _shown(row: Row) -> list[str]:

@@ -205,7 +205,7 @@ def _draw_faces(figure: Any, table: dict[str, list[Any]]) -> None:
     for k, ((name, domain), t) in enumerate(grouped(table, "name", "domain")):
         error = 100.0 * (t["finger3d_N"] / t["calculix_N"] - 1.0)
         for axes, key in ((left, "nu"), (right, "mu")):
-            axes.plot(t[key], error, f"C{k}o", mfc="none", label=f"{name}, {domain}")
+            axes.plot(t[key], error, f"C{k}o", mfc="none", label=f"{name}, {domain.replace('-', ' ')}")
     for axes, key in ((left, "nu"), (right, "mu")):
         axes.axhspan(-1.0, 1.0, color="0.92", label="1 %")
         axes.axhline(0.0, color="k", lw=0.6)

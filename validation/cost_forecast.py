@@ -161,14 +161,14 @@ def _draw(figure: Any, lines: list[tuple[Any, ...]]) -> None:
     seconds = [line for line in lines if line[2] == "seconds"]
     errors = [line for line in lines if line[2] not in ("unknowns", "seconds") and line[5] > 1e-6 and line[3] > 0.0]
     for axes, title, chosen, column, factors in (
-        (panels[0], "seconds", seconds, 4, (1.0 / FACTOR, FACTOR)),
-        (panels[1], "relative errors", errors, 5, (1.0 / BARS,)),
+        (panels[0], "time (s)", seconds, 4, (1.0 / FACTOR, FACTOR)),
+        (panels[1], "error of a number, relative", errors, 5, (1.0 / BARS,)),
     ):
         real, forecast = (np.array([line[k] for line in chosen]) for k in (column, 3))
         low, high = 0.7 * min(real.min(), forecast.min()), 1.4 * max(real.max(), forecast.max())
         axes.loglog(real, forecast, "o", ms=3, alpha=0.6)
         axes.loglog([low, high], [low, high], "k-", lw=0.8, label="equal")
         for k, factor in enumerate(factors):
-            label = None if k else "factor 2" if title == "seconds" else "true error of 2 forecasts"
+            label = None if k else "factor 2" if len(factors) > 1 else "true error of 2 forecasts"
             axes.loglog([low, high], [factor * low, factor * high], "k:", lw=0.8, label=label)
-        axes.set(xlabel="real" if title == "seconds" else "true error", ylabel="forecast", title=title)
+        axes.set(xlabel=f"true {title}", ylabel=f"forecast {title}")

@@ -29,7 +29,7 @@ from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
 from ._press import changed
-from ._rows import Result, Row, at_least, columns, zero
+from ._rows import Result, Row, at_least, columns, words, zero
 
 SEED = 68
 SECTIONS, LARGE_SECTIONS, SOLIDS = 12, 2, 2
@@ -141,7 +141,8 @@ def _draw(figure: Any, found: list[Judged]) -> None:
         some = [one for one in found if one.is_zone == zones and one.counts]
         for number in dict.fromkeys(one.number for one in some):
             here = [one for one in some if one.number == number]
-            axes.plot([abs(o.true) for o in here], [abs(o.effect) for o in here], "o", ms=3, alpha=0.5, label=number)
-        axes.plot([LEAST, 1.0], [LEAST, 1.0], "k-", lw=0.8)
-        axes.set(xscale="log", yscale="log", xlabel="on half the edges, over the natural scale", ylabel="effect",
-                 title=title)  # fmt: skip
+            true, told = np.abs([(one.true, one.effect) for one in here]).T
+            axes.plot(true, told, "o", ms=3, alpha=0.5, label=words(number))
+        axes.plot([LEAST, 1.0], [LEAST, 1.0], "k-", lw=0.8, label="equal")
+        axes.set(xscale="log", yscale="log", xlabel="|effect| on half the edges, of the natural scale",
+                 ylabel="|effect|, of the natural scale", title=title)  # fmt: skip

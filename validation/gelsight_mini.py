@@ -161,7 +161,7 @@ def _checks(best: Model, finer: Model, size: float) -> list[Row]:
 
 
 def _draw(figure: Any, models: list[Model], best: Model) -> None:
-    figure.set_size_inches(14.0, 4.6)
+    figure.set_size_inches(12.5, 4.6)
     left, middle, right = figure.subplots(1, 3)
     fitting = [m for m in models if m.misfit <= FITS]
     for m in fitting:

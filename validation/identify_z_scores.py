@@ -162,7 +162,7 @@ def _draw(figure: Any, found: list[Fitted]) -> None:
         for k, key in enumerate(FREE):
             for domain, mark in (("plane-strain", "o"), ("solid", "s"), ("drawn", "^")):
                 some = [f for f in found if (f.key, f.domain) == (key, domain)]
-                label = f"{key}, {domain.replace('-', ' ')}"
+                label = f"{key.partition('.')[2].removesuffix('_MPa')}, {domain.replace('-', ' ')}"
                 axes.plot([f.noise for f in some], [abs(getattr(f, which)) for f in some], mark, color=f"C{k}", ms=4,
                           mfc=f"C{k}" if mark == "o" else "none", label=label)  # fmt: skip
         axes.axhline(1.0, color="k", lw=0.8)

@@ -29,6 +29,7 @@ from ._rows import Kind, Result, Row, at_least, exact_columns
 NU, STATIC = 0.3, 0.25
 SOURCE = "Spence 1968 with mu_k; REFERENCES.md, 2.5"
 COLUMNS = "branch ratio points_per_a increments q_over_P D_over_AP2 c_over_a iterations"
+STICK, OUTWARD = "half width of stick / of contact", "friction on one half / normal force"
 Key = tuple[str, float, int, int]
 
 
@@ -89,13 +90,12 @@ def _rows(found: dict[Key, np.ndarray], meshes: Any, counts: Any, ratios: Any) -
 
 def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -> None:
     axes = figure.subplots(1, 2)
-    for (k, label, exact), ax in zip(((2, "c/a", 0.263), (0, "int_0^a q/P", 0.0773)), axes, strict=True):
-        for branch, colour in (("keep", "C0"), ("paper", "C1")):
+    for (k, label, exact), ax in zip(((2, STICK, 0.263), (0, OUTWARD, 0.0773)), axes, strict=True):
+        for branch, rule, colour in (("keep", "keeps slipping", "C0"), ("paper", "the paper's rule", "C1")):
             for points, mark in zip(meshes, "o^s", strict=False):
                 values = [found[branch, 0.7, points, n][k] for n in counts]
-                ax.semilogx(counts, values, colour + mark + "-", mfc="w", label=f"{branch}, {points} points to a")
-        ax.axhline(exact, color="k", ls="--", lw=1, label="exact, mu_k alone")
+                ax.semilogx(counts, values, colour + mark + "-", mfc="w", label=f"{rule}, {points} points")
+        ax.axhline(exact, color="k", ls="--", lw=1, label="exact, kinetic friction alone")
         ticks_at(ax, counts)
         ax.set(xlabel="increments", ylabel=label)
-    best = found["keep", 0.7, meshes[-1], counts[-1]]
-    figure.suptitle(f"mu_k/mu_s = .7; keep: error of int q/P {100 * abs(best[0] / 0.0773 - 1):.1f} %")
+    figure.suptitle("kinetic friction 0.7 times the static one; 10 to 40 points to the half width of contact")

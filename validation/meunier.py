@@ -162,7 +162,7 @@ def _compression_as_equibiaxial(tests: dict[str, MaterialTest]) -> float:
 
 def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
     """Draw the tests by column, and what the laws are fitted to by row; only predictions have bands."""
-    figure.set_size_inches(15.0, 8.0)
+    figure.set_size_inches(12.5, 7.5)
     rows = list(FITS)[:2]
     for line, own in zip(figure.subplots(2, 4), rows, strict=True):
         for axes, (mode, test) in zip(line, tests.items(), strict=True):
@@ -170,7 +170,7 @@ def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
             at = np.linspace(1.0, end, 100)
             for i, fit in enumerate(f for f in fits if f.tests == own):
                 curve, band = fit.stress(mode, at), fit.band(mode, at)
-                axes.plot(at, curve, color=f"C{i}", lw=1.4, label=fit.law)
+                axes.plot(at, curve, color=f"C{i}", lw=1.4, label=fit.law.title())
                 if mode not in FITS[own]:
                     axes.fill_between(at, curve - band, curve + band, color=f"C{i}", alpha=0.15, lw=0)
             axes.plot(test.stretch, test.stress, "ko", ms=3.5, label="measured")

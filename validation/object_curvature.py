@@ -131,10 +131,8 @@ def _draw(figure: Any, mus: np.ndarray, curve: np.ndarray, found: dict[float, An
     left, right = figure.subplots(1, 2)
     left.plot(mus, 1e3 * curve, "ko-", ms=4, label="plane: the calibration")
     kept = sorted(r for r in found if r < 1e4)
-    for radius, shade in zip(kept, np.linspace(0.0, 0.85, len(kept)), strict=True):
-        left.plot(
-            [TRUE], [1e3 * found[radius][1]], "s", color=(shade, 0.3, 1.0 - shade), label=f"bar, R = {radius:g} mm"
-        )
+    strains = [1e3 * found[r][1] for r in kept]
+    left.plot([TRUE, TRUE], [min(strains), max(strains)], "C0_-", ms=12, label="bars of 30 to 400 mm")
     left.set(xlabel="mu", ylabel="strain of g36, 1e-3", title="200 N over 20 mm, plane strain")
     right.plot([100.0 / r for r in kept], [read[r] for r in kept], "s-", label="with the plane's calibration")
     right.plot([0.0], [TRUE], "ko", label="plane")

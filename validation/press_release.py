@@ -117,14 +117,14 @@ def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], show
     top = len(half) // 2
     pressing = np.interp(depth, depth[: top + 1], force[: top + 1])
     left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {columns['nu'][-2]:g}, mu = {MU:g}")
-    left.set(xlabel="depth / largest", ylabel="1000 (P - P while pressing)/P_max", title="the loop, opened")
+    left.set(xlabel="depth / largest", ylabel="force - that of the press, 0.1 %", title="the loop, opened")
     for nu, t in grouped(columns, "nu", body="cylinder", points_per_a=20):
         middle.loglog(t["increments"], 100.0 * np.abs(t["work_over_lost"] - 1.0), "o-", label=f"cylinder, nu = {nu:g}")
     counts = sorted(set(t["increments"]))
-    middle.set(xlabel="increments each way", ylabel="|work/work lost - 1|, %", title="energy balance")
-    ticks_at(middle, counts)
+    middle.set(xlabel="increments each way", ylabel="|work - work lost|, % of it", title="energy balance")
+    ticks_at(middle, counts[-3:])
     less = f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"
     for profile, name in ((shown[0], "loaded"), (shown[-1], less)):
         inside = (profile.x >= 0.0) & (profile.status != OPEN)
         right.plot(profile.x[inside] / shown[0].a, profile.q[inside] / (MU * profile.p[inside]), ".-", label=name)
-    right.set(xlabel="x/a", ylabel="q/(mu p)", title="friction reverses at the edge first")
+    right.set(xlabel="x / half width", ylabel="friction / (mu pressure)", title="friction reverses first")

@@ -166,7 +166,7 @@ def _draw(figure: Any, found: list[Judged]) -> None:
     for case, colour in colours.items():
         some = [one for one in found if (one.domain, one.readings) == case and math.isfinite(one.z)]
         if some:
-            label = f"{case[0]}, {case[1]} reading{'s' if case[1] != '1' else ''}"
+            label = f"{case[0].replace('-', ' ')}, {case[1]} reading{'s' if case[1] != '1' else ''}"
             left.plot([one.mu for one in some], [one.z for one in some], ".", ms=5, color=colour, label=label)
             z = np.sort([one.z for one in some])
             right.plot(z, (np.arange(len(z)) + 0.5) / len(z), color=colour, lw=1.5, label=label)

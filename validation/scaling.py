@@ -134,7 +134,7 @@ def _draw(figure: Any, runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size
     """Stacked seconds, and memory by stage, over both series."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    figure.set_size_inches(15.0, 9.5)
+    figure.set_size_inches(12.0, 9.0)
     panels = figure.subplots(2, 2)
     for column, (sizes, key, label) in enumerate(((unknowns, "dofs", "unknowns"), (rows, "rows", "contact rows"))):
         top, low = panels[0][column], panels[1][column]

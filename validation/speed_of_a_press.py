@@ -140,7 +140,7 @@ def _checks(name: str, body: Problem, found: Found) -> Iterator[Row]:
 
 def _draw(figure: Any, found: Found) -> None:
     models = list(dict.fromkeys(key[0] for key in found))
-    figure.set_size_inches(5.2 * len(models) + 4.6, 4.6)
+    figure.set_size_inches(4.2 * len(models) + 4.0, 4.4)
     panels = figure.subplots(1, len(models) + 1)
     for axes, model in zip(panels, models, strict=False):
         for (name, control, bulk, rate), reads in found.items():

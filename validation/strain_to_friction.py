@@ -150,7 +150,7 @@ def _widths(found: Found) -> list[Row]:
 
 
 def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
-    figure.set_size_inches(15.5, 9.0)
+    figure.set_size_inches(12.0, 8.0)
     panels = figure.subplots(2, 3, height_ratios=[1.0, 0.8])
     colours = {"plane-strain": "#2166ac", "solid": "#b2182b"}
     for axes, kind in zip(panels[0], (FREE, READ), strict=False):
@@ -170,13 +170,13 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         right.semilogy(c.grid, shown, style, color=colours[domain], lw=1.5, label=f"{NAMES[domain]}, {kind}")
     right.plot(0.5, 0.1, "k*", ms=11, label="the paper, measured")
     right.set(xlabel="mu", ylabel="standard deviation of mu", title="from a strain noise of 1.5e-4", ylim=(5e-4, 50.0))
-    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), frameon=False)
     for axes, domain in zip(panels[1], NAMES, strict=False):
         slope_panel(figure, axes, maps[domain], TURN, 0.5)
-        axes.set_title(f"d strain / d mu, 30°, mu = .5, {NAMES[domain]}")
+        axes.set_title(f"slope at mu = .5, 30°, {NAMES[domain]}")
     best, _ = maps["solid"].best(0.0, 0.6)
     resolution_panel(figure, panels[1, 2], maps["solid"], NOISE / np.maximum(best, 1e-12), LIMIT)
-    panels[1, 2].set_title("worst resolution to mu = .6, best direction, 20 mm wide")
+    panels[1, 2].set_title("worst to mu = .6, best angle, 20 mm wide")
     for axes in panels[1]:
         axes.plot(36.0, 40.0, "ko", mfc="none", ms=8)
         axes.set(xlabel="x (mm)", ylabel="y (mm)")

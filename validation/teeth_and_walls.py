@@ -108,11 +108,11 @@ def _draw_gear(figure: Any, table: dict[str, Any]) -> None:
     left.plot(table["angle_deg"], [-f for f in table["force_y_N"]], "o-", label="vertical, down")
     left.plot(table["angle_deg"], table["force_x_N"], "s-", label="sideways")
     left.axhline(0.0, color="0.6", lw=0.8)
-    left.set(xlabel="turn of the wheel (deg)", ylabel="force on the finger (N)")
+    left.set(xlabel="turn of the wheel (deg)", ylabel="force on the finger (N)", title="gear")
     right.plot(table["angle_deg"], table["torque_Nmm"], "o-", label="reported")
     right.plot(table["angle_deg"], table["of_points_Nmm"], "x", label="from the points")
     right.axhline(0.0, color="0.6", lw=0.8)
-    right.set(xlabel="turn of the wheel (deg)", ylabel="torque on the finger about the axis (N mm)")
+    right.set(xlabel="turn of the wheel (deg)", ylabel="torque on the finger about the axis (N mm)", title="gear")
 
 
 E, NU = 1.0, 0.3
@@ -217,9 +217,9 @@ def _draw_slot(figure: Any, sizes: tuple[float, ...], found: list[dict[str, Any]
         at, pressure = case["pressure"]
         own = at[:, 0] < 0.0
         order = np.argsort(at[own, 1])
-        left.plot(pressure[own][order], at[own][order, 1], "o-", ms=3, label=f"edges of {size:g} mm")
+        left.plot(pressure[own][order], at[own][order, 1], "o-", ms=3, lw=1.0, label=f"edges of {size:g} mm")
     left.axhspan(found[0]["mouth"], found[0]["mouth"] + LIP, color="0.9", label="lip of the slot")
-    left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)")
+    left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)", title="slot with a lip")
     right.plot(sizes, [f["penetration_mm"] for f in found], "o-")
     right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", xlim=(0.0, None), ylim=(0.0, None))
 

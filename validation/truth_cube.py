@@ -165,7 +165,7 @@ def _predicted(models: list[Compression], data: Float) -> list[Row]:
 
 
 def _draw(figure: Any, models: list[Compression], best: Compression, data: Float) -> None:
-    figure.set_size_inches(14.0, 4.6)
+    figure.set_size_inches(12.0, 4.4)
     left, middle, right = figure.subplots(1, 3)
     for level, share in enumerate(NOMINAL):
         travel, differences = best.fitted(data[level])

@@ -119,11 +119,12 @@ def _objects(quick: bool) -> Result:
 
 def _draw_objects(figure: Any, table: dict[str, list[Any]]) -> None:
     axes = figure.subplots()
-    names = [f"{o}\n{d.replace(', ', chr(10))}" for o, d in zip(table["object"], table["domain"], strict=True)]
+    domains = [d.replace("-", "\n").replace(", ", "\n") for d in table["domain"]]
+    names = [f"{o}\n{d}" for o, d in zip(table["object"], domains, strict=True)]
     at = np.arange(len(names))
     axes.semilogy(at, np.maximum(table["change"], 1e-17), "o")
     axes.axhline(1e-6, color="k", lw=0.8, label="allowed")
-    axes.set_xticks(at, names, fontsize=6)
+    axes.set_xticks(at, names, fontsize=8)
     axes.set(ylabel="change over the force, rotated back", ylim=(1e-17, 1e-5))
 
 

@@ -154,7 +154,7 @@ def _draw(figure: Any, found: Sequence[Searched]) -> None:
             tried = [s.solved + s.others + s.unsettled for s in own]
             shares = [100.0 * s.others / max(n, 1) for s, n in zip(own, tried, strict=True)]
             left.plot([s.mu for s in own], shares, style, ms=4, color=f"C{i}", label=f"{model}, nu = {nu:g}, {path}")
-            right.loglog([s.mu for s in own], [max(s.apart, 1e-16) for s in own], style, ms=4, color=f"C{i}")
+            right.loglog([s.mu for s in own], [s.apart or np.nan for s in own], style, ms=4, color=f"C{i}")
     left.set(xscale="log", xlabel="mu", ylabel="random starts that end in another solution (%)")
     right.axhline(DIFFERENT, color="#222222", lw=0.8)
-    right.set(xlabel="mu", ylabel="largest difference of a force over the largest force")
+    right.set(xlabel="mu", ylabel="largest difference of a force over the largest, if any")

@@ -120,7 +120,7 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
     """Draw changes in per cent, and beside them the seconds of each press."""
     domains = [d for d in DOMAINS if (d, "none") in found]
     effects = [n for n in SETTINGS if (domains[0], n) in found]
-    figure.set_size_inches(7.0 * len(domains) + 1.6, 5.6)
+    figure.set_size_inches(5.2 * len(domains) + 1.6, 5.6)
     panels = figure.subplots(1, 2 * len(domains), squeeze=False, width_ratios=[3.4, 1.0] * len(domains))[0]
     for k, domain in enumerate(domains):
         axes, times = panels[2 * k : 2 * k + 2]
