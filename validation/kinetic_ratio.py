@@ -98,4 +98,5 @@ def _draw(figure: Any, found: dict[Key, np.ndarray], meshes: Any, counts: Any) -
         ax.axhline(exact, color="k", ls="--", lw=1, label="exact, kinetic friction alone")
         ticks_at(ax, counts)
         ax.set(xlabel="increments", ylabel=label)
-    figure.suptitle("kinetic friction 0.7 times the static one; 10 to 40 points to the half width of contact")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle("kinetic friction 0.7 times the static one; points to the half width of contact")

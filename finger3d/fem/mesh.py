@@ -508,8 +508,10 @@ _SETTLED = 1e-9
 _INSIDE = -1e-6
 """Least barycentric coordinate of a point that counts as inside a cell."""
 
-_NEAREST_CELLS = {2: 12, 3: 40}
-"""Cells with the nearest centroids, by dimension, among which the one that holds a point is searched."""
+_NEAREST_CELLS = {2: 12, 3: 100}
+"""Cells with the nearest centroids, by dimension, among which the one that holds a point is searched.
+
+In graded solid meshes it may be beyond the 40 nearest."""
 
 
 def inverse_map(element: Element, nodes: Float, points: Float, start: Float | None = None) -> Float:
