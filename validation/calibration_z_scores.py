@@ -182,11 +182,11 @@ def _draw(figure: Any, found: list[Reading]) -> None:
             left.semilogy(where, size, ".", ms=3, color=colour, label=None if k else label)
     left.set(xticks=range(len(cases)), xlabel="increments of the calibration, mesh of the reading")
     left.set(ylabel="|z| of the strain", ylim=(1e-2, None), title="Error over its standard deviation")
-    left.set_xticklabels([f"{s}\n{m}" for s, m in cases], fontsize=8)
+    left.set_xticklabels([f"{s} {m}".replace(" ", "\n") for s, m in cases], fontsize=8)
     for mesh, color in ((SAME, "#2166ac"), (FINER, "#d95f02")):
         some = [r for r in found if r.mesh == mesh]
         right.plot([r.mu for r in some], [r.z for r in some], ".", ms=4, color=color, label=f"read on the {mesh}")
     right.axhspan(-1.0, 1.0, color="#dddddd", lw=0, zorder=0, label="one standard deviation")
     right.set(xlabel="true mu", ylabel="z of the strain", title="The same errors over mu")
     for axes in (left, right):
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, frameon=False)

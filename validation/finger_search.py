@@ -212,14 +212,14 @@ def _statements_gauges(plane: str, over: str, found: dict[Any, Judged], x: Float
 
 
 def _draw_gauges(figure: Any, radii: Any, edges: Any, found: dict[Any, Judged], x: Float) -> None:
-    panels = figure.subplots(2, 3, squeeze=False)
+    panels = figure.subplots(3, 2).T
     whole, half = RANGES
     for row, (plane, name) in enumerate(DOMAINS.items()):
         best = [[found[plane, r, h].best(x, half) for r in radii] for h in edges]
         values = np.array([[value for value, _, _ in own] for own in best])
         gauges = [[f"{at:.0f} mm, {angle:.0f}°" for _, at, angle in own] for own in best]
         _draw_map(panels[row, 0], radii, edges, values, gauges, "least |d strain / d mu|")
-        panels[row, 0].set_title(f"{name}, {half}: each finger's best gauge, x and angle")
+        panels[row, 0].set_title(f"{name}, {half}: each finger's best gauge")
         for k, over in enumerate((half, whole), start=1):
             _gauge_map(figure, panels[row, k], found[(plane, *CHOSEN)], x, name, over)
     figure.suptitle(f"Sensitivity to friction, nu = {NU:g}, 10 mm deep; red: the paper's choice")
@@ -239,4 +239,4 @@ def _gauge_map(figure: Any, axes: Any, finger: Judged, x: Float, name: str, over
 
 def run(quick: bool) -> Result:
     """Fingers by their shear strain, then by their best gauge."""
-    return together((19.0, 17.4), shear=_shear(quick), gauges=_gauges(quick))
+    return together((13.0, 8.0, 12.0), shear=_shear(quick), gauges=_gauges(quick))

@@ -136,11 +136,11 @@ def _draw(figure: Any, runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size
 
     figure.set_size_inches(12.0, 9.0)
     panels = figure.subplots(2, 2)
-    for column, (sizes, key, label) in enumerate(((unknowns, "dofs", "unknowns"), (rows, "rows", "contact rows"))):
+    for column, (sizes, key, other) in enumerate(((unknowns, "dofs", "rows"), (rows, "rows", "dofs"))):
         top, low = panels[0][column], panels[1][column]
         sizes = sorted(sizes, key=lambda s: runs[s][key])
-        other = "rows" if key == "dofs" else "dofs"
-        names = [f"{runs[s][key]:,}\n({runs[s][other]:,} {'rows' if other == 'rows' else 'unknowns'})" for s in sizes]
+        label = "unknowns (contact rows)" if key == "dofs" else "contact rows (unknowns)"
+        names = [f"{runs[s][key]:,}\n({runs[s][other]:,})" for s in sizes]
         at = np.arange(len(sizes))
         total = np.array([sum(runs[s]["seconds"].values()) for s in sizes])
         bottom = np.zeros(len(sizes))
