@@ -142,7 +142,7 @@ def differences(figure: Figure) -> None:
     left, right = figure.subplots(1, 2)
     path = np.array([0.0, 0.25, 0.6, 1.0])
     low, high = np.array([0.0, 0.12, 0.42, 0.6]), np.array([0.0, 0.12, 0.5, 0.85])
-    for values, colour, text in ((low, INK, "at \u03bc"), (high, SLIP, "at \u03bc + d\u03bc")):
+    for values, colour, text in ((low, INK, "at mu"), (high, SLIP, "at mu + dmu")):
         left.plot(path, values, "o-", color=colour, ms=4)
         left.text(1.03, values[-1], text, color=colour, va="center")
     left.annotate("", (1.0, high[-1] - 0.02), (1.0, low[-1] + 0.02), arrowprops={"arrowstyle": "<->", "color": STICK})
@@ -155,7 +155,7 @@ def differences(figure: Figure) -> None:
     )
     left.set_title("a reading", fontsize=10)
     right.plot(path, high - low, "o-", color=STICK, ms=4)
-    right.set_title("the effect of d\u03bc: the difference", fontsize=10)
+    right.set_title("the effect of dmu: the difference", fontsize=10)
     for axes in (left, right):
         axes.set(xlabel="depth", xticks=[], yticks=[], xlim=(0.0, 1.3), ylim=(0.0, 1.0))
         axes.spines[["top", "right"]].set_visible(False)

@@ -145,12 +145,10 @@ def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarr
         right.loglog(lengths, [s[1] for s in slopes], colour + "-o", ms=3, label=f"read, {domain.replace('-', ' ')}")
     plane = [100.0 * wing(n, 9.0, 1.0, NU) for n in fine]
     left.loglog(fine, plane, "k:", lw=1.2, label="Prandtl's equation")
-    left.set(xlabel="length of the foil, mm", ylabel="read over free, %", title="lines: in a body without end")
+    left.set(xlabel="length of the foil, mm", ylabel="read over free, %", title="lines: in an endless body")
     middle.set(xlabel="mu", ylabel="strain", yscale="log", title="gauge of 4 mm")
     right.axhline(SLOPE, color="k", lw=0.8, label="implied by the paper")
-    right.set(
-        xlabel="length of the foil, mm", ylabel="|d strain / d mu| at mu = 0.5", title="1.5e-4 over it: error of mu"
-    )
+    right.set(xlabel="length of the foil, mm", ylabel="|d strain / d mu|", title="slope at mu = 0.5")
     left.legend(fontsize=7)
     middle.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.02, 0.1))
     right.set_ylim(1e-6, 0.3)

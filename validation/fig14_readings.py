@@ -201,7 +201,7 @@ def _claims(curves: list[Curve]) -> Iterator[Row]:
 
 
 def _draw_models(figure: Any, curves: list[Curve]) -> None:
-    panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.9))
+    panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
     models = list(dict.fromkeys(c.model for c in curves))
     for axes, leaning in zip(panels, ("30", "-30"), strict=False):
         mu = np.linspace(0.06, 0.5, 50)
@@ -227,10 +227,9 @@ def _draw_models(figure: Any, curves: list[Curve]) -> None:
     for i, line in enumerate(shares):
         for j, share in enumerate(line):
             axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8)
-    names = [f"{lean}°\nfrom the {'vertical' if 'vertical' in name else 'x axis'}"
-             for name in LEANING for lean in name.split()[:1]]  # fmt: skip
-    axes.set_xticks(range(len(LEANING)), names, fontsize=7)
-    axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=7)
+    names = [f"{name.split()[0]}°\nfrom {'y' if 'vertical' in name else 'x'}" for name in LEANING]
+    axes.set_xticks(range(len(LEANING)), names, fontsize=8)
+    axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=8)
     axes.set_title("share of places and nu compatible")
 
 
@@ -320,4 +319,4 @@ def _draw_foil(figure: Any, mus: tuple[float, ...], found: dict[str, dict[str, n
 
 def run(quick: bool) -> Result:
     """All models, then the one nearest to the sensor."""
-    return together((15.0, 10.5), models=_models(quick), foil=_foil(quick))
+    return together((12.5, 10.5), models=_models(quick), foil=_foil(quick))

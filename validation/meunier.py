@@ -175,6 +175,6 @@ def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
                     axes.fill_between(at, curve - band, curve + band, color=f"C{i}", alpha=0.15, lw=0)
             axes.plot(test.stretch, test.stress, "ko", ms=3.5, label="measured")
             axes.set(xlabel="stretch", ylabel="nominal stress (MPa)")
-            kind = "fitted" if mode in FITS[own] else "predicted, with bands"
+            kind = "fitted" if mode in FITS[own] else "predicted"
             axes.set_title(f"{MODES[mode]}, {kind}\nlaws fitted to {own}", fontsize=9)
         line[0].legend(frameon=False, fontsize=8)

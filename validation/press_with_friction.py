@@ -194,9 +194,9 @@ def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], f
         if of.any():
             stuck, slip = of & (t["mu"] == STUCK), of & (t["mu"] == 0.25) & (t["increments"] == most)
             for which, name, key, want in (
-                (stuck, "P, full stick", "P_over_Hertz", FULL_STICK_LINE[nu]),
-                (slip, "P, mu = .25", "P_over_Hertz", INTEGRALS_LINE[nu][0]),
-                (slip, "int q, mu = .25", "q_over_P", INTEGRALS_LINE[nu][1]),
+                (stuck, "force, full stick", "P_over_Hertz", FULL_STICK_LINE[nu]),
+                (slip, "force, mu = .25", "P_over_Hertz", INTEGRALS_LINE[nu][0]),
+                (slip, "friction, mu = .25", "q_over_P", INTEGRALS_LINE[nu][1]),
             ):
                 error = 100 * np.abs(t[key][which] / want - 1)
                 middle.loglog(t["points_per_a"][which], error, marker + "-", label=f"{name}, nu = {nu:g}")
@@ -219,7 +219,7 @@ def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], f
 
 def _title(profile: Profile) -> str:
     got = _normalised(profile, np.linspace(0.0, 1.0, 11))
-    return f"q of nu = .3, mu = .25: error {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} % of the largest q"
+    return f"nu = .3, mu = .25: error of friction {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} %"
 
 
 C_OVER_A_SPHERE = {
@@ -325,15 +325,15 @@ def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
         left.semilogx(list(wanted), list(wanted.values()), colour + "--", label="reference")
         tets = {k[3]: v for k, v in found.items() if k[0] == "tets" and k[1] == nu}
         points = list(tets)
-        for i, name, mark in ((0, "P", "o-"), (1, "T/P", "s-")):
+        for i, name, mark in ((0, "force", "o-"), (1, "friction / force", "s-")):
             error = [100 * abs(tets[n][i] / INTEGRALS_SPHERE[nu][i] - 1) for n in points]
             middle.loglog(points, error, colour + mark, label=f"{name}, nu = {nu:g}", mfc="w" if i else None)
         exact = found["rings", nu, 0.25, rings, 40][2]
         right.loglog(points, [tets[n][2] for n in points], colour + "o-", label=f"3D, nu = {nu:g}")
         right.axhline(exact, color=colour, ls="--", lw=1, label=f"rings a/{rings} wide")
-    left.set(xlabel="mu", ylabel="c/a", title="stick radius")
+    left.set(xlabel="mu", ylabel="stick radius / contact radius", title="stick")
     middle.set(xlabel="points per a", ylabel="error, %", title="3D, mu = .25")
-    right.set(xlabel="points per a", ylabel="D/(P depth), 40 increments", title="dissipation, mu = .25")
+    right.set(xlabel="points per a", ylabel="dissipation / (force depth)", title="dissipation, mu = .25")
     for axes in (middle, right):
         ticks_at(axes, points)
 

@@ -173,7 +173,7 @@ def _draw(figure: Any, found: Curves) -> None:
                 row[1].tick_params(labelleft=True)
                 row[1].set_ylabel("d strain / d mu, 1e-3")
                 continue
-            kind = "no refinement" if refinement == PLAIN else f"gauge_refinement = {refinement:g}"
+            kind = "no refinement" if refinement == PLAIN else "refined at the gauge"
             axes.set_title(f"{case}: {kind}", fontsize=9)
     for axes in panels[-1]:
         axes.set_xlabel("friction coefficient mu")

@@ -145,7 +145,7 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
         times.barh(range(len(seconds)), seconds, color=["#777777", *(f"C{i}" for i in range(len(effects)))])
         for y, value in enumerate(seconds):
             times.text(1.15 * value, y, f"{value:.2g}" if value < 10.0 else f"{value:.0f}", va="center", fontsize=8)
-        times.set(xscale="log", xlim=(0.5 * min(seconds), 6.0 * max(seconds)), xlabel="processor time (s)")
+        times.set(xscale="log", xlim=(0.5 * min(seconds), 6.0 * max(seconds)), xlabel="time (s)")
         times.set_yticks([0], ["none"])
         times.invert_yaxis()
         for panel in (axes, times):
