@@ -226,7 +226,8 @@ def _draw_models(figure: Any, curves: list[Curve]) -> None:
     axes.imshow(np.array(shares), cmap="Greens", vmin=0.0, vmax=1.0, aspect="auto")
     for i, line in enumerate(shares):
         for j, share in enumerate(line):
-            axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8)
+            ink = "w" if share > 0.7 else "k"
+            axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8, color=ink)
     names = [f"{name.split()[0]}°\nfrom {'y' if 'vertical' in name else 'x'}" for name in LEANING]
     axes.set_xticks(range(len(LEANING)), names, fontsize=8)
     axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=8)
