@@ -110,6 +110,7 @@ Image = NDArray[np.uint8]
 
 _TIME_LIMIT_S = 180.0  # of a child process that renders
 _SHINE = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.1}
+_SHARP_ANGLE = 40.0  # between the normals of two triangles whose common edge is not shaded as round, in degrees
 _FEATURE_ANGLE = 25.0  # between the normals of two triangles with a visible edge between them, in degrees
 
 
@@ -162,14 +163,19 @@ class Polygons:
         """Add the polygons to a plotter."""
         import pyvista as pv
 
-        mesh = pv.PolyData(self.points, _padded(self.cells))
-        if isinstance(self.colour, str):
-            plotter.add_mesh(mesh, color=self.colour, opacity=self.opacity, **_SHINE)
-        else:
-            mesh["colour"] = self.colour
-            plotter.add_mesh(mesh, scalars="colour", rgb=True, opacity=self.opacity, **_SHINE)
+        corners, cells = unshared(self.points[self.cells])
+        mesh = pv.PolyData(corners, _padded(cells))
+        whole = mesh.clean(tolerance=1e-6, absolute=True)
+        smooth = whole.compute_normals(False, consistent_normals=False, split_vertices=True, feature_angle=_SHARP_ANGLE)
+        is_smooth = self.opacity == 1.0 and smooth.n_cells == mesh.n_cells  # not where a cell has no area
+        if is_smooth:
+            mesh.point_data.active_normals = smooth["Normals"][smooth.regular_faces].reshape(-1, 3)
+        how: dict[str, Any] = {"color": self.colour}
+        if not isinstance(self.colour, str):
+            mesh["colour"], how = self.colour[self.cells.ravel()], {"scalars": "colour", "rgb": True}
+        plotter.add_mesh(mesh, opacity=self.opacity, smooth_shading=is_smooth, **how, **_SHINE)
         if self.feature_edges:
-            edges = mesh.extract_feature_edges(
+            edges = whole.extract_feature_edges(
                 _FEATURE_ANGLE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
             )
             if edges.n_points:
