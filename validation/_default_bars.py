@@ -125,4 +125,3 @@ def _draw(figure: Any, found: list[Number]) -> None:
     axes.axvline(100.0 * QUARTER, color="k", lw=0.8, ls=":", label="a quarter of the number")
     axes.set(xscale="log", xlabel="error bar, % of the number", yticks=range(len(names)), yticklabels=names)
     axes.set(xlim=(1e-3, 3e2), ylim=(len(names) - 0.5, -0.5))
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)

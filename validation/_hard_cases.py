@@ -215,8 +215,7 @@ def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
                 axes.plot(names, values, mark + style, label=f"{dim}D, {name} of the legs")
     left.axhline(10, color="k", lw=0.8, ls=":")
     for axes, what in ((left, "median"), (middle, "largest")):
-        axes.set_yscale("symlog", linthresh=1.0)
-        axes.set(xlabel="mu", ylabel=f"{what} iterations per part", ylim=(-0.1, 500.0))
+        axes.set(xlabel="mu", ylabel=f"{what} iterations per part", yscale="symlog", ylim=(-0.2, 500.0))
     for key, label in (("settled", "finger3d"), ("paper_settled", "the paper's rule")):
         share = {mu: 100 * t[key].sum() / t["increments"].sum() for mu, t in grouped(columns, "mu")}
         right.plot([f"{mu:g}" for mu in sorted(share)], [share[mu] for mu in sorted(share)], "o-", label=label)

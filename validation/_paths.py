@@ -165,7 +165,6 @@ def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tupl
             label = name if (kind, mu) == (OWN, MUS[1]) else None
             left.loglog(counts, worst, f"o{style}", ms=3, lw=1, color=f"C{names.index(name)}", label=label)
     left.set(xlabel="increments", ylabel="largest relative error, each mu", title="finger3d's (lines), plain (dotted)")
-    left.legend()
     for k, number in enumerate(dict.fromkeys(line[2] for line in automatic)):
         told, true = np.array([(line[5], line[4]) for line in automatic if line[2] == number]).T
         right.loglog(np.maximum(told, 1e-9), np.maximum(true, 1e-9), "o", ms=4, color=f"C{k}", label=words(number))
@@ -173,4 +172,3 @@ def _draw(figure: Any, errors: dict[Any, dict[str, float]], automatic: list[tupl
     right.loglog(ends, WITHIN * ends, "k:", lw=1, label="two estimates")
     right.set(xlabel="estimated error (N, mJ, strain)", ylabel="true error (N, mJ, strain)")
     right.set_title("automatic increments; 1e-9: less than that")
-    right.legend()

@@ -221,8 +221,7 @@ def _draw_slot(figure: Any, sizes: tuple[float, ...], found: list[dict[str, Any]
     left.axhspan(found[0]["mouth"], found[0]["mouth"] + LIP, color="0.9", label="lip of the slot")
     left.set(xlabel="pressure on the wall (MPa)", ylabel="height on the wall (mm)", title="slot with a lip")
     right.plot(sizes, [f["penetration_mm"] for f in found], "o-")
-    right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", title="slot with a lip")
-    right.set(xlim=(0.0, None), ylim=(0.0, None))
+    right.set(xlabel="edge length (mm)", ylabel="largest penetration (mm)", xlim=(0.0, None), ylim=(0.0, None))
 
 
 def run(quick: bool) -> Result:

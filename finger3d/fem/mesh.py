@@ -509,9 +509,7 @@ _INSIDE = -1e-6
 """Least barycentric coordinate of a point that counts as inside a cell."""
 
 _NEAREST_CELLS = {2: 12, 3: 100}
-"""Cells with the nearest centroids, by dimension, among which the one that holds a point is searched.
-
-In graded solid meshes it may be beyond the 40 nearest."""
+"""Cells with the nearest centroids, by dimension, that may hold a point; in graded solids 40 are too few."""
 
 
 def inverse_map(element: Element, nodes: Float, points: Float, start: Float | None = None) -> Float:

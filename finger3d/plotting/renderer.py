@@ -175,9 +175,7 @@ class Polygons:
             mesh["colour"], how = self.colour[self.cells.ravel()], {"scalars": "colour", "rgb": True}
         plotter.add_mesh(mesh, opacity=self.opacity, smooth_shading=is_smooth, **how, **_SHINE)
         if self.feature_edges:
-            edges = whole.extract_feature_edges(
-                _FEATURE_ANGLE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
-            )
+            edges = whole.extract_feature_edges(_FEATURE_ANGLE, False, False, True, False)
             if edges.n_points:
                 plotter.add_mesh(edges, color="#333333", line_width=1.5)
 
