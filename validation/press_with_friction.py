@@ -325,7 +325,7 @@ def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
         left.semilogx(list(wanted), list(wanted.values()), colour + "--", label="reference")
         tets = {k[3]: v for k, v in found.items() if k[0] == "tets" and k[1] == nu}
         points = list(tets)
-        for i, name, mark in ((0, "force", "o-"), (1, "friction / force", "s-")):
+        for i, name, mark in ((0, "force", "o-"), (1, "friction", "s-")):
             error = [100 * abs(tets[n][i] / INTEGRALS_SPHERE[nu][i] - 1) for n in points]
             middle.loglog(points, error, colour + mark, label=f"{name}, nu = {nu:g}", mfc="w" if i else None)
         exact = found["rings", nu, 0.25, rings, 40][2]

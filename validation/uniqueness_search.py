@@ -146,7 +146,6 @@ def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
 
 
 def _draw(figure: Any, found: Sequence[Searched]) -> None:
-    figure.set_size_inches(11.0, 4.6)
     left, right = figure.subplots(1, 2)
     for i, (model, nu) in enumerate(dict.fromkeys((s.model, s.nu) for s in found)):
         for path, style in zip(PATHS, ("o-", "s--"), strict=True):
@@ -155,6 +154,7 @@ def _draw(figure: Any, found: Sequence[Searched]) -> None:
             shares = [100.0 * s.others / max(n, 1) for s, n in zip(own, tried, strict=True)]
             left.plot([s.mu for s in own], shares, style, ms=4, color=f"C{i}", label=f"{model}, nu = {nu:g}, {path}")
             right.loglog([s.mu for s in own], [s.apart or np.nan for s in own], style, ms=4, color=f"C{i}")
-    left.set(xscale="log", xlabel="mu", ylabel="random starts that end in another solution (%)")
+    left.set(xscale="log", xlabel="mu", ylabel="starts that end elsewhere (%)")
     right.axhline(DIFFERENT, color="#222222", lw=0.8)
-    right.set(xlabel="mu", ylabel="largest difference of a force over the largest, if any")
+    right.set(xlabel="mu", ylabel="difference of a force over the largest, if any")
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
