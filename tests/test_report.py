@@ -379,12 +379,14 @@ def test_every_gauge_with_its_place_and_the_command_that_calibrates_them(tmp_pat
     (tmp_path / "gauges.json").write_text(json.dumps(data), encoding="utf-8")
     text = words(gauge_places_page(tmp_path).write(tmp_path))
     assert "2 gauges" in text
-    assert "mu = 0.1 to 0.5 0.03" in text
+    assert "mu = 0.1 to 0.5 0.03 readings tell mu up to 0.5" in text
     assert "g1 x 30.2, y 41.0, z 0.0 mm, 12.5°" in text
     assert f"finger3d calibrate {tmp_path / 'best.toml'} --gauge g1,g2" in text
-    data["gauges"] = data["gauges"][:1]
+    data |= {"gauges": data["gauges"][:1], "mu_sd": [0.02, 0.06]}  # 0.4 / sqrt(12) is 0.115
     (tmp_path / "gauges.json").write_text(json.dumps(data), encoding="utf-8")
-    assert "1 gauge " in words(gauge_places_page(tmp_path).write(tmp_path))
+    text = words(gauge_places_page(tmp_path).write(tmp_path))
+    assert "1 gauge " in text
+    assert "readings tell mu up to 0.1" in text
 
 
 # --- the page of an identification -----------------------------------------------------------------------------------

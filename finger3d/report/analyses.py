@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -284,8 +285,12 @@ def gauge_places_page(folder: str | Path) -> Page:
     folder = Path(folder)
     data = read_json(folder / "gauges.json")
     gauges, names = data["gauges"], ",".join(g["name"] for g in data["gauges"])
+    known = list(zip(data["mu"], data["mu_sd"], strict=True))
+    unknown = (data["mu"][-1] - data["mu"][0]) / math.sqrt(12.0)  # standard deviation of a mu of which nothing is known
+    told = [mu for mu, _ in itertools.takewhile(lambda one: one[1] <= 0.5 * unknown, known)]
     headline = [
         HeadlineRow(f"mu \u00b1, mean over mu = {data['mu'][0]:g} to {data['mu'][-1]:g}", f"{data['mean_mu_sd']:.3g}"),
+        HeadlineRow("readings tell mu", f"up to {told[-1]:.2g}" if told else "nowhere"),
         *(
             HeadlineRow(
                 f"{g['name']}",
@@ -294,22 +299,12 @@ def gauge_places_page(folder: str | Path) -> Page:
             for g in gauges
         ),
     ]
+    keys = "name", "x_mm", "y_mm", "z_mm", "angle_deg", "mean_mu_sd_alone", "mean_mu_sd_with_those_before"
     each = Table(
         ("gauge", "x (mm)", "y (mm)", "z (mm)", "angle (degree)", "mean sd of mu alone", "with those before"),
-        [
-            (
-                g["name"],
-                g["x_mm"],
-                g["y_mm"],
-                g["z_mm"],
-                g["angle_deg"],
-                g["mean_mu_sd_alone"],
-                g["mean_mu_sd_with_those_before"],
-            )
-            for g in gauges
-        ],
+        [[g[key] for key in keys] for g in gauges],
     )
-    spread = Table(("mu", "sd of mu"), list(zip(data["mu"], data["mu_sd"], strict=True)))
+    spread = Table(("mu", "sd of mu"), known)
     best = folder / "best.toml"
     return Page(
         f"{title_of(data['scene'])}: places of {len(gauges)} gauge{'s' if len(gauges) > 1 else ''}",
