@@ -135,8 +135,17 @@ def test_rows_are_the_derivative_of_the_gap(d: int) -> None:
     way = np.random.default_rng(7).normal(size=u.shape)
     h = 1e-6
     slope = (contact(mesh, face, u + h * way).gap - contact(mesh, face, u - h * way).gap) / (2 * h)
-    rows = contact(mesh, face, u).rows[::d]
-    assert rows @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
+    rows = contact(mesh, face, u).rows
+    assert rows[::d] @ way.ravel() == pytest.approx(slope, rel=1e-7, abs=1e-8)  # central: error h^2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("share", [None, 0.4])
+def test_displacements_are_those_along_the_rows(d: int, share: float | None) -> None:
+    mesh, face, u = made(d)
+    motions = np.random.default_rng(7).normal(size=(u.size, 3))
+    there = contact(mesh, face, u, share=share)
+    np.testing.assert_allclose(there.displacement(motions), there.rows @ motions, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -386,6 +386,11 @@ class _Area:
         return sp.csr_matrix(tangents.T @ block_diagonal(second) @ tangents)
 
 
+def _times(matrices: Float, vectors: Float) -> Float:
+    """Return products (m, i, k) of matrices (m, i, j) and vectors (m j, k)."""
+    return np.asarray(matrices @ vectors.reshape(len(matrices), matrices.shape[2], -1))
+
+
 @dataclass(frozen=True)
 class DeformedContact:
     """Contact of a deformed face.
@@ -448,6 +453,20 @@ class DeformedContact:
         if self.follows_area:
             rows = rows + sp.csr_array((np.ones(c), (d * np.arange(c), np.arange(c))), (c * d, c)) @ self._d_point_gap
         return sp.csr_matrix(rows)
+
+    def displacement(self, motion: Float) -> Float:
+        """Return the displacement (c d, k) of the points along the rows in motions (n d, k), unassembled."""
+        face, at_points = self.face, _times(self.bases, self.face.vector_trace @ motion)
+        if self.follows_area:
+            widened = _times(self.samples_normal[:, None, :], face.vector_interpolate @ motion)[:, 0]
+            grown = _times(np.concatenate(self.area.turned, axis=1)[:, None, :], face.vector_slopes @ motion)[:, 0]
+            grown /= self.area.initial[:, None]
+            sums = face.average @ np.hstack(
+                [self.area.ratio[:, None] * widened + self.samples_gap[:, None] * grown, grown]
+            )
+            summed, area = np.split(sums, 2, axis=1)
+            at_points[:, 0] = (summed - (self.slope * self.gap)[:, None] * area) / self._slope_area[:, None]
+        return at_points.reshape(-1, motion.shape[1])
 
     @cached_property
     def _d_point_gap(self) -> sp.csr_matrix:

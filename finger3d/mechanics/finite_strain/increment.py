@@ -441,7 +441,7 @@ class IncrementToForces(FiniteIncrement):
         """Move the object until the linearised body has the forces, by at most the largest step."""
         images = 2.0 ** len(self.problem.axes)
         motion, resultant = (
-            np.array([self.active(-one).ravel() for one in (now.contact.rows @ field).T]).T
+            np.array([self.active(-one).ravel() for one in now.contact.displacement(field).T]).T
             for field in self._fields(now)
         )
         if turned.size:
