@@ -554,6 +554,7 @@ def locate(mesh: Mesh, points: Float) -> tuple[Int, Float]:
     count = min(_NEAREST_CELLS[d], len(mesh.cells))
     _, near = cKDTree(corners[:, : d + 1].mean(axis=1)).query(points, k=count)
     near = near.reshape(len(points), count)
+    low, high = mesh.boxes
     best = np.full(len(points), -np.inf)
     where = np.full((len(points), d + 1), 1.0 / (d + 1))
     cell = np.full(len(points), -1)
@@ -561,6 +562,8 @@ def locate(mesh: Mesh, points: Float) -> tuple[Int, Float]:
         left = np.flatnonzero(best < _INSIDE)
         if not len(left):
             break
+        at, there = points[left], near[left, k]
+        left = left[((at >= low[there]) & (at <= high[there])).all(axis=1)]
         bary = inverse_map(mesh.element, corners[near[left, k]], points[left])
         least = bary.min(axis=1)
         better = least > best[left]
