@@ -10,7 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh import Mesh, boundary, cell_angles_deg, curved_jacobians, curved_volume, signed_volumes, unfold
+from finger3d.fem.mesh import (
+    Mesh,
+    boundary,
+    cell_angles_deg,
+    curved_jacobians,
+    curved_volume,
+    locate,
+    signed_volumes,
+    unfold,
+)
 from finger3d.geometry.cad import sound
 from finger3d.geometry.design import designs
 from finger3d.geometry.tessellate import ImplicitCylinder, ImplicitPlane, ImplicitSphere, Tessellation, tessellate
@@ -192,6 +201,18 @@ def test_edges_have_the_asked_length_in_the_zone_and_grow_away_from_it(size: flo
     base = mesh.points[mesh.facets["base"][:, :2]]
     assert np.linalg.norm(base[:, 1] - base[:, 0], axis=1).max() == pytest.approx(8.0, rel=0.2)
     assert np.diff(np.sort(mesh.points[mesh.points[:, 0] == 0.0][:, 1]))[-1] == pytest.approx(size / 2, rel=0.2)
+
+
+def test_every_point_of_a_graded_solid_is_in_one_of_its_cells() -> None:
+    """Some of these points are in none of the 40 cells with the nearest centroids."""
+    body = designs()["block"](half_length_mm=10.0, height_mm=8.0, width_mm=12.0)
+    options = MeshOptions(size_mm=0.5, base_size_mm=5.0, mesher="swept")
+    mesh, _ = mesh_solid(body, options, (-3.0, 3.0, -3.0, 3.0), ())
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    points = low + np.random.default_rng(1).random((4000, 3)) * (high - low)
+    cell, bary = locate(mesh, points)
+    assert (cell >= 0).all()
+    np.testing.assert_allclose(np.einsum("pk,pkd->pd", mesh.element.shape(bary), mesh.points[mesh.cells[cell]]), points)
 
 
 @pytest.mark.parametrize(
