@@ -15,7 +15,7 @@ def main() -> int:
         interruption_ends_process()
         return code
     except KeyboardInterrupt:
-        print("finger3d: interrupted; nothing was written", file=sys.stderr)
+        print("finger3d: interrupted; what was finished is kept", file=sys.stderr)
         return 130
 
 

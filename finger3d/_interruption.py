@@ -31,7 +31,7 @@ def termination_interrupts() -> Iterator[None]:
 
     A package may catch the exception and go on, as by a bare ``except`` or in C, and Python prints and drops those of
     callbacks of weak references and of ``__del__``. An exception that has gone while the block still runs is raised
-    again shortly afterwards.
+    again shortly afterwards, and takes the place of any other that ends the block.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -62,6 +62,10 @@ def termination_interrupts() -> Iterator[None]:
         signal.signal(name, interrupt)
     try:
         yield
+    except Exception as error:
+        if raised:  # numpy, for one, may raise another error in its place
+            raise KeyboardInterrupt from error
+        raise
     finally:
         running.clear()
         for name, old in before.items():

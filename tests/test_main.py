@@ -156,6 +156,17 @@ def test_an_interruption_that_a_package_catches_is_raised_again(converted: bool)
         work()
 
 
+def test_an_error_in_place_of_an_interruption_ends_the_block_as_one() -> None:
+    def work() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise TypeError("as numpy does") from None
+
+    with pytest.raises(KeyboardInterrupt), termination_interrupts():
+        work()
+
+
 def test_one_interruption_is_one_exception_while_what_is_done_is_kept() -> None:
     """The exception lives while blocks end, however long that takes, and when the command has answered it is over."""
     kept = False
