@@ -63,7 +63,7 @@ def termination_interrupts() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if raised:  # numpy, for one, may raise another error in its place
+        if raised:  # loaders of OCP and VTK, and numpy, raise another error in its place
             raise KeyboardInterrupt from error
         raise
     finally:

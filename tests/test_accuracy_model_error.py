@@ -69,14 +69,14 @@ def test_the_interval_of_a_number_that_no_coarse_mesh_resolves_holds() -> None:
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, when: Any) -> None:
-    pressed = module.last_step
+    pressed = module.all_steps
 
     def press(problem: Any, *more: Any, **options: Any) -> Any:
         if when(problem.model):
             raise Finger3dError("it did not converge")
         return pressed(problem, *more, **options)
 
-    monkeypatch.setattr(module, "last_step", press)
+    monkeypatch.setattr(module, "all_steps", press)
 
 
 def test_the_strain_decides_where_a_press_at_large_deformation_fails(monkeypatch: pytest.MonkeyPatch) -> None:

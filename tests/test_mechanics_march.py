@@ -24,10 +24,10 @@ from finger3d.mechanics.history import StepResult, measure
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
+    all_steps,
     automatic,
     errors_of_runs,
     increment_error,
-    last_step,
     march_automatic,
     refine,
     step_error,
@@ -135,7 +135,7 @@ def test_an_increment_that_fails_is_cut_and_the_state_restored(monkeypatch: pyte
     assert depths == [["0.3"], ["0.1875"], ["0.3"]]  # contact begins in a quarter of the increment
     timid.gap = problem.gap(targets(problem.model.legs)[0].__class__(0.0))
     with pytest.raises(Finger3dError, match="did not converge"):
-        last_step(problem, cuts=FEW_CUTS)  # as for an estimate: two halvings are needed
+        all_steps(problem, cuts=FEW_CUTS)  # as for an estimate: two halvings are needed
     monkeypatch.undo()
     four = list(march(replace(problem, model=replace(problem.model, legs=(Leg(0.3, steps=4),)))))
     assert cut.method == "cut back"

@@ -13,7 +13,7 @@ from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.errors import Outcome
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import contact_table, measure, slip_events
+from finger3d.mechanics.history import StepResult, contact_table, measure, slip_events
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions
 from finger3d.mechanics.readings import Taxel
@@ -67,7 +67,12 @@ def test_the_stick_ratio_of_a_line_contact_follows_its_margin() -> None:
 
 
 def _events(problem: Problem) -> dict[str, Any]:
-    return slip_events(problem.points, list(march(problem)), problem.model.readings)
+    return _with_errors(problem, list(march(problem)), {})
+
+
+def _with_errors(problem: Problem, steps: list[StepResult], errors: dict[str, float]) -> dict[str, Any]:
+    margin = [measure(problem.points, step)["slip_margin"] for step in steps]
+    return slip_events(problem.points, steps, margin, problem.model.readings, errors)
 
 
 def _slid_ball(steps: int) -> dict[str, Any]:
@@ -99,8 +104,7 @@ def test_the_error_of_gross_slip_is_that_of_mesh_and_increments() -> None:
 
     problem, fine = slid(0.6, 1), slid(0.3, 3)
     steps = list(march(problem))
-    errors = estimate(problem, steps).slip
-    found = slip_events(problem.points, steps, (), errors)["gross_slip"]
+    found = _with_errors(problem, steps, estimate(problem, steps).slip)["gross_slip"]
     assert found["error"].keys() == {"slide_x_mm"}
     assert 0.5 * 0.4 / 8 <= found["error"]["slide_x_mm"] <= 0.1
     missed = abs(found["slide_x_mm"] - _events(fine)["gross_slip"]["slide_x_mm"])

@@ -29,14 +29,14 @@ from finger3d.contact.acceleration import one_thread
 from finger3d.errors import FAILURES, Finger3dError, MissingError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.companions import coarse_companions, companion, finer_companions
+from finger3d.mechanics.discretise.contact_points import ContactPoints
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import StepResult, measure, slips
+from finger3d.mechanics.history import SlipEvent, StepResult, measure, slip_margin, slips
 from finger3d.mechanics.march.step_halving import (
     FEW_CUTS,
     StepEstimate,
     all_steps,
     errors_of_runs,
-    last_step,
     rough_workspace,
     step_error,
     with_increments_of,
@@ -298,7 +298,7 @@ def _of_increments(
         if judged is None or ratio * seconds > budget:
             continue
         try:
-            there = numbers(own, steps[-1]) if judged is own else known or numbers(judged, last_step(judged))
+            there = numbers(own, steps[-1]) if judged is own else known or numbers(judged, all_steps(judged)[-1])
             errors = step_error(judged, there, numbers, ratio)
         except FAILURES as error:
             failure = failure or error
@@ -346,10 +346,13 @@ def discretisation(
 
 def _errors_of_slip(own: Problem, steps: Sequence[StepResult], pressed: Sequence[CompanionPress]) -> dict[str, float]:
     """Return the errors, in increments, of slip events that all companions have, half an increment at least."""
-    events = slips(own.points, steps, own.model.readings)
-    others = [(one.ratio, slips(one.problem.points, one.steps, own.model.readings)) for one in pressed]
-    found = {}
-    for name, event in events.items():
+
+    def events(points: ContactPoints, steps: Sequence[StepResult]) -> dict[str, SlipEvent | None]:
+        margin = [slip_margin(points, step.state, step.friction) for step in steps]
+        return slips(points, steps, margin, own.model.readings)
+
+    others, found = [(one.ratio, events(one.problem.points, one.steps)) for one in pressed], {}
+    for name, event in events(own.points, steps).items():
         told = [(ratio, there.increments) for ratio, one in others if (there := one.get(name))]
         if event and len(told) == len(others):
             found[name] = _WITHIN_INCREMENT + spread(Kind.FRICTION_SUM, event.increments, told)

@@ -31,7 +31,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.march.step_halving import FEW_CUTS, last_step, rough_workspace, with_few_increments
+from finger3d.mechanics.march.step_halving import FEW_CUTS, all_steps, rough_workspace, with_few_increments
 from finger3d.mechanics.model import MeshOptions, Model
 from finger3d.mechanics.readings import Kind, kinds_of
 from finger3d.meshing.sizing import SizedPlaces
@@ -330,7 +330,7 @@ def _zones_to_refine(beside: Problem, known: Mapping[str, float], goal: str, kin
             continue
         try:
             problem = with_refined_borders(replace(beside.model, mesh=finer))
-            end = last_step(problem, rough_workspace(problem), cuts=FEW_CUTS)
+            end = all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1]
         except (Finger3dError, MemoryError):
             continue
         changes[zone] = abs(press_numbers(problem, end)[goal] - known[goal])

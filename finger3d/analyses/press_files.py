@@ -158,8 +158,9 @@ class PressRecord:
 
     def _slip(self, problem: Problem, steps: Sequence[StepResult]) -> Tree:
         """Return where and when the contact slips, and what is left of it until it does."""
+        margin = [self.entry(step)["slip_margin"] for step in steps]
         errors = self.error_estimate.slip if self.error_estimate and problem is self.problem else {}
-        return slip_events(problem.points, steps, problem.model.readings, errors)
+        return slip_events(problem.points, steps, margin, problem.model.readings, errors)
 
     def _grip_summary(self, outcome: str) -> Tree:
         """Return what two fingers have besides: the increments of each, the object's pose, and whether it is held."""

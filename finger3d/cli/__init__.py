@@ -72,13 +72,7 @@ def _run(arguments: Sequence[str], program: App) -> int:
         if out_of_memory(error):
             complain(OUT_OF_MEMORY)
             return MissingError.exit_code
-        if not isinstance(error, ImportError):
-            raise
-        if (module := absent(error)) is not None:
+        if isinstance(error, ImportError) and (module := absent(error)) is not None:
             complain(message(next(iter(arguments), "finger3d"), module))
             return MissingError.exit_code
-        # The loaders of OCP and VTK turn a KeyboardInterrupt into an ImportError.
-        if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
-            raise
-        complain("interrupted while a package was loading; finished increments are kept")
-        return 130
+        raise

@@ -140,9 +140,7 @@ def edges_of(facets: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return the pairs of points (e, 2) that an edge of facets (f, d) joins."""
     corners = range(facets.shape[1])
     pairs = np.vstack([facets[:, [i, j]] for i in corners for j in range(i)])
-    low, high = np.sort(pairs, axis=1).T
-    count = np.int64(facets.max(initial=0) + 1)
-    return np.stack(np.divmod(np.unique(low * count + high), count), axis=1)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def zone_ends(x: Float, points: Int, zone: Zone) -> tuple[float, float]:

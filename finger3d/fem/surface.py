@@ -354,10 +354,15 @@ class _Area:
         return [scaled * one for one in self.turned]
 
     @cached_property
+    def turns(self) -> sp.csr_array:
+        """Derivative (q, q d (d - 1)) of the ratio by the tangents."""
+        turned = np.concatenate(self.turned, axis=1) / self.initial[:, None]
+        return block_diagonal(turned[:, None, :])
+
+    @cached_property
     def derivative(self) -> sp.csr_matrix:
         """Derivative (q, n d) of the ratio."""
-        turned = np.concatenate(self.turned, axis=1) / self.initial[:, None]
-        return sp.csr_matrix(block_diagonal(turned[:, None, :]) @ self.face.vector_slopes)
+        return sp.csr_matrix(self.turns @ self.face.vector_slopes)
 
     @cached_property
     def normal_slopes(self) -> Float:
@@ -384,11 +389,6 @@ class _Area:
         second *= (weights / self.initial)[:, None, None]
         tangents = self.face.vector_slopes
         return sp.csr_matrix(tangents.T @ block_diagonal(second) @ tangents)
-
-
-def _times(matrices: Float, vectors: Float) -> Float:
-    """Return products (m, i, k) of matrices (m, i, j) and vectors (m j, k)."""
-    return np.asarray(matrices @ vectors.reshape(len(matrices), matrices.shape[2], -1))
 
 
 @dataclass(frozen=True)
@@ -456,24 +456,30 @@ class DeformedContact:
 
     def displacement(self, motion: Float) -> Float:
         """Return the displacement (c d, k) of the points along the rows in motions (n d, k), unassembled."""
-        face, at_points = self.face, _times(self.bases, self.face.vector_trace @ motion)
+        face, (of_gap, of_area) = self.face, self._weights
+        moved = np.einsum("cij,cjk->cik", self.bases, (face.vector_trace @ motion).reshape(*self.bases.shape[:2], -1))
         if self.follows_area:
-            widened = _times(self.samples_normal[:, None, :], face.vector_interpolate @ motion)[:, 0]
-            grown = _times(np.concatenate(self.area.turned, axis=1)[:, None, :], face.vector_slopes @ motion)[:, 0]
-            grown /= self.area.initial[:, None]
-            sums = face.average @ np.hstack(
-                [self.area.ratio[:, None] * widened + self.samples_gap[:, None] * grown, grown]
-            )
-            summed, area = np.split(sums, 2, axis=1)
-            at_points[:, 0] = (summed - (self.slope * self.gap)[:, None] * area) / self._slope_area[:, None]
-        return at_points.reshape(-1, motion.shape[1])
+            widened = self._normals @ (face.vector_interpolate @ motion)
+            moved[:, 0] = of_gap @ widened + of_area @ (self.area.turns @ (face.vector_slopes @ motion))
+        return np.asarray(moved.reshape(-1, motion.shape[1]))
 
     @cached_property
     def _d_point_gap(self) -> sp.csr_matrix:
         """Derivative (c, n d) of the gap of the points."""
+        of_gap, of_area = self._weights
+        return sp.csr_matrix(of_gap @ self._d_gap + of_area @ self.area.derivative)
+
+    @cached_property
+    def _weights(self) -> tuple[sp.csr_array, sp.csr_array]:
+        """Derivatives (c, q) of the gap of the points by the gap at the samples, and by the area's ratio there."""
         weight = sp.diags_array(1.0 / self._slope_area) @ self.face.average
         deviation = weight @ sp.diags_array(self.samples_gap) - sp.diags_array(self.slope * self.gap) @ weight
-        return sp.csr_matrix(weight @ sp.diags_array(self.area.ratio) @ self._d_gap + deviation @ self.area.derivative)
+        return weight @ sp.diags_array(self.area.ratio), deviation
+
+    @cached_property
+    def _normals(self) -> sp.csr_array:
+        """Normals at the samples, as a matrix (q, q d)."""
+        return block_diagonal(self.samples_normal[:, None, :])
 
     def gap_rows(self, moved: Float) -> sp.csr_matrix:
         """Return the derivative (c, n d) of the gap beside an elastic object.
@@ -490,7 +496,7 @@ class DeformedContact:
     @cached_property
     def _d_gap(self) -> sp.csr_matrix:
         """Derivative (q, n d) of the gap at the samples."""
-        return sp.csr_matrix(block_diagonal(self.samples_normal[:, None, :]) @ self.face.vector_interpolate)
+        return sp.csr_matrix(self._normals @ self.face.vector_interpolate)
 
     def geometric_stiffness(self, force: Float, curvature: Float | None = None) -> sp.csr_matrix:
         """Return the geometric stiffness (n d, n d) of normal forces (c,) N, which is subtracted from K.

@@ -381,18 +381,19 @@ class SlipEvent(NamedTuple):
 
 
 def slips(
-    points: ContactPoints, steps: Sequence[StepResult], readings: Sequence[Reading]
+    points: ContactPoints, steps: Sequence[StepResult], margin: Sequence[float], readings: Sequence[Reading]
 ) -> dict[str, SlipEvent | None]:
-    """Return the first slip of every region, and, under `GROSS_SLIP`, that of the whole contact."""
+    """Return the first slip of every region, and, under `GROSS_SLIP`, that of the whole contact; see `slip_events`."""
     regions, good = regions_of(points, readings), [step for step in steps if step.outcome.ok]
-    return {**_first_slips(points, good, regions), GROSS_SLIP: _gross_slip(points, steps)}
+    return {**_first_slips(points, good, regions), GROSS_SLIP: _gross_slip(points, steps, np.array(margin))}
 
 
 def slip_events(
     points: ContactPoints,
     steps: Sequence[StepResult],
+    margin: Sequence[float],
     readings: Sequence[Reading],
-    errors: Mapping[str, float] | None = None,
+    errors: Mapping[str, float],
 ) -> Tree:
     """Return the entries of summary.json on slip.
 
@@ -400,6 +401,7 @@ def slip_events(
     ----------
     points : of the whole finger, m of them
     steps : increments in order; the last may have failed
+    margin : the slip margins after them
     readings : those of the model; the patches of its taxels are regions
     errors : of the events, in increments, by the names of `slips`
 
@@ -413,8 +415,8 @@ def slip_events(
     """
     good = [step for step in steps if step.outcome.ok]
     found = {
-        name: e and _entry(points, steps, e, (errors or {}).get(name))
-        for name, e in slips(points, steps, readings).items()
+        name: event and _entry(points, steps, event, errors.get(name))
+        for name, event in slips(points, steps, margin, readings).items()
     }
     return {
         GROSS_SLIP: found.pop(GROSS_SLIP),
@@ -449,12 +451,11 @@ def _first_slips(
     return found
 
 
-def _gross_slip(points: ContactPoints, steps: Sequence[StepResult]) -> SlipEvent | None:
+def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Float) -> SlipEvent | None:
     """Return the event in which no point of the contact sticks any more while the object moves along it.
 
     Under a prescribed force that the contact cannot hold it is the last pose at which it held.
     """
-    margin = np.array([slip_margin(points, step.state, step.friction) for step in steps])
     left = margin ** _MARGIN_POWER[points.dim]
     for number, step in enumerate(steps):
         if step.outcome is Outcome.SLIPS:

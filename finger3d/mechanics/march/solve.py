@@ -106,8 +106,8 @@ class Press:
         self._leg_start: Float = np.zeros(7)  # forces as in a Load
         self._left: Float = np.zeros(8)  # coordinates at the start of the leg, less those of the path
         self._before: tuple[State[Any], Float] | None = None  # None if the last increment was cut
-        body = problem.without_inclusions
-        self._without_inclusions = Press(replace(body, model=problem.model), self.workspace) if body else None
+        body = problem.without_inclusions and replace(problem.without_inclusions, model=problem.model)
+        self._without_inclusions = Press(body, self.workspace, report=report) if body else None
 
     def advance(
         self, station: Station, guess: Float | None = None, solutions: Sequence[ContactSolution[State[Any]]] = ()

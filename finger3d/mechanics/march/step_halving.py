@@ -372,7 +372,7 @@ def step_error(
         Increments of the further run over those of the problem.
     """
     trial, ratio = with_scaled_steps(problem, ratio)
-    return errors_between(quantities, measurement(trial, last_step(trial, cuts=FEW_CUTS)), ratio)
+    return errors_between(quantities, measurement(trial, all_steps(trial, cuts=FEW_CUTS)[-1]), ratio)
 
 
 def errors_between(quantities: Mapping[str, float], others: Mapping[str, float], ratio: float) -> dict[str, float]:
@@ -419,13 +419,6 @@ def all_steps(
         failed = results[-1].outcome
         raise Finger3dError(f"a run with {problem.model.mesh.size_mm:.4g} mm did not converge ({failed})")
     return results
-
-
-def last_step(
-    problem: Problem, workspace: Workspace | None = None, cuts: int = CUTS, cancel: Event | None = None
-) -> StepResult:
-    """Return the last of `all_steps`."""
-    return all_steps(problem, workspace, cuts, cancel)[-1]
 
 
 def with_increments_of(legs: tuple[Leg, ...], count: int) -> tuple[Leg, ...]:
