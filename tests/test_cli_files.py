@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import finger3d.__main__
 import finger3d.analyses.press
 from finger3d.cli import main
 from finger3d.geometry.surface import Triangles
@@ -350,11 +351,15 @@ def test_a_press_killed_while_it_meshes_leaves_no_child_and_no_folder(
 
 
 def test_an_import_that_ctrl_c_broke_off_is_an_interruption(root: Path, tmp_path, monkeypatch, capsys) -> None:
-    def broken(*args: object, **kwargs: object) -> None:
-        raise ImportError("initialization failed") from KeyboardInterrupt()
+    def broken(*args: object, **kwargs: object) -> None:  # as the loaders of OCP and VTK are
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("initialization failed") from error
 
     monkeypatch.setattr(finger3d.analyses.press, "press", broken)
-    assert main(press(root, tmp_path / "out")[3:]) == 130
+    monkeypatch.setattr(sys, "argv", press(root, tmp_path / "out")[2:])
+    assert finger3d.__main__.main() == 130
     assert capsys.readouterr().err.startswith("finger3d: interrupted")
 
 
