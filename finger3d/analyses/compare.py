@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finger3d._cost import duration
 from finger3d._machine import versions
 from finger3d._ranges import FARTHEST_MM
 from finger3d._types import Float, Tree
+from finger3d.accuracy.cost import forecast
 from finger3d.accuracy.error_bars import gain, with_error
 from finger3d.accuracy.estimate import estimate
 from finger3d.errors import Finger3dError, Outcome, UnresolvedError
@@ -446,6 +448,8 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
     write_text(folder / "scene.toml", solid.to_toml())
     variants = list(_variants(model, widths))
     report.steps_total = len(variants)
+    seconds = sum(forecast(variant, bars=True)["total_s"] for _, variant in variants)
+    report.say(f"{len(variants)} presses; they take about {duration(seconds)}, --widths sets how many")
     cases: list[Case] = []
     for done, (name, variant) in enumerate(variants, start=1):
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
