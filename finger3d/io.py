@@ -12,9 +12,7 @@ import math
 import os
 import secrets
 import time
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -145,22 +143,6 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
         lock.release()
 
 
-_DAMAGED = (
-    ValueError,
-    TypeError,
-    KeyError,
-    AttributeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    RuntimeError,
-    SyntaxError,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
-
 _CHECKSUM = "checksum"
 """Name of the array of an .npz file with the SHA-256 of all others."""
 
@@ -185,7 +167,9 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
             raise ValueError(f"it expands to {expanded / 1e6:.0f} MB")
         with np.load(path, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
-    except _DAMAGED as error:
+    except OSError:
+        raise
+    except Exception as error:
         raise ValueError(f"no .npz file, or damaged: {error}") from error
 
 
@@ -222,9 +206,6 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     columns : name (with its unit) -> (n,) numbers, or texts; all of one length
     """
     arrays = [np.asarray(column) for column in columns.values()]
-    shapes = {a.shape for a in arrays}
-    if len(shapes) > 1 or any(len(s) != 1 for s in shapes):
-        raise ValueError(f"columns of {path} differ in shape: { {k: np.shape(v) for k, v in columns.items()} }")
     with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)

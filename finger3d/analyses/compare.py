@@ -492,12 +492,7 @@ def _check(model: Model, widths: Sequence[float]) -> None:
 
 def _variants(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
     """Yield the name and the model of every case; solid and sections of one width have the same in-plane mesh."""
-    strain, stress = section_of(model, "plane-strain"), section_of(model, "plane-stress")
-    yield "plane strain", strain
-    yield "plane stress", stress
-    yield "solid", model
-    for width in widths:
-        wide = widened(model, width)
+    for wide in (model, *(widened(model, width) for width in widths)):
         yield "plane strain", section_of(wide, "plane-strain")
         yield "plane stress", section_of(wide, "plane-stress")
         yield "solid", wide

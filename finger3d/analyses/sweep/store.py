@@ -13,9 +13,8 @@ from typing import cast
 from finger3d import _extras
 from finger3d._cost import duration
 from finger3d._types import Tree
-from finger3d.analyses.sweep.labels import FILE, PARTS, SAMPLE, store_part, write_labels
+from finger3d.analyses.sweep.labels import SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
-from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
 from finger3d.mechanics.postprocess.labels import Sample
 from finger3d.progress import Progress
@@ -69,15 +68,13 @@ class ResultStore:
 
         Raises
         ------
-        MissingError
+        Finger3dError
             If it cannot be written.
         """
         if SAMPLE in row:
-            with self.room(PARTS):
-                store_part(self.folder, _number_of(row), cast(Sample, row[SAMPLE]))
+            store_part(self.folder, _number_of(row), cast(Sample, row[SAMPLE]))
             row = {name: value for name, value in row.items() if name != SAMPLE}
-        with self.room(JOURNAL):
-            self._journal.append(row)
+        self._journal.append(row)
         self.rows[_number_of(row)] = row
         self.lost.pop(_number_of(row), None)
 
@@ -98,26 +95,23 @@ class ResultStore:
 
         Raises
         ------
-        MissingError
+        Finger3dError
             If they cannot be written.
         """
         columns = self.columns()
         if not columns["point"]:
             return
-        with self.room(CSV):
-            write_csv(self.folder / CSV, columns)
+        write_csv(self.folder / CSV, columns)
         if grid := [(key, marker) for key, spec in self.sweep.bodies.items() for marker in spec.grid]:
             places = {axis: [getattr(marker, axis) for _, marker in grid] for axis in ("x_mm", "y_mm", "z_mm")}
-            with self.room(GRID):
-                names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
-                write_csv(self.folder / GRID, {**names, **places})
-        with self.room(FILE):
-            write_labels(self.folder, self.sweep, self.rows, columns)
+            names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
+            write_csv(self.folder / GRID, {**names, **places})
+        write_labels(self.folder, self.sweep, self.rows, columns)
         if _extras.available("pyarrow"):
             import pyarrow as pa
             import pyarrow.parquet as pq
 
-            with self.room(PARQUET), atomic(self.folder / PARQUET) as temporary:
+            with atomic(self.folder / PARQUET) as temporary:
                 pq.write_table(pa.table(columns), temporary)
 
     def columns(self) -> dict[str, Column]:
@@ -148,18 +142,6 @@ class ResultStore:
     def said(self) -> str:
         """Return how many points are kept, and where."""
         return f"{len(self.rows)} of {len(self.sweep.points)} points are kept in {self.folder}"
-
-    @contextmanager
-    def room(self, name: str) -> Iterator[None]:
-        """Convert errors while the block writes a file into a MissingError that states how many points are kept."""
-        try:
-            yield
-        except (OSError, Finger3dError) as error:
-            cause = error.__cause__ or error
-            reason = (isinstance(cause, OSError) and cause.strerror) or str(cause)
-            raise MissingError(
-                f"cannot write {self.folder / name}: {reason}; {self.said()}; make room and run the same command again"
-            ) from None
 
 
 def _number_of(row: Row) -> int:
