@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from finger3d._types import Float, Int, freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
@@ -124,9 +124,6 @@ class ObjectElements:
     kind: str
     elements: Int
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
 
 @dataclass(frozen=True)
 class DeckStep:
@@ -140,9 +137,6 @@ class DeckStep:
 
     motion: Float
     increments: int
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
 
 
 @dataclass(frozen=True)
@@ -195,23 +189,17 @@ class Deck:
         """Return the input deck."""
         lines = [f"** {remark}" for remark in self.remarks]
         lines += [*self._nodes(), *self._elements(), *self._materials(), *self._surfaces(), "*BOUNDARY", *self._held()]
-        now = self._moved(np.zeros(3))
         for step in self.steps:
-            now = self._moved(step.motion)
-            lines += self._step(step, now)
+            lines += self._step(step)
         return "\n".join(lines) + "\n"
-
-    @property
-    def _dim(self) -> int:
-        return self.mesh.dim
 
     def _nodes(self) -> list[str]:
         points = self.mesh.points
-        at = points if self._dim == 3 else np.column_stack([points, np.zeros(len(points))])
+        at = points if self.mesh.dim == 3 else np.column_stack([points, np.zeros(len(points))])
         return ["*NODE, NSET=NALL", *_rows(at, 1), f"*NODE, NSET={OBJECT}", *_rows(self.object.nodes, len(points) + 1)]
 
     def _elements(self) -> list[str]:
-        kind = "C3D10" if self._dim == 3 else "CPS6" if self.plane_stress else "CPE6"
+        kind = "C3D10" if self.mesh.dim == 3 else "CPS6" if self.plane_stress else "CPE6"
         part = np.zeros(len(self.mesh.cells), dtype=np.int64) if self.mesh.part is None else self.mesh.part
         lines = []
         for k in range(len(self.laws)):
@@ -227,7 +215,7 @@ class Deck:
         ]
 
     def _materials(self) -> list[str]:
-        section = [f"{self.thickness_mm:.12g}"] if self._dim == 2 else []
+        section = [f"{self.thickness_mm:.12g}"] if self.mesh.dim == 2 else []
         part = {0} if self.mesh.part is None else set(np.unique(self.mesh.part).tolist())
         lines = []
         for k, cards in enumerate(self.laws):
@@ -269,10 +257,10 @@ class Deck:
             for k, value in enumerate(row, start=1)
         ]
 
-    def _step(self, step: DeckStep, moved: list[str]) -> list[str]:
+    def _step(self, step: DeckStep) -> list[str]:
         share = 1.0 / step.increments
         lines = [f"*STEP, INC={1000 + 10 * step.increments}" + ", NLGEOM" * self.finite]
-        lines += ["*STATIC", f"{share:.12g}, 1., 1e-5, {share:.12g}", "*BOUNDARY", *moved]
+        lines += ["*STATIC", f"{share:.12g}, 1., 1e-5, {share:.12g}", "*BOUNDARY", *self._moved(step.motion)]
         lines += [f"*NODE PRINT, NSET={OBJECT}, FREQUENCY=1, TOTALS=ONLY", "RF"]
         if self.fields:
             lines += ["*NODE FILE", "U", "*EL FILE", "S, E", "*CONTACT FILE", "CDIS, CSTR"]

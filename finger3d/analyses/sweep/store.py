@@ -15,6 +15,7 @@ from finger3d._cost import duration
 from finger3d._types import Tree
 from finger3d.analyses.sweep.labels import SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
+from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
 from finger3d.mechanics.postprocess.labels import Sample
 from finger3d.progress import Progress
@@ -55,13 +56,18 @@ class ResultStore:
         Finger3dError
             If another sweep is in the folder, another finger3d is writing there, or its files are damaged.
         MissingError
-            If the folder cannot be written.
+            If a file cannot be written while it is held; the line says how many points are kept.
         """
         path, task = self.folder / JOURNAL, self.folder / TASK
         with claimed(self.folder, "sweep"), opened(path, task, self.sweep.identity(), _difference) as j:
             self._journal: Journal = j
             self.rows = {_number_of(row): row for row in j.rows}
-            yield self
+            try:
+                yield self
+            except Finger3dError as error:
+                if not isinstance(error.__cause__, OSError):
+                    raise
+                raise MissingError(f"{error}; {self.said()}") from None
 
     def add(self, row: Row) -> None:
         """Keep the row of a finished point.
