@@ -30,7 +30,6 @@ from finger3d.mechanics.discretise.build import mesh_part
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
-from finger3d.meshing.limits import MeshReport
 from finger3d.objects import (
     Cylinder,
     MeshObject,
@@ -171,6 +170,8 @@ class Deck:
     plane_stress, thickness_mm : of a section
     remarks : comments at the head
     fields : whether displacements, strains, stresses and contact are written for a postprocessor
+    multiple : forces on the whole finger over those on the part, for components along no mirrored axis
+    notes : differences between the deck and the press, a line each
     """
 
     mesh: Mesh
@@ -184,6 +185,8 @@ class Deck:
     thickness_mm: float = 1.0
     remarks: tuple[str, ...] = ()
     fields: bool = False
+    multiple: float = 1.0
+    notes: tuple[str, ...] = ()
 
     def text(self) -> str:
         """Return the input deck."""
@@ -496,25 +499,7 @@ _EFFECTS = {
 """Slots of a model that have no equivalent in a deck, and the effects that fill them."""
 
 
-@dataclass(frozen=True)
-class PressDeck:
-    """An input deck, the report on its mesh, and remarks.
-
-    Attributes
-    ----------
-    deck : of the meshed part
-    report : size and quality of the mesh
-    multiple : forces on the whole finger over those on the part, for components along no mirrored axis
-    remarks : differences between the deck and the press, a line each
-    """
-
-    deck: Deck
-    report: MeshReport
-    multiple: float
-    remarks: tuple[str, ...]
-
-
-def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> PressDeck:
+def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Deck:
     """Mesh a model as a press does, and return it as a deck.
 
     Raises
@@ -524,8 +509,7 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
     """
     _check(model)
     contact, axes = model.first_contact, symmetry(model)
-    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
-    finite = model.finite_strain
+    mesh, _ = mesh_part(model, contact.contact_box, axes, report)
     law = _law(model)
     laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
     touch = contact.first_contact_mm
@@ -540,14 +524,14 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
     )
     thickness = _SLICE * model.design.height_mm if model.domain == "plane-stress" else model.design.width_mm
     multiple = 2.0 ** len(axes) * (model.design.width_mm / thickness if mesh.dim == 2 else 1.0)
-    deck = Deck(
+    return Deck(
         mesh=mesh,
         laws=laws,
         object=elements,
         steps=steps,
         contact=Contact(penalty, STICK_SHARE * penalty, model.friction.mu, FREE_FACES),
         axes=axes,
-        finite=finite,
+        finite=model.finite_strain,
         plane_stress=model.domain == "plane-stress",
         thickness_mm=thickness,
         remarks=tuple(
@@ -555,8 +539,9 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
             for line in (*_head(title, axes, multiple), *_remarks(model))
         ),
         fields=True,
+        multiple=multiple,
+        notes=_remarks(model),
     )
-    return PressDeck(deck, mesh_report, multiple, _remarks(model))
 
 
 def _check(model: Model) -> None:
@@ -733,9 +718,8 @@ def export_deck(
     out, report = Path(out), report or Progress()
     scene, _ = settled(scene_of(scene, overrides), report)
     report.stage("meshing")
-    made = press_deck(scene.model(), scene.title, report)
+    deck = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
     with claimed(out):
-        write_text(out / DECK_FILE, made.deck.text())
-    mesh = made.deck.mesh
-    return ModelFiles((out / DECK_FILE,), len(mesh.points), len(mesh.cells), made.multiple, made.remarks)
+        write_text(out / DECK_FILE, deck.text())
+    return ModelFiles((out / DECK_FILE,), len(deck.mesh.points), len(deck.mesh.cells), deck.multiple, deck.notes)
