@@ -439,7 +439,8 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
         cases.append(_press(name, variant, model))
         report.step(done, len(variants), _remark(cases[-1]))
-        comparison = _compared(model, cases, folder)
+        table = numbers_table(cases, model.design.width_mm)
+        comparison = Comparison(tuple(cases), tuple(_verdict(model, cases)), tuple(table), folder)
         _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
     from finger3d.plotting.analyses import draw_comparison
     from finger3d.report.analyses import compare_page
@@ -514,11 +515,6 @@ def _remark(case: Case) -> str:
         return f"{case.model}, {case.width_mm:g} mm wide: {case.outcome}"
     force = case.numbers["force_N_per_mm"]
     return f"{case.model}, {case.width_mm:g} mm wide, edges of {case.size_mm:.3g} mm: {force:.4g} N per mm"
-
-
-def _compared(model: Model, cases: Sequence[Case], folder: Path) -> Comparison:
-    table = numbers_table(cases, model.design.width_mm)
-    return Comparison(tuple(cases), tuple(_verdict(model, cases)), tuple(table), folder)
 
 
 def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:

@@ -361,18 +361,16 @@ class ResultWriter:
         if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._seconds):
             self.progress(record)
 
-    def summary(self, record: PressRecord, outcome: str) -> Tree:
-        """Write summary.json and return its content."""
+    def summary(self, record: PressRecord, outcome: str) -> None:
+        """Write summary.json."""
         begin = time.perf_counter()
-        content = record.summary(outcome)
-        write_json(self.folder / _SUMMARY, content)
+        write_json(self.folder / _SUMMARY, record.summary(outcome))
         if self._scene:
             write_text(self.folder / _SCENE, self._scene)
             for name in _FILES if self._replaces else ():
                 (self.folder / name).unlink(missing_ok=True)
             self._scene, self._replaces = "", False
         record.seconds["output"] += time.perf_counter() - begin
-        return content
 
     def markers(self, record: PressRecord) -> None:
         """Write markers.csv, if there are markers, with their errors as far as they are known."""

@@ -150,7 +150,7 @@ def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
 
     solids = sorted((c for c in cases if c.model == "solid"), key=lambda c: c.width_mm)
     for case in own:
-        if case.is_section:
+        if case.model != "solid":
             value, error = case.numbers[FORCE], case.errors.get(FORCE, 0.0)
             axes.axhspan(value - error, value + error, color=_COLOURS[case.model], alpha=0.15, lw=0)
             axes.axhline(value, color=_COLOURS[case.model], ls="--", lw=1.2, label=case.model)
