@@ -121,7 +121,7 @@ def presses(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
         yield from _together(problem, mus)
         return
 
-    def pressed(mu: float, before: object, workspace: Workspace, cancel: Event) -> PressAtMu:
+    def pressed(mu: float, workspace: Workspace, cancel: Event) -> PressAtMu:
         return press(problem, mu, workspace, cancel)
 
     yield from map_parallel(problem, pressed, mus)
@@ -426,7 +426,7 @@ class SharedBody(PressedBody):
                     yield left.popleft(), result
 
     def _march(
-        self, variant: Variant, before: object, workspace: Workspace, cancel: Event
+        self, variant: Variant, workspace: Workspace, cancel: Event
     ) -> tuple[Problem, tuple[StepResult, ...] | Exception, float]:
         """Return the problem of a variant, its increments, or why they failed, and the seconds that they took."""
         start, problem = time.perf_counter(), self.problem
