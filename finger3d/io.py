@@ -151,14 +151,14 @@ _MOST_EXPANSION = 100
 
 
 def read_arrays(path: str | Path) -> dict[str, Array]:
-    """Read all arrays of an .npz file.
+    """Read the arrays that `write_arrays` wrote.
 
     Raises
     ------
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     ValueError
-        If it is damaged.
+        If it is damaged, or was altered.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -166,11 +166,14 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
         if expanded > _MOST_EXPANSION * os.path.getsize(path):
             raise ValueError(f"it expands to {expanded / 1e6:.0f} MB")
         with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            arrays = {name: stored[name] for name in stored.files}
     except OSError:
         raise
     except Exception as error:
         raise ValueError(f"no .npz file, or damaged: {error}") from error
+    if not np.array_equal(arrays.pop(_CHECKSUM, np.zeros(0)), _checksum_of(arrays)):
+        raise ValueError("it was altered after it was written")
+    return arrays
 
 
 def text_of(content: bytes) -> str:
@@ -226,13 +229,6 @@ def write_arrays(path: str | Path, arrays: Mapping[str, Array]) -> None:
     """Write arrays and their checksum as an .npz file, whole or not at all."""
     with atomic(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **{**arrays, _CHECKSUM: _checksum_of(arrays)})
-
-
-def check_arrays(arrays: Mapping[str, Array]) -> None:
-    """Raise ValueError unless arrays are those that `write_arrays` wrote, their checksum among them."""
-    own = {name: values for name, values in arrays.items() if name != _CHECKSUM}
-    if not np.array_equal(arrays.get(_CHECKSUM, np.zeros(0)), _checksum_of(own)):
-        raise ValueError("it was altered after it was written")
 
 
 def _checksum_of(arrays: Mapping[str, Array]) -> Array:
