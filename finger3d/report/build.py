@@ -101,7 +101,7 @@ def _known(values: Sequence[float]) -> list[float | None]:
 _TABLES = ("finger", "material", "object", "friction", "press", "grip", "contact", "model", "mesh")
 
 
-def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
+def how_modelled(summary: TreeView, folder: Path) -> list[Part]:
     """Return the scene as a table, with the active effects, and the text of scene.toml.
 
     Parameters
@@ -109,16 +109,14 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     summary : JSON object with the key ``scene``
     folder : results folder
     """
-    scene = _mapping(summary["scene"])
+    scene = summary["scene"]
     rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
-    rows += _modulus("", scene.get("material"))
-    for part, settings in _mapping(scene.get("parts")).items():
+    rows += _modulus("", scene.get("material", {}))
+    for part, settings in scene.get("parts", {}).items():
         rows += [(f"part {part}", _settings(settings)), *_modulus(f" of {part}", settings)]
-    gauges = scene.get("gauge")
-    for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
+    for gauge in scene.get("gauge", ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
-    named = _mapping(scene.get("effects")).items()
-    effects = {name: settings for name, settings in named if isinstance(settings, Mapping)}
+    effects = {name: table for name, table in scene.get("effects", {}).items() if isinstance(table, Mapping)}
     rows += [(f"effect {name}", _settings(settings) or "on") for name, settings in effects.items()]
     parts: list[Part] = [Table(("", "settings, with defaults"), rows)]
     if not effects:
@@ -131,17 +129,12 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     return parts
 
 
-def _modulus(of: str, table: object) -> list[tuple[str, str]]:
+def _modulus(of: str, table: TreeView) -> list[tuple[str, str]]:
     """Return the row of a Young's modulus that follows from a hardness or a silicone, with its spread and origin."""
-    E, spread, origin = (_mapping(table).get(key) for key in ("E_MPa", "E_spread", "E_origin"))
-    if not (isinstance(E, float) and isinstance(spread, float) and origin):
+    E, spread, origin = (table.get(key) for key in ("E_MPa", "E_spread", "E_origin"))
+    if spread is None or not origin:
         return []
     return [(f"Young's modulus{of}", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    """Return a JSON object, empty if it is missing."""
-    return value if isinstance(value, Mapping) else {}
 
 
 def _settings(settings: object) -> str:

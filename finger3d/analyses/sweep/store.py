@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 from finger3d import _extras
 from finger3d._cost import duration
@@ -17,7 +16,6 @@ from finger3d.analyses.sweep.labels import SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
-from finger3d.mechanics.postprocess.labels import Sample
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal, Row, journal_rows, number_in, opened
 from finger3d.results.summary import PressStep
@@ -61,7 +59,7 @@ class ResultStore:
         path, task = self.folder / JOURNAL, self.folder / TASK
         with claimed(self.folder, "sweep"), opened(path, task, self.sweep.identity(), _difference) as j:
             self._journal: Journal = j
-            self.rows = {_number_of(row): row for row in j.rows}
+            self.rows = {row["point"]: row for row in j.rows}
             try:
                 yield self
             except Finger3dError as error:
@@ -78,15 +76,15 @@ class ResultStore:
             If it cannot be written.
         """
         if SAMPLE in row:
-            store_part(self.folder, _number_of(row), cast(Sample, row[SAMPLE]))
+            store_part(self.folder, row["point"], row[SAMPLE])
             row = {name: value for name, value in row.items() if name != SAMPLE}
         self._journal.append(row)
-        self.rows[_number_of(row)] = row
-        self.lost.pop(_number_of(row), None)
+        self.rows[row["point"]] = row
+        self.lost.pop(row["point"], None)
 
     def reload(self) -> None:
         """Read the rows from the journal: an interruption may fall between writing a row and its entry in `rows`."""
-        self.rows = {_number_of(row): row for row, _ in journal_rows(self._journal.path, self._journal.task)}
+        self.rows = {row["point"]: row for row, _ in journal_rows(self._journal.path, self._journal.task)}
 
     def lose(self, point: Point, reason: str) -> None:
         """Note why a point has no numbers."""
@@ -123,7 +121,7 @@ class ResultStore:
     def columns(self) -> dict[str, Column]:
         """Return the table by column: point, varied keys, numbers of the last step, readings, outcome and times."""
         rows = [row for _, row in sorted((self.rows | self.lost).items())]
-        points = [self.sweep.points[_number_of(row)] for row in rows]
+        points = [self.sweep.points[row["point"]] for row in rows]
         names = list(dict.fromkeys(name for row in rows for name in row if name not in ("point", *_LAST)))
         names.sort(key=lambda name: name not in PressStep.__dataclass_fields__)  # readings follow the other numbers
         found: dict[str, Column] = {"point": [point.number for point in points]}
@@ -148,12 +146,6 @@ class ResultStore:
     def said(self) -> str:
         """Return how many points are kept, and where."""
         return f"{len(self.rows)} of {len(self.sweep.points)} points are kept in {self.folder}"
-
-
-def _number_of(row: Row) -> int:
-    number = row["point"]
-    assert isinstance(number, int)
-    return number
 
 
 def _alike(values: Sequence[object]) -> Column:
