@@ -12,9 +12,7 @@ import math
 import os
 import secrets
 import time
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -145,22 +143,6 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
         lock.release()
 
 
-_DAMAGED = (
-    ValueError,
-    TypeError,
-    KeyError,
-    AttributeError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    RuntimeError,
-    SyntaxError,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
-
 _CHECKSUM = "checksum"
 """Name of the array of an .npz file with the SHA-256 of all others."""
 
@@ -169,14 +151,14 @@ _MOST_EXPANSION = 100
 
 
 def read_arrays(path: str | Path) -> dict[str, Array]:
-    """Read all arrays of an .npz file.
+    """Read the arrays that `write_arrays` wrote.
 
     Raises
     ------
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     ValueError
-        If it is damaged.
+        If it is damaged, or was altered.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -184,9 +166,14 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
         if expanded > _MOST_EXPANSION * os.path.getsize(path):
             raise ValueError(f"it expands to {expanded / 1e6:.0f} MB")
         with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except _DAMAGED as error:
+            arrays = {name: stored[name] for name in stored.files}
+    except OSError:
+        raise
+    except Exception as error:
         raise ValueError(f"no .npz file, or damaged: {error}") from error
+    if not np.array_equal(arrays.pop(_CHECKSUM, np.zeros(0)), _checksum_of(arrays)):
+        raise ValueError("it was altered after it was written")
+    return arrays
 
 
 def text_of(content: bytes) -> str:
@@ -222,9 +209,6 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     columns : name (with its unit) -> (n,) numbers, or texts; all of one length
     """
     arrays = [np.asarray(column) for column in columns.values()]
-    shapes = {a.shape for a in arrays}
-    if len(shapes) > 1 or any(len(s) != 1 for s in shapes):
-        raise ValueError(f"columns of {path} differ in shape: { {k: np.shape(v) for k, v in columns.items()} }")
     with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
@@ -245,13 +229,6 @@ def write_arrays(path: str | Path, arrays: Mapping[str, Array]) -> None:
     """Write arrays and their checksum as an .npz file, whole or not at all."""
     with atomic(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **{**arrays, _CHECKSUM: _checksum_of(arrays)})
-
-
-def check_arrays(arrays: Mapping[str, Array]) -> None:
-    """Raise ValueError unless arrays are those that `write_arrays` wrote, their checksum among them."""
-    own = {name: values for name, values in arrays.items() if name != _CHECKSUM}
-    if not np.array_equal(arrays.get(_CHECKSUM, np.zeros(0)), _checksum_of(own)):
-        raise ValueError("it was altered after it was written")
 
 
 def _checksum_of(arrays: Mapping[str, Array]) -> Array:

@@ -314,13 +314,13 @@ def scene(**tables: Any):
 def test_the_deck_of_a_symmetric_press_is_a_quarter() -> None:
     made = press_deck(scene().model(), "Würfel")
     assert made.multiple == 4.0
-    assert made.deck.axes == ("x", "z")
-    assert made.remarks == ()
-    assert [step.increments for step in made.deck.steps] == [4]
-    np.testing.assert_allclose(made.deck.steps[0].motion, [0.0, -1.0, 0.0], atol=1e-12)
-    assert made.deck.contact.penalty == pytest.approx(200.0 * 2.0 / 1.0)
-    assert made.deck.object.nodes[:, 1].min() == pytest.approx(8.0)
-    text = made.deck.text()
+    assert made.axes == ("x", "z")
+    assert made.notes == ()
+    assert [step.increments for step in made.steps] == [4]
+    np.testing.assert_allclose(made.steps[0].motion, [0.0, -1.0, 0.0], atol=1e-12)
+    assert made.contact.penalty == pytest.approx(200.0 * 2.0 / 1.0)
+    assert made.object.nodes[:, 1].min() == pytest.approx(8.0)
+    text = made.text()
     assert text.isascii()
     assert " 4 times " in text
     assert "2, 0.4" in text
@@ -334,22 +334,22 @@ def test_every_leg_is_a_step_and_every_increment_of_one_that_turns() -> None:
         {"depth_mm": 0.5, "slide_x_mm": 0.5, "turn_y_deg": 5.0},
     ]
     made = press_deck(scene(press={"leg": legs}).model())
-    assert [step.increments for step in made.deck.steps] == [4, 3, 1, 1, 10]
-    assert [step.motion.ndim for step in made.deck.steps] == [1, 1, 2, 2, 2]
-    np.testing.assert_allclose(made.deck.steps[1].motion, [0.5, -1.0, 0.0], atol=1e-12)
+    assert [step.increments for step in made.steps] == [4, 3, 1, 1, 10]
+    assert [step.motion.ndim for step in made.steps] == [1, 1, 2, 2, 2]
+    np.testing.assert_allclose(made.steps[1].motion, [0.5, -1.0, 0.0], atol=1e-12)
     assert made.multiple == 1.0
-    (remark,) = made.remarks
+    (remark,) = made.notes
     assert remark.startswith('steps = "auto": 10 increments ')
 
 
 def test_a_section_has_its_thickness() -> None:
     strain, stress = (press_deck(scene(model={"domain": f"plane-{kind}"}).model()) for kind in ("strain", "stress"))
-    assert (strain.multiple, strain.deck.thickness_mm) == (2.0, 6.0)
+    assert (strain.multiple, strain.thickness_mm) == (2.0, 6.0)
     # a thin slice of a section in plane stress
-    assert stress.deck.thickness_mm < 0.01
-    assert stress.multiple * stress.deck.thickness_mm == pytest.approx(2.0 * 6.0)
-    assert "CPS6" in stress.deck.text()
-    assert "CPE6" in strain.deck.text()
+    assert stress.thickness_mm < 0.01
+    assert stress.multiple * stress.thickness_mm == pytest.approx(2.0 * 6.0)
+    assert "CPS6" in stress.text()
+    assert "CPE6" in strain.text()
 
 
 @pytest.mark.parametrize(
@@ -381,6 +381,6 @@ def test_what_calculix_lacks_is_refused_by_name(tables: dict[str, Any], told: st
 
 def test_nearly_incompressible_materials_are_told() -> None:
     made = press_deck(scene(material={"E_MPa": 1.0, "nu": 0.49}).model())
-    (remark,) = made.remarks
+    (remark,) = made.notes
     assert remark.startswith("nu ")
     assert "C3D10" in remark

@@ -20,7 +20,7 @@ from finger3d.effects.kinetic_friction import Effect as Kinetic
 from finger3d.effects.large_deformation import Effect as Large
 from finger3d.effects.viscosity import Effect as Viscous
 from finger3d.errors import Finger3dError
-from finger3d.io import read_arrays
+from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.march.solve import march
@@ -122,6 +122,12 @@ def test_files_that_are_none_or_were_altered_are_one_line(tmp_path: Path) -> Non
     def headed(**changes: Any) -> bytes:
         return file(header=np.frombuffer(json.dumps({**header, **changes}).encode(), dtype=np.uint8))
 
+    def sealed(**changes: Any) -> bytes:
+        text = json.dumps({**header, **changes}).encode()
+        others = {name: a for name, a in arrays.items() if name != "checksum"}
+        write_arrays(tmp_path / "sealed.npz", {**others, "header": np.frombuffer(text, dtype=np.uint8)})
+        return (tmp_path / "sealed.npz").read_bytes()
+
     single = io.BytesIO()
     np.save(single, np.zeros(3))
     turned = bytearray(data)
@@ -129,9 +135,9 @@ def test_files_that_are_none_or_were_altered_are_one_line(tmp_path: Path) -> Non
     cases = [
         ("cut short", data[: len(data) // 2]),
         ("no reduced model", b"hello"),
-        ("version 8", headed(version=8)),
-        ("; `finger3d calibrate` writes one", headed(format="a cake")),
-        ("parts of the reduced model are missing", file("compliance")),
+        ("version 8", sealed(version=8)),
+        ("; `finger3d calibrate` writes one", sealed(format="a cake")),
+        ("damaged", file("compliance")),
         ("reduced model, or cut", single.getvalue()),
         ("no reduced model, or cut short", bytes(turned)),
         ("damaged", headed(legs=[{**header["legs"][0], "force_N": -1}])),

@@ -339,27 +339,26 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(name, paper_scene, tmp_p
     sweep = points_of(paper_scene, "friction.mu=0.06,1")
     rows = pressed_here(sweep)
     kept = ResultStore(sweep, tmp_path)
-    with kept.open():
-        kept.add(rows[0])
-        if name == "results.parquet":
-            real = os.replace
+    real = os.replace
 
-            def full(source: object, target: object) -> None:
-                if str(target).endswith(".parquet"):
-                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                real(source, target)
+    def full(source: object, target: object) -> None:
+        if str(target).endswith(".parquet"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(source, target)
 
-            monkeypatch.setattr(os, "replace", full)
-            act = kept.write
-        else:
+    def fill() -> None:
+        with kept.open():
+            kept.add(rows[0])
+            if name == "results.parquet":
+                monkeypatch.setattr(os, "replace", full)
+                kept.write()
+            else:
+                kept._journal.close()
+                kept._journal._file = open("/dev/full", "ab", buffering=0)
+                kept.add(rows[1])
 
-            def append(journal: Journal, row: Row) -> None:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-            monkeypatch.setattr(Journal, "append", append)
-            act = lambda: kept.add(rows[1])  # noqa: E731
-        with pytest.raises(MissingError, match=r"; 1 of 2 points") as told:
-            act()
+    with pytest.raises(MissingError, match=r"; 1 of 2 points") as told:
+        fill()
     assert name in str(told.value)
     with ResultStore(sweep, tmp_path).open() as again:
         assert again.left() == [sweep.points[1]]

@@ -101,7 +101,7 @@ def sweep(path: Path) -> None:
 def search(path: Path) -> None:
     places = np.random.default_rng(0).random((30, 3))
     values = [-1000.0 * a if b > 0.2 else np.nan for a, b, _ in places]
-    draw_search(path, ["finger.radius_mm", "gauge.g36.x_mm", "gauge.g36.angle_deg"], places, values, places[0], "best")
+    draw_search(path, ["finger.radius_mm", "gauge.g36.x_mm", "gauge.g36.angle_deg"], places, values, places[0])
 
 
 @pytest.mark.parametrize(
@@ -355,7 +355,7 @@ def test_residuals_are_shown_in_standard_deviations(tmp_path: Path, figures: lis
 
 def test_the_best_so_far_never_falls_and_failed_designs_are_left_out(tmp_path: Path, figures: list[Any]) -> None:
     places, values = [[1.0], [2.0], [3.0], [4.0]], [5.0, float("nan"), 7.0, 6.0]
-    draw_search(tmp_path / "a.png", ["gauge.g.x_mm"], places, values, places[0], "sensitivity")
+    draw_search(tmp_path / "a.png", ["gauge.g.x_mm"], places, values, places[0])
     convergence, key = figures[0].axes[:2]
     designs, best = convergence.get_lines()
     assert [*designs.get_xdata()] == [1, 3, 4]

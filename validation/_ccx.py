@@ -108,7 +108,7 @@ def run(model: Model, contact: Contact, limit_s: float) -> Answer:
         Not within the limit.
     """
     made = press_deck(model)
-    text = replace(made.deck, contact=contact, fields=False).text()
+    text = replace(made, contact=contact, fields=False).text()
     with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as name:
         folder = Path(name)
         (folder / "press.inp").write_text(text, encoding="ascii")
@@ -122,6 +122,6 @@ def run(model: Model, contact: Contact, limit_s: float) -> Answer:
             raise ArithmeticError(f"ccx ended with {status}: {' '.join(log.split()[-20:])}")
         history = [line.split() for line in (folder / "press.sta").read_text(encoding="ascii").splitlines()[2:]]
         times, forces = printed_forces(folder / "press.dat")
-    ends = [int((times <= k + 1e-6).sum()) - 1 for k in range(1, len(made.deck.steps) + 1)]
+    ends = [int((times <= k + 1e-6).sum()) - 1 for k in range(1, len(made.steps) + 1)]
     whole = made.multiple * forces[ends] * [1.0, -1.0, 1.0]
     return Answer(whole, wall, cpu, peak, sum(int(h[3]) for h in history), len(history))

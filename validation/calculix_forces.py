@@ -83,7 +83,7 @@ def calculix(scene: Scene) -> float:
     made = press_deck(scene.model(), scene.title)
     with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
         path = Path(folder, "press.inp")
-        path.write_text(made.deck.text(), encoding="ascii")
+        path.write_text(made.text(), encoding="ascii")
         solve(path, LIMIT_S_DECKS)
         return -made.multiple * float(printed_forces(path.with_suffix(".dat"))[1][-1, 1])
 

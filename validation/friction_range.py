@@ -52,7 +52,7 @@ def press(mu: float) -> Model:
 
 def calculix_share(mu: float, stiffer: float) -> float:
     """Share of the press that CalculiX has done when it ends."""
-    deck = replace(press_deck(press(mu)).deck, fields=False)
+    deck = replace(press_deck(press(mu)), fields=False)
     contact = replace(deck.contact, stick=stiffer * deck.contact.stick)
     with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
         file = Path(folder) / "press.inp"
@@ -67,7 +67,7 @@ def calculix_share(mu: float, stiffer: float) -> float:
 
 def _felupe_share(mu: float, stiffer: float) -> float:
     model = press(mu)
-    return felupe_press(model, press_deck(model).deck.mesh, stiffer)[0]
+    return felupe_press(model, press_deck(model).mesh, stiffer)[0]
 
 
 def run(quick: bool) -> Result:

@@ -61,7 +61,8 @@ base_size_mm = 3.2
 comparison = finger3d.compare(
     "finger.toml", "out/compare", widths=[4.0, 24.0]
 )
-comparison
+print(*(" | ".join(row) for row in comparison.table), sep="\n")
+print(*comparison.verdict, sep="\n")
 
 # %% [markdown]
 # Plane strain holds the material between two rigid walls; a nearly incompressible finger that is free at its ends

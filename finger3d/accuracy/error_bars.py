@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Self
 
 import numpy as np
@@ -177,13 +177,7 @@ class ErrorBars:
 
     def as_dict(self) -> Tree:
         """Return the entries of summary.json."""
-        return {
-            "discretisation": dict(self.discretisation),
-            "steps": dict(self.steps),
-            "modulus": dict(self.modulus),
-            "method": self.method,
-            "seconds": self.seconds,
-        }
+        return {own.name: getattr(self, own.name) for own in fields(ErrorBars)}
 
 
 def with_error(value: float, error: float | None = None, digits: int = 5, sign: str = "±") -> str:

@@ -235,12 +235,12 @@ def estimate(
 def estimate_with_grid(
     problem: Problem,
     steps: Sequence[StepResult],
-    grid: MarkerGrid,
+    grid: MarkerGrid | None,
     report: Progress = QUIET,
     chosen: StepEstimate | None = None,
     companions: Companions = companion_presses,
 ) -> tuple[ErrorEstimate, dict[str, float]]:
-    """Estimate the errors of a press, and those of the displacements of a grid of markers.
+    """Estimate the errors of a press, and those of the displacements of a grid of markers, if there is one.
 
     Returns
     -------
@@ -248,25 +248,20 @@ def estimate_with_grid(
     markers : sums of the errors of mesh and increments by the keys of the columns, mm; empty without an estimate
     """
 
-    def moved(p: Problem, step: StepResult) -> dict[str, float]:
-        return by_key(MarkerGrid.at(p, grid.markers).readings(p, step))
+    if grid is None or not steps or not steps[-1].outcome.ok:
+        return estimate(problem, steps, report, press_numbers, chosen, companions), {}
+    own, markers = grid.readings(problem, steps[-1]), grid.markers
+    read, of_grid = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)], by_key(own)
 
     def both(p: Problem, step: StepResult) -> dict[str, float]:
-        return press_numbers(p, step) | moved(p, step)
-
-    if not steps or not steps[-1].outcome.ok:
-        return estimate(problem, steps, report, press_numbers, chosen, companions), {}
-    own = grid.readings(problem, steps[-1])
-    read = [*steps[:-1], replace(steps[-1], readings=steps[-1].readings | own)]
-    found = estimate(problem, read, report, both, chosen, companions)
-    totals, of_grid = found.totals(), by_key(own)
+        return press_numbers(p, step) | by_key(MarkerGrid.at(p, markers).readings(p, step))
 
     def of_press(errors: Mapping[str, float]) -> dict[str, float]:
         return {name: error for name, error in errors.items() if name not in of_grid}
 
-    mesh, increments, beside = map(of_press, (found.discretisation, found.steps, found.companion_numbers))
-    found = replace(found, discretisation=mesh, steps=increments, companion_numbers=beside)
-    return found, {name: error for name, error in totals.items() if name in of_grid}
+    found = estimate(problem, read, report, both, chosen, companions)
+    errors = {name: error for name, error in found.totals().items() if name in of_grid}
+    return replace(found, discretisation=of_press(found.discretisation), steps=of_press(found.steps)), errors
 
 
 def _of_increments(

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from finger3d._types import Float, Int, freeze_arrays
+from finger3d._types import Float, Int
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws import IsochoricLaw, MooneyRivlin, NeoHooke, Ogden, Yeoh
@@ -30,7 +30,6 @@ from finger3d.mechanics.discretise.build import mesh_part
 from finger3d.mechanics.discretise.symmetry import symmetry
 from finger3d.mechanics.model import Leg, Model
 from finger3d.mechanics.path import AUTO_START
-from finger3d.meshing.limits import MeshReport
 from finger3d.objects import (
     Cylinder,
     MeshObject,
@@ -124,9 +123,6 @@ class ObjectElements:
     kind: str
     elements: Int
 
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-
 
 @dataclass(frozen=True)
 class DeckStep:
@@ -140,9 +136,6 @@ class DeckStep:
 
     motion: Float
     increments: int
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
 
 
 @dataclass(frozen=True)
@@ -177,6 +170,8 @@ class Deck:
     plane_stress, thickness_mm : of a section
     remarks : comments at the head
     fields : whether displacements, strains, stresses and contact are written for a postprocessor
+    multiple : forces on the whole finger over those on the part, for components along no mirrored axis
+    notes : differences between the deck and the press, a line each
     """
 
     mesh: Mesh
@@ -190,28 +185,24 @@ class Deck:
     thickness_mm: float = 1.0
     remarks: tuple[str, ...] = ()
     fields: bool = False
+    multiple: float = 1.0
+    notes: tuple[str, ...] = ()
 
     def text(self) -> str:
         """Return the input deck."""
         lines = [f"** {remark}" for remark in self.remarks]
         lines += [*self._nodes(), *self._elements(), *self._materials(), *self._surfaces(), "*BOUNDARY", *self._held()]
-        now = self._moved(np.zeros(3))
         for step in self.steps:
-            now = self._moved(step.motion)
-            lines += self._step(step, now)
+            lines += self._step(step)
         return "\n".join(lines) + "\n"
-
-    @property
-    def _dim(self) -> int:
-        return self.mesh.dim
 
     def _nodes(self) -> list[str]:
         points = self.mesh.points
-        at = points if self._dim == 3 else np.column_stack([points, np.zeros(len(points))])
+        at = points if self.mesh.dim == 3 else np.column_stack([points, np.zeros(len(points))])
         return ["*NODE, NSET=NALL", *_rows(at, 1), f"*NODE, NSET={OBJECT}", *_rows(self.object.nodes, len(points) + 1)]
 
     def _elements(self) -> list[str]:
-        kind = "C3D10" if self._dim == 3 else "CPS6" if self.plane_stress else "CPE6"
+        kind = "C3D10" if self.mesh.dim == 3 else "CPS6" if self.plane_stress else "CPE6"
         part = np.zeros(len(self.mesh.cells), dtype=np.int64) if self.mesh.part is None else self.mesh.part
         lines = []
         for k in range(len(self.laws)):
@@ -227,7 +218,7 @@ class Deck:
         ]
 
     def _materials(self) -> list[str]:
-        section = [f"{self.thickness_mm:.12g}"] if self._dim == 2 else []
+        section = [f"{self.thickness_mm:.12g}"] if self.mesh.dim == 2 else []
         part = {0} if self.mesh.part is None else set(np.unique(self.mesh.part).tolist())
         lines = []
         for k, cards in enumerate(self.laws):
@@ -269,10 +260,10 @@ class Deck:
             for k, value in enumerate(row, start=1)
         ]
 
-    def _step(self, step: DeckStep, moved: list[str]) -> list[str]:
+    def _step(self, step: DeckStep) -> list[str]:
         share = 1.0 / step.increments
         lines = [f"*STEP, INC={1000 + 10 * step.increments}" + ", NLGEOM" * self.finite]
-        lines += ["*STATIC", f"{share:.12g}, 1., 1e-5, {share:.12g}", "*BOUNDARY", *moved]
+        lines += ["*STATIC", f"{share:.12g}, 1., 1e-5, {share:.12g}", "*BOUNDARY", *self._moved(step.motion)]
         lines += [f"*NODE PRINT, NSET={OBJECT}, FREQUENCY=1, TOTALS=ONLY", "RF"]
         if self.fields:
             lines += ["*NODE FILE", "U", "*EL FILE", "S, E", "*CONTACT FILE", "CDIS, CSTR"]
@@ -508,25 +499,7 @@ _EFFECTS = {
 """Slots of a model that have no equivalent in a deck, and the effects that fill them."""
 
 
-@dataclass(frozen=True)
-class PressDeck:
-    """An input deck, the report on its mesh, and remarks.
-
-    Attributes
-    ----------
-    deck : of the meshed part
-    report : size and quality of the mesh
-    multiple : forces on the whole finger over those on the part, for components along no mirrored axis
-    remarks : differences between the deck and the press, a line each
-    """
-
-    deck: Deck
-    report: MeshReport
-    multiple: float
-    remarks: tuple[str, ...]
-
-
-def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> PressDeck:
+def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Deck:
     """Mesh a model as a press does, and return it as a deck.
 
     Raises
@@ -536,8 +509,7 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
     """
     _check(model)
     contact, axes = model.first_contact, symmetry(model)
-    mesh, mesh_report = mesh_part(model, contact.contact_box, axes, report)
-    finite = model.finite_strain
+    mesh, _ = mesh_part(model, contact.contact_box, axes, report)
     law = _law(model)
     laws = tuple(law_cards(material, law) for material in model.materials(mesh.part_labels))
     touch = contact.first_contact_mm
@@ -552,14 +524,14 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
     )
     thickness = _SLICE * model.design.height_mm if model.domain == "plane-stress" else model.design.width_mm
     multiple = 2.0 ** len(axes) * (model.design.width_mm / thickness if mesh.dim == 2 else 1.0)
-    deck = Deck(
+    return Deck(
         mesh=mesh,
         laws=laws,
         object=elements,
         steps=steps,
         contact=Contact(penalty, STICK_SHARE * penalty, model.friction.mu, FREE_FACES),
         axes=axes,
-        finite=finite,
+        finite=model.finite_strain,
         plane_stress=model.domain == "plane-stress",
         thickness_mm=thickness,
         remarks=tuple(
@@ -567,8 +539,9 @@ def press_deck(model: Model, title: str = "", report: Progress = QUIET) -> Press
             for line in (*_head(title, axes, multiple), *_remarks(model))
         ),
         fields=True,
+        multiple=multiple,
+        notes=_remarks(model),
     )
-    return PressDeck(deck, mesh_report, multiple, _remarks(model))
 
 
 def _check(model: Model) -> None:
@@ -745,9 +718,8 @@ def export_deck(
     out, report = Path(out), report or Progress()
     scene, _ = settled(scene_of(scene, overrides), report)
     report.stage("meshing")
-    made = press_deck(scene.model(), scene.title, report)
+    deck = press_deck(scene.model(), scene.title, report)
     report.stage("writing the deck")
     with claimed(out):
-        write_text(out / DECK_FILE, made.deck.text())
-    mesh = made.deck.mesh
-    return ModelFiles((out / DECK_FILE,), len(mesh.points), len(mesh.cells), made.multiple, made.remarks)
+        write_text(out / DECK_FILE, deck.text())
+    return ModelFiles((out / DECK_FILE,), len(deck.mesh.points), len(deck.mesh.cells), deck.multiple, deck.notes)

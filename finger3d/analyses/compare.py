@@ -382,18 +382,6 @@ class Comparison:
         """One line."""
         return f"<Comparison of {len(self.cases)} cases: {self.outcome}; {self.out}>"
 
-    def _repr_html_(self) -> str:
-        from finger3d._notebook import card
-        from finger3d.report.build import number
-        from finger3d.results.summary import FORCE
-
-        rows = [
-            (c.model, f"{c.width_mm:g}", number(c.numbers[FORCE], c.errors.get(FORCE)) if c.ok else str(c.outcome))
-            for c in self.cases
-        ]
-        said = f"{self.outcome}, {len(self.cases)} cases"
-        return card("2D against 3D", said, rows, self.verdict, head=("model", "width (mm)", "force per width (N/mm)"))
-
     @property
     def outcome(self) -> Outcome:
         """Outcome of the first case that did not converge, else CONVERGED."""
@@ -455,7 +443,8 @@ def _solve_and_write(solid: Scene, model: Model, widths: list[float], folder: Pa
         report.stage(f"{name}, {variant.design.width_mm:g} mm wide")
         cases.append(_press(name, variant, model))
         report.step(done, len(variants), _remark(cases[-1]))
-        comparison = _compared(model, cases, folder)
+        table = numbers_table(cases, model.design.width_mm)
+        comparison = Comparison(tuple(cases), tuple(_verdict(model, cases)), tuple(table), folder)
         _write(comparison, solid, model.design.height_mm, complete=done == len(variants))
     from finger3d.plotting.analyses import draw_comparison
     from finger3d.report.analyses import compare_page
@@ -508,12 +497,7 @@ def _check(model: Model, widths: Sequence[float]) -> None:
 
 def _variants(model: Model, widths: Sequence[float]) -> Iterator[tuple[str, Model]]:
     """Yield the name and the model of every case; solid and sections of one width have the same in-plane mesh."""
-    strain, stress = section_of(model, "plane-strain"), section_of(model, "plane-stress")
-    yield "plane strain", strain
-    yield "plane stress", stress
-    yield "solid", model
-    for width in widths:
-        wide = widened(model, width)
+    for wide in (model, *(widened(model, width) for width in widths)):
         yield "plane strain", section_of(wide, "plane-strain")
         yield "plane stress", section_of(wide, "plane-stress")
         yield "solid", wide
@@ -535,11 +519,6 @@ def _remark(case: Case) -> str:
         return f"{case.model}, {case.width_mm:g} mm wide: {case.outcome}"
     force = case.numbers["force_N_per_mm"]
     return f"{case.model}, {case.width_mm:g} mm wide, edges of {case.size_mm:.3g} mm: {force:.4g} N per mm"
-
-
-def _compared(model: Model, cases: Sequence[Case], folder: Path) -> Comparison:
-    table = numbers_table(cases, model.design.width_mm)
-    return Comparison(tuple(cases), tuple(_verdict(model, cases)), tuple(table), folder)
 
 
 def _verdict(model: Model, cases: Sequence[Case]) -> list[str]:

@@ -148,9 +148,7 @@ class Evaluation:
 
 def evaluation_of(row: Row) -> Evaluation:
     """Return the evaluation of a line of evaluations.jsonl."""
-    values = row["values"]
-    assert isinstance(values, list)
-    return Evaluation(tuple(values), number_in(row, "objective"), str(row["outcome"]))
+    return Evaluation(tuple(row["values"]), number_in(row, "objective"), row["outcome"])
 
 
 _GAUGE_BUDGET = 60  # evaluations of gauges on one body
@@ -469,7 +467,6 @@ def _write_result(search: Search, folder: Path) -> OptimisationResult:
         [e.values for e in known],
         [e.value for e in known],
         first.values,
-        "sensitivity",
     )
     optimise_page(folder).write(folder)
     return OptimisationResult(

@@ -298,17 +298,13 @@ def _recover(record: PressRecord, writer: ResultWriter, report: Progress) -> Sta
 
 def _estimate_errors(record: PressRecord, report: Progress, companions: CompanionThread) -> None:
     """Estimate the errors by mesh and increments."""
-    from finger3d.accuracy.estimate import estimate, estimate_with_grid, modulus_errors, press_numbers
+    from finger3d.accuracy.estimate import estimate_with_grid, modulus_errors, press_numbers
     from finger3d.scene.material import spreads
 
     report.stage("estimating the error")
-    grid, of_grid = record.marker_grid, dict[str, float]()
-    if grid is None:
-        found = estimate(record.problem, record.steps, report, press_numbers, record.step_estimate, companions.of)
-    else:
-        found, of_grid = estimate_with_grid(
-            record.problem, record.steps, grid, report, record.step_estimate, companions.of
-        )
+    found, of_grid = estimate_with_grid(
+        record.problem, record.steps, record.marker_grid, report, record.step_estimate, companions.of
+    )
     record.marker_errors = found.totals() | of_grid
     known = spreads(record.scene.tables) if record.steps and record.steps[-1].outcome.ok else {}
     by_modulus, why = modulus_errors(record.problem, record.converged_steps, known, press_numbers)

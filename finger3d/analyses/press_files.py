@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from finger3d._machine import peak_memory_MB, versions
-from finger3d._types import Array, Float, Tree, TreeView
+from finger3d._types import Array, Float, Tree
 from finger3d.contact.friction import OPEN, STICK
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh, axis_numbers, middles, unfold
@@ -350,7 +350,8 @@ class ResultWriter:
         begin = time.perf_counter()
         self.summary(record, outcome)
         if record.steps:
-            write_csv(self.folder / "history.csv", history_table(record.steps, map(record.entry, record.steps)))
+            rows = [{"step": n} | row_of_entry(record.entry(s), s) for n, s in enumerate(record.steps, start=1)]
+            write_csv(self.folder / "history.csv", {name: [row[name] for row in rows] for name in rows[0]})
             last = next((step for step in reversed(record.steps) if step.outcome.ok), record.steps[-1])
             write_csv(self.folder / "contact.csv", _contact_table(record, last))
         self._written = time.perf_counter()
@@ -361,18 +362,16 @@ class ResultWriter:
         if time.perf_counter() - self._written > max(_WRITE_EVERY_S, _WRITE_SHARE * self._seconds):
             self.progress(record)
 
-    def summary(self, record: PressRecord, outcome: str) -> Tree:
-        """Write summary.json and return its content."""
+    def summary(self, record: PressRecord, outcome: str) -> None:
+        """Write summary.json."""
         begin = time.perf_counter()
-        content = record.summary(outcome)
-        write_json(self.folder / _SUMMARY, content)
+        write_json(self.folder / _SUMMARY, record.summary(outcome))
         if self._scene:
             write_text(self.folder / _SCENE, self._scene)
             for name in _FILES if self._replaces else ():
                 (self.folder / name).unlink(missing_ok=True)
             self._scene, self._replaces = "", False
         record.seconds["output"] += time.perf_counter() - begin
-        return content
 
     def markers(self, record: PressRecord) -> None:
         """Write markers.csv, if there are markers, with their errors as far as they are known."""
@@ -457,13 +456,6 @@ def _contact_table(record: PressRecord, step: StepResult) -> Tree:
     second = contact_table(record.problem.points, step.other)
     fingers = np.repeat(FINGERS, len(first["face"]))
     return {"finger": fingers, **{name: np.concatenate([first[name], second[name]]) for name in first}}
-
-
-def history_table(steps: Sequence[StepResult], entries: Iterable[TreeView]) -> dict[str, ArrayLike]:
-    """Return the columns of history.csv from the entries of the steps in summary.json; none without steps."""
-    pairs = enumerate(zip(steps, entries, strict=True), start=1)
-    rows = [{"step": number} | row_of_entry(entry, step) for number, (step, entry) in pairs]
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def _on_surface(mesh: Mesh, points: ContactPoints, step: StepResult) -> dict[str, Array]:

@@ -3,10 +3,6 @@
 A body is condensed to the points that may come into contact.  Whether contact stayed within them is checked after the
 solution; if not, the body is condensed again to all points of its free faces, and pressed again.
 
-Presses with several coefficients of friction start from those before: where mu changes by at most 0.1, the forces at
-the previous mu save 15 to 25 % of the time of a press under a plane.  They are an initial guess only: the solution
-satisfies the contact conditions in any case.
-
 Scenes that differ only in friction, path, contact rule and gauges have the same compliance and form a family.  The body
 of a family is meshed for the union of all paths, so that its mesh is graded for the widest contact among them.
 """
@@ -24,7 +20,6 @@ from threading import Event
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from finger3d._machine import made_with
-from finger3d._types import Float
 from finger3d.contact.friction import FrictionLaw
 from finger3d.contact.solve import RuleName
 from finger3d.errors import FAILURES, Outcome
@@ -38,7 +33,6 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, table_row
 from finger3d.mechanics.march.equilibrium import at_depth_reached
 from finger3d.mechanics.march.grip import Grip
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.march.step_halving import automatic, march_automatic
 from finger3d.mechanics.march.variants import map_parallel
 from finger3d.mechanics.model import Leg, MeshOptions, Model
@@ -62,12 +56,6 @@ Value = TypeVar("Value")
 _MOST_KEPT = 4
 """Bodies, and presses, that a search or a fit keeps."""
 
-_FARTHEST = 2.0
-"""Largest extrapolation of forces in mu, over the difference of the last two values."""
-
-_NEAR = 0.1
-"""Largest difference in mu from which a press is started; from farther off its own path is the better start."""
-
 
 @dataclass(frozen=True)
 class PressAtMu:
@@ -77,19 +65,12 @@ class PressAtMu:
     ----------
     mu : coefficient of friction
     frame : the last increment
-    forces : contact forces (c, d), N, on the meshed part at the end of every increment
     factorizations : factorisations of the body in the increments
     """
 
     mu: float
     frame: StepResult
-    forces: tuple[Float, ...]
-    factorizations: int = 0
-
-    @classmethod
-    def of(cls, mu: float, steps: Sequence[StepResult], factorizations: int) -> PressAtMu:
-        """Return the press with these increments."""
-        return cls(mu, steps[-1], tuple(step.meshed_state.contact.force for step in steps), factorizations)
+    factorizations: int
 
 
 def under(
@@ -122,22 +103,13 @@ def _poses(legs: tuple[Leg, ...]) -> list[Leg]:
     return [replace(leg, steps=1, duration_s=None) for leg in legs]
 
 
-def press(
-    problem: Problem,
-    mu: float,
-    near: Sequence[PressAtMu] = (),
-    workspace: Workspace | None = None,
-    cancel: Event | None = None,
-) -> PressAtMu:
-    """Press the condensed body with this mu; the last two presses of `near` give the initial guess."""
+def press(problem: Problem, mu: float, workspace: Workspace | None = None, cancel: Event | None = None) -> PressAtMu:
+    """Press the condensed body with this mu."""
     problem = under(problem, problem.model.friction.with_mu(mu))
     workspace = workspace or formulation_of(problem.model).workspace()
     before = workspace.factorizations
-    if automatic(problem.model):
-        steps, _ = march_automatic(problem, workspace, cancel)
-    else:
-        steps = tuple(march(problem, _start(problem, mu, near), workspace, cancel))
-    return PressAtMu.of(mu, steps, workspace.factorizations - before)
+    steps, _ = march_automatic(problem, workspace, cancel)
+    return PressAtMu(mu, steps[-1], workspace.factorizations - before)
 
 
 def presses(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
@@ -149,8 +121,8 @@ def presses(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
         yield from _together(problem, mus)
         return
 
-    def pressed(mu: float, before: Sequence[PressAtMu], workspace: Workspace, cancel: Event) -> PressAtMu:
-        return press(problem, mu, before, workspace, cancel)
+    def pressed(mu: float, workspace: Workspace, cancel: Event) -> PressAtMu:
+        return press(problem, mu, workspace, cancel)
 
     yield from map_parallel(problem, pressed, mus)
 
@@ -163,20 +135,7 @@ def _together(problem: Problem, mus: Sequence[float]) -> Iterator[PressAtMu]:
     problems = [under(problem, problem.model.friction.with_mu(mu)) for mu in mus]
     for number, steps in march_in_groups(problems, workspace, Event()):
         new, counted = workspace.factorizations - counted, workspace.factorizations
-        yield PressAtMu.of(mus[number], steps, new)
-
-
-def _start(problem: Problem, mu: float, near: Sequence[PressAtMu]) -> list[Float]:
-    """Return the forces extrapolated in mu from the last two presses; none if these have other contact points."""
-    shape = problem.delassus.shape[:2]
-    good = [p for p in near if p.forces[0].shape == shape]
-    if not good or abs(good[-1].mu - mu) > _NEAR:
-        return []
-    first, last = good[0], good[-1]
-    if first.mu == last.mu:
-        return list(last.forces)
-    share = min((mu - last.mu) / (last.mu - first.mu), _FARTHEST)
-    return [b + share * (b - a) for a, b in zip(first.forces, last.forces, strict=False)]
+        yield PressAtMu(mus[number], steps[-1], new)
 
 
 class PressedBody:
@@ -467,7 +426,7 @@ class SharedBody(PressedBody):
                     yield left.popleft(), result
 
     def _march(
-        self, variant: Variant, before: object, workspace: Workspace, cancel: Event
+        self, variant: Variant, workspace: Workspace, cancel: Event
     ) -> tuple[Problem, tuple[StepResult, ...] | Exception, float]:
         """Return the problem of a variant, its increments, or why they failed, and the seconds that they took."""
         start, problem = time.perf_counter(), self.problem

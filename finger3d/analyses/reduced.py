@@ -27,7 +27,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.surface import BoundarySurface
 from finger3d.geometry.design import DesignSummary
-from finger3d.io import check_arrays, read_arrays, write_arrays
+from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem, rigid_gap
 from finger3d.mechanics.discretise.symmetry import Symmetry
@@ -79,49 +79,6 @@ class _Header(BaseModel):
     filled: tuple[tuple[str, str], ...]
     axes: tuple[str, ...]
     touch_mm: float
-
-
-def write(path: str | Path, problem: Problem, other: BoundarySurface, about: TreeView) -> Path:
-    """Write a reduced model, whole or not at all; return its path."""
-    arrays: Tree = {**arrays_of(problem), **_face_arrays("other", other)}
-    if isinstance(problem.model.object, MeshObject):
-        shape = problem.model.object.surface
-        arrays |= {"object_points": shape.points, "object_faces": shape.faces}
-    arrays["header"] = np.frombuffer(_header(problem, about).model_dump_json().encode(), dtype=np.uint8)
-    write_arrays(path, arrays)
-    return Path(path)
-
-
-def read(path: str | Path) -> tuple[Problem, BoundarySurface, TreeView]:
-    """Read a reduced model: problem, points that are no candidates, and versions.
-
-    Raises
-    ------
-    Finger3dError
-        In one line, if the file is not there, of another kind or version, or damaged.
-    """
-    try:
-        arrays = read_arrays(path)
-        header = json.loads(arrays["header"].tobytes())
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except (OSError, ValueError, KeyError, RecursionError):
-        raise Finger3dError(f"{path}: no reduced model, or cut short; condense the scene again") from None
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise Finger3dError(f"{path}: no reduced model; `finger3d calibrate` writes one, reduced.npz")
-    if header.get("version") != VERSION:
-        raise Finger3dError(
-            f"{path}: version {header.get('version')}, this finger3d reads version {VERSION}; condense it again"
-        )
-    try:
-        check_arrays(arrays)
-    except ValueError:
-        raise Finger3dError(
-            f"{path}: parts of the reduced model are missing or damaged; condense the scene again"
-        ) from None
-    checked = _Header.model_validate_json(arrays["header"].tobytes())
-    problem = assembled(_model(checked, arrays), arrays, checked.touch_mm, checked.axes)
-    return problem, _face("other", arrays), checked.about
 
 
 def _face_arrays(name: str, face: BoundarySurface) -> dict[str, Array]:
@@ -372,7 +329,13 @@ class ReducedModel:
 
     def save(self, path: str | Path) -> Path:
         """Write the model into one .npz file without pickles, whole or not at all; return its path."""
-        return write(path, self.problem, self.others, self.about)
+        arrays: Tree = {**arrays_of(self.problem), **_face_arrays("other", self.others)}
+        if isinstance(self.problem.model.object, MeshObject):
+            shape = self.problem.model.object.surface
+            arrays |= {"object_points": shape.points, "object_faces": shape.faces}
+        header = _header(self.problem, self.about).model_dump_json()
+        write_arrays(path, arrays | {"header": np.frombuffer(header.encode(), dtype=np.uint8)})
+        return Path(path)
 
     @classmethod
     def load(cls, path: str | Path) -> ReducedModel:
@@ -383,4 +346,21 @@ class ReducedModel:
         Finger3dError
             In one line, if the file is not there, of another kind or version, or damaged.
         """
-        return cls(*read(path))
+        try:
+            arrays = read_arrays(path)
+        except FileNotFoundError:
+            raise Finger3dError(f"{path}: there is no such file") from None
+        except (OSError, ValueError):
+            raise Finger3dError(
+                f"{path}: no reduced model, or cut short or damaged; condense the scene again"
+            ) from None
+        header = json.loads(arrays["header"].tobytes()) if "header" in arrays else {}
+        if header.get("format") != FORMAT:
+            raise Finger3dError(f"{path}: no reduced model; `finger3d calibrate` writes one, reduced.npz")
+        if header.get("version") != VERSION:
+            raise Finger3dError(
+                f"{path}: version {header.get('version')}, this finger3d reads version {VERSION}; condense it again"
+            )
+        checked = _Header.model_validate_json(arrays["header"].tobytes())
+        problem = assembled(_model(checked, arrays), arrays, checked.touch_mm, checked.axes)
+        return cls(problem, _face("other", arrays), checked.about)

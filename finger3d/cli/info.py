@@ -27,26 +27,18 @@ def info(*, json_: Json = False) -> None:
     from finger3d.meshing.cache import folder
 
     memory = memory_bytes()
+    machine: dict[str, object] = {
+        "platform": platform.platform(),
+        "cores": cores(),
+        "memory_bytes": memory[0] if memory else None,
+        "mesh_cache": folder(),
+        "environment": sys.prefix,
+        "factorisation": condense.default_solver(),
+    }
     if json_:
-        machine = {
-            "platform": platform.platform(),
-            "cores": cores(),
-            "memory_bytes": memory[0] if memory else None,
-            "mesh_cache": folder(),
-            "environment": sys.prefix,
-            "factorisation": condense.default_solver(),
-        }
         print_json({"versions": versions(), "machine": machine})
         return
+    machine["memory_bytes"] = f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"
+    machine["factorisation"] = _SOLVERS[condense.default_solver()]
     print_rows("versions", versions().items())
-    print_rows(
-        "machine",
-        [
-            ("platform", platform.platform()),
-            ("cores", cores()),
-            ("memory", f"{memory[0] / 1e9:.1f} GB" if memory else "unknown"),
-            ("mesh cache", folder()),
-            ("environment", sys.prefix),
-            ("factorisation", _SOLVERS[condense.default_solver()]),
-        ],
-    )
+    print_rows("machine", [(name.removesuffix("_bytes").replace("_", " "), value) for name, value in machine.items()])

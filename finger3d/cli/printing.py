@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,33 +46,24 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         """Write text and return its length."""
-        if self.lost is None:
-            try:
-                self._stream.write(text)
-            except (OSError, ValueError) as error:
-                self._give_up(error)
+        self._attempt(lambda: self._stream.write(text))
         return len(text)
-
-    def writelines(self, lines: Iterable[str]) -> None:
-        """Write a sequence of texts."""
-        for line in lines:
-            self.write(line)
 
     def flush(self) -> None:
         """Flush the stream."""
-        if self.lost is None:
-            try:
-                self._stream.flush()
-            except (OSError, ValueError) as error:
-                self._give_up(error)
+        self._attempt(self._stream.flush)
 
-    def _give_up(self, error: Exception) -> None:
-        self.lost = error
-        # At exit the interpreter flushes the remaining buffer, which must not fail.
-        with suppress(OSError, ValueError):
-            target = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(target, self._stream.fileno())
-            os.close(target)
+    def _attempt(self, act: Callable[[], object]) -> None:
+        try:
+            if self.lost is None:
+                act()
+        except (OSError, ValueError) as error:
+            self.lost = error
+            # At exit the interpreter flushes the remaining buffer, which must not fail.
+            with suppress(OSError, ValueError):
+                target = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(target, self._stream.fileno())
+                os.close(target)
 
 
 @contextmanager

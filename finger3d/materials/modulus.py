@@ -44,7 +44,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import fmean, stdev
+from typing import Any
 
 from finger3d.materials.silicones import Silicone, silicone_named
 
@@ -113,16 +115,37 @@ BATCH = 0.25
 """Relative standard deviation of the modulus of a batch, from six silicones in two families."""
 
 
+MODULUS_KEYS = ("E_MPa", "shore_A", "shore_00", "silicone")
+"""Keys of which exactly one gives Young's modulus."""
+
+NU = 0.49
+"""Poisson's ratio of a silicone: its bulk modulus is about 50 times its shear modulus or more."""
+
+
 @dataclass(frozen=True)
-class YoungsModulus:
-    """Young's modulus in MPa, its relative standard deviation, None if not known, and where it comes from."""
+class ElasticConstants:
+    """Young's modulus and Poisson's ratio, and where they come from.
+
+    Attributes
+    ----------
+    E_MPa : Young's modulus
+    spread : its relative standard deviation; None if the user gave it
+    origin : where it comes from, "given" if the user gave it
+    nu : Poisson's ratio
+    """
 
     E_MPa: float
     spread: float | None
     origin: str
+    nu: float = NU
+
+    def __str__(self) -> str:
+        """Young's modulus with its spread and origin, in one line."""
+        spread = "" if self.spread is None else f" +- {100.0 * self.spread:.0f} %"
+        return f"{self.E_MPa:.3g} MPa{spread}, {self.origin}"
 
 
-def youngs_modulus(silicone: Silicone) -> YoungsModulus:
+def youngs_modulus(silicone: Silicone) -> ElasticConstants:
     """Return the modulus of a silicone: from its sources, or from its Shore hardness if no source measured it.
 
     Examples
@@ -135,24 +158,20 @@ def youngs_modulus(silicone: Silicone) -> YoungsModulus:
     estimates = _estimates(silicone)
     if not estimates:
         by_hardness = of_shore(silicone.scale, silicone.shore)
-        return YoungsModulus(by_hardness.E_MPa, by_hardness.spread, f"{silicone.name}, {by_hardness.origin}")
+        return replace(by_hardness, origin=f"{silicone.name}, {by_hardness.origin}")
     logarithms = [math.log(value) for value, _, _ in estimates]
-    mean = math.fsum(logarithms) / len(estimates)
-    if len(estimates) == 1:
-        error = estimates[0][1]
-    else:
-        error = math.sqrt(math.fsum((x - mean) ** 2 for x in logarithms) / (len(estimates) - 1) / len(estimates))
+    error = estimates[0][1] if len(estimates) == 1 else stdev(logarithms) / math.sqrt(len(estimates))
     *others, last = (origin for _, _, origin in estimates)
     origin = f"{silicone.name}, {', '.join(others)}{' and ' if others else ''}{last}"
-    return YoungsModulus(math.exp(mean), math.hypot(BATCH, error), origin)
+    return ElasticConstants(math.exp(fmean(logarithms)), math.hypot(BATCH, error), origin)
 
 
-def of_shore(scale: str, shore: float) -> YoungsModulus:
+def of_shore(scale: str, shore: float) -> ElasticConstants:
     """Return the modulus of a Shore hardness; the scale is "A" or "00"."""
     if scale == "A":
         origin = f"Shore A {shore:g} by Gent 1958; cast silicones are {SOFTER_A:g} times softer on average"
-        return YoungsModulus(modulus_of_shore_A(shore), SPREAD_A, origin)
-    return YoungsModulus(modulus_of_shore_00(shore), SPREAD_00, f"Shore 00-{shore:g} by Hertz's solution")
+        return ElasticConstants(modulus_of_shore_A(shore), SPREAD_A, origin)
+    return ElasticConstants(modulus_of_shore_00(shore), SPREAD_00, f"Shore 00-{shore:g} by Hertz's solution")
 
 
 def _estimates(silicone: Silicone) -> list[tuple[float, float, str]]:
@@ -177,36 +196,7 @@ def _between(low: float, ratio: float) -> tuple[float, float]:
     return low * math.sqrt(ratio), math.log(ratio) / math.sqrt(12.0)
 
 
-MODULUS_KEYS = ("E_MPa", "shore_A", "shore_00", "silicone")
-"""Keys of which exactly one gives Young's modulus."""
-
-NU = 0.49
-"""Poisson's ratio of a silicone: its bulk modulus is about 50 times its shear modulus or more."""
-
-
-@dataclass(frozen=True)
-class ElasticConstants:
-    """Young's modulus and Poisson's ratio, and where they come from.
-
-    Attributes
-    ----------
-    E_MPa, nu : the constants
-    spread : relative standard deviation of E_MPa; None if the user gave it
-    origin : where E_MPa comes from, "given" if the user gave it
-    """
-
-    E_MPa: float
-    nu: float
-    spread: float | None
-    origin: str
-
-    def __str__(self) -> str:
-        """Young's modulus with its spread and origin, in one line."""
-        spread = "" if self.spread is None else f" +- {100.0 * self.spread:.0f} %"
-        return f"{self.E_MPa:.3g} MPa{spread}, {self.origin}"
-
-
-def elastic_constants(table: Mapping[str, object]) -> ElasticConstants:
+def elastic_constants(table: Mapping[str, Any]) -> ElasticConstants:
     """Return the elastic constants that the keys of a table give, such as [material].
 
     Parameters
@@ -221,25 +211,16 @@ def elastic_constants(table: Mapping[str, object]) -> ElasticConstants:
     Examples
     --------
     >>> elastic_constants({"E_MPa": 1.0, "nu": 0.4})
-    ElasticConstants(E_MPa=1.0, nu=0.4, spread=None, origin='given')
+    ElasticConstants(E_MPa=1.0, spread=None, origin='given', nu=0.4)
     >>> print(elastic_constants({"shore_00": 30.0}))
     0.103 MPa +- 45 %, Shore 00-30 by Hertz's solution
     """
-    nu = table.get("nu")
-    found = _modulus(table)
-    return ElasticConstants(found.E_MPa, NU if nu is None else _number(nu), found.spread, found.origin)
-
-
-def _modulus(table: Mapping[str, object]) -> YoungsModulus:
     ((key, value),) = [(key, table[key]) for key in MODULUS_KEYS if table.get(key) is not None]
     if key == "silicone":
-        return youngs_modulus(silicone_named(str(value)))
-    if key == "E_MPa":
-        return YoungsModulus(_number(value), None, "given")
-    return of_shore(key.removeprefix("shore_"), _number(value))
-
-
-def _number(value: object) -> float:
-    if not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is no number")
-    return float(value)
+        found = youngs_modulus(silicone_named(value))
+    elif key == "E_MPa":
+        found = ElasticConstants(float(value), None, "given")
+    else:
+        found = of_shore(key.removeprefix("shore_"), value)
+    nu = table.get("nu")
+    return found if nu is None else replace(found, nu=float(nu))

@@ -16,7 +16,7 @@ from finger3d._machine import source_hash
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
-from finger3d.io import check_arrays, read_arrays, write_arrays
+from finger3d.io import read_arrays, write_arrays
 from finger3d.meshing.sizing import MeshSizes, Zone
 
 _PACKAGES = {"ftetwild": ("pytetwild", "build123d"), "netgen": ("netgen-mesher", "build123d")}
@@ -60,7 +60,6 @@ def load(path: Path) -> tuple[Mesh, float] | None:
     """Return a mesh and the CAD volume (mm3) of the whole body; None if there is no file, or a damaged one."""
     try:
         arrays = read_arrays(path)
-        check_arrays(arrays)
         facets = {name[7:]: array for name, array in arrays.items() if name.startswith("facets_")}
         labels = tuple(str(label) for label in arrays["part_labels"]) if "part" in arrays else ()
         mesh = Mesh(arrays["points"], arrays["cells"], facets, arrays.get("part"), labels)

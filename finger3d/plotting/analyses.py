@@ -150,7 +150,7 @@ def _forces(axes: Axes, cases: Sequence[Case], own: Sequence[Case]) -> None:
 
     solids = sorted((c for c in cases if c.model == "solid"), key=lambda c: c.width_mm)
     for case in own:
-        if case.is_section:
+        if case.model != "solid":
             value, error = case.numbers[FORCE], case.errors.get(FORCE, 0.0)
             axes.axhspan(value - error, value + error, color=_COLOURS[case.model], alpha=0.15, lw=0)
             axes.axhline(value, color=_COLOURS[case.model], ls="--", lw=1.2, label=case.model)
@@ -332,18 +332,16 @@ def draw_optimisation(
     places: Sequence[Sequence[float]],
     values: Sequence[float],
     start: Sequence[float],
-    objective: str,
 ) -> None:
-    """Draw the designs with a finite objective and write the picture.
+    """Draw the designs with a finite sensitivity and write the picture.
 
     Parameters
     ----------
     path : PNG file to write
     keys : names of the k free keys
     places : (n, k) values of the free keys of every design, in order of evaluation
-    values : (n,) objective of every design; NaN if its solution failed
+    values : (n,) sensitivity of every design; NaN if its solution failed
     start : (k,) values of the free keys of the initial design
-    objective : label of the objective
     """
     good = np.isfinite(values)
     at, value = np.array(places, dtype=float)[good], np.array(values, dtype=float)[good]
@@ -361,7 +359,7 @@ def draw_optimisation(
         axes.plot(at[best, column], value[best], "*", ms=11, color=_BEST, label="best")
         axes.set_xlabel(key)
     for axes in made.axes:
-        finish(axes, y=objective, fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        finish(axes, y="sensitivity", fontsize=9, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     made.save(path)
 
 

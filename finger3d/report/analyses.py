@@ -13,7 +13,7 @@ from finger3d.errors import Finger3dError
 from finger3d.mechanics.readings import Column
 from finger3d.plotting.layout import finish, sheet
 from finger3d.report.build import Chart, Code, Figure, HeadlineRow, Line, Page, PageSection, Table, how_modelled, number
-from finger3d.results.summary import read_json, read_rows, strains_of, title_of
+from finger3d.results.summary import FORCE, read_json, read_rows, strains_of, title_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,9 +78,6 @@ def calibrate_page(folder: str | Path) -> Page:
     )
 
 
-_FORCE = "force_N_per_mm"
-
-
 def compare_page(folder: str | Path) -> Page:
     """Return the page of a comparison, from the files in its folder.
 
@@ -95,7 +92,7 @@ def compare_page(folder: str | Path) -> Page:
     own = data["scene"]["finger"].get("width_mm")
     cases = [c for c in data["cases"] if c["numbers"]]
     headline = [
-        HeadlineRow(f"force per width, {c['model']}", c["numbers"][_FORCE], "N/mm", c["errors"].get(_FORCE))
+        HeadlineRow(f"force per width, {c['model']}", c["numbers"][FORCE], "N/mm", c["errors"].get(FORCE))
         for c in cases
         if c["width_mm"] == own
     ]
@@ -226,10 +223,9 @@ def optimise_page(folder: str | Path) -> Page:
     rows = read_rows(folder / "evaluations.csv")
     good = sorted((r for r in rows if r["outcome"] == "converged"), key=lambda r: -float(r["objective"]))
     bounds = {key: (low, high) for key, low, high in search["free"]}
-    objective = Path(found["objective"]).name
     increments = found.get("increments") or {}
     headline = [
-        HeadlineRow(f"objective ({objective})", found["best"]),
+        HeadlineRow("objective (sensitivity)", found["best"]),
         HeadlineRow("objective at the start", "none" if found["start"] is None else found["start"]),
         *(HeadlineRow(key, value) for key, value in found["values"].items()),
         HeadlineRow("designs evaluated", str(len(rows))),
@@ -243,17 +239,15 @@ def optimise_page(folder: str | Path) -> Page:
         for key, value in found["values"].items()
     ]
     best = [tuple(float(r[k]) for k in (*bounds, "objective")) for r in good[:_MOST_ROWS]]
-    parts = [Table((*bounds, "objective"), best)]
     without = len(rows) - len(good)
     failures = [f"{without} of {len(rows)} designs have no number; evaluations.csv has the reasons."] if without else []
-    explanation = [_SENSITIVITY] if objective == "sensitivity" else []
     best_scene = folder / "best.toml"
     return Page(
-        f"{title_of(search['scene'])}: design for {objective}",
+        f"{title_of(search['scene'])}: design for sensitivity",
         headline,
         [
-            PageSection("Free keys", [*explanation, Table(("key", "from", "to", "start", "best", ""), free)]),
-            PageSection("The best designs", [*failures, *parts]),
+            PageSection("Free keys", [_SENSITIVITY, Table(("key", "from", "to", "start", "best", ""), free)]),
+            PageSection("The best designs", [*failures, Table((*bounds, "objective"), best)]),
             PageSection(
                 "Use it",
                 [

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from finger3d._machine import versions as installed
-from finger3d._types import Array
+from finger3d._types import Array, TreeView
 from finger3d.accuracy.error_bars import with_error
 from finger3d.contact.zones import facet_borders
 from finger3d.fem.mesh import FREE_FACES, Mesh
@@ -101,7 +101,7 @@ def _known(values: Sequence[float]) -> list[float | None]:
 _TABLES = ("finger", "material", "object", "friction", "press", "grip", "contact", "model", "mesh")
 
 
-def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
+def how_modelled(summary: TreeView, folder: Path) -> list[Part]:
     """Return the scene as a table, with the active effects, and the text of scene.toml.
 
     Parameters
@@ -109,16 +109,14 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     summary : JSON object with the key ``scene``
     folder : results folder
     """
-    scene = _mapping(summary["scene"])
+    scene = summary["scene"]
     rows = [(name, _settings(scene[name])) for name in _TABLES if scene.get(name)]
-    rows += _modulus("", scene.get("material"))
-    for part, settings in _mapping(scene.get("parts")).items():
+    rows += _modulus("", scene.get("material", {}))
+    for part, settings in scene.get("parts", {}).items():
         rows += [(f"part {part}", _settings(settings)), *_modulus(f" of {part}", settings)]
-    gauges = scene.get("gauge")
-    for gauge in map(_mapping, gauges if isinstance(gauges, list | tuple) else ()):
+    for gauge in scene.get("gauge", ()):
         rows.append((f"gauge {gauge['name']}", _settings({k: v for k, v in gauge.items() if k != "name"})))
-    named = _mapping(scene.get("effects")).items()
-    effects = {name: settings for name, settings in named if isinstance(settings, Mapping)}
+    effects = {name: table for name, table in scene.get("effects", {}).items() if isinstance(table, Mapping)}
     rows += [(f"effect {name}", _settings(settings) or "on") for name, settings in effects.items()]
     parts: list[Part] = [Table(("", "settings, with defaults"), rows)]
     if not effects:
@@ -131,17 +129,12 @@ def how_modelled(summary: Mapping[str, object], folder: Path) -> list[Part]:
     return parts
 
 
-def _modulus(of: str, table: object) -> list[tuple[str, str]]:
+def _modulus(of: str, table: TreeView) -> list[tuple[str, str]]:
     """Return the row of a Young's modulus that follows from a hardness or a silicone, with its spread and origin."""
-    E, spread, origin = (_mapping(table).get(key) for key in ("E_MPa", "E_spread", "E_origin"))
-    if not (isinstance(E, float) and isinstance(spread, float) and origin):
+    E, spread, origin = (table.get(key) for key in ("E_MPa", "E_spread", "E_origin"))
+    if spread is None or not origin:
         return []
     return [(f"Young's modulus{of}", f"{E:.3g} MPa \u00b1 {100.0 * spread:.0f} %: {origin}")]
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    """Return a JSON object, empty if it is missing."""
-    return value if isinstance(value, Mapping) else {}
 
 
 def _settings(settings: object) -> str:
@@ -394,39 +387,29 @@ class View3D:
 
     Attributes
     ----------
-    rest : (v, 3) undeformed vertices, mm
-    body, contact : (t, 3) triangles of faces that cannot touch, and of those that may; they share no vertices
-    moved : (s, v, 3) deformed vertices at each increment, mm
-    pressure : (s, v) contact pressure, MPa
-    status : (s, v) 0 open, 1 stick, 2 slip
-    border : (s, t, 3) where the status changes along the sides of each contact triangle, as a share of their length
-    labels : (s,) label of each increment
-    gauges : (s, g, 3, 3) start, middle and end of each gauge at each increment, projected onto the front face (+z), mm
-    gauge_labels : (g,) label of each gauge
-    object_points, object_faces : (o, 3) mm, (f, 3) triangles of the object in its own coordinates
-    object_poses : (s, 3, 4) its rotation and place at each increment
+    data : what view3d.js draws; arrays in base64
+        labels : (s,) label of each increment
+        vertices : number v of vertices
+        rest : (v, 3) undeformed vertices, mm
+        moved : (s, v, 3) deformed vertices at each increment, mm
+        pressure : (s, v) contact pressure, MPa
+        status : (s, v) 0 open, 1 stick, 2 slip
+        border : (s, t, 3) where the status changes along the sides of each contact triangle, in 255ths of their length
+        body, contact : (t, 3) triangles of faces that cannot touch, and of those that may; they share no vertices
+        gauges : (s, g, 3, 3) start, middle and end of each gauge, projected onto the front face (+z), mm
+        gaugeLabels : (g,) label of each gauge
+        objectPoints, objectFaces : (o, 3) mm, (f, 3) triangles of the object in its own coordinates
+        objectPoses : (s, 3, 4) its rotation and place at each increment
     """
 
-    rest: Array
-    body: Array
-    contact: Array
-    moved: Array
-    pressure: Array
-    status: Array
-    border: Array
-    labels: tuple[str, ...]
-    gauges: Array
-    gauge_labels: tuple[str, ...]
-    object_points: Array
-    object_faces: Array
-    object_poses: Array
+    data: TreeView
 
     def html(self) -> str:
         """Return the HTML element that holds the view and its controls."""
-        last = len(self.labels) - 1
+        last = len(self.data["labels"]) - 1
         hidden = " hidden" if last == 0 else ""
-        none = "" if self.gauge_labels else " hidden"
-        no_object = "" if len(self.object_faces) else " hidden"
+        none = "" if self.data["gaugeLabels"] else " hidden"
+        no_object = "" if self.data["objectFaces"] else " hidden"
         return (
             '<div class="view"><div class="controls">'
             '<label>colour <select id="view-field"><option value="pressure">contact pressure</option>'
@@ -440,29 +423,13 @@ class View3D:
             '<span class="open"><i style="background:#c4c4c4"></i>open, no contact</span></span>'
             '</div><div class="stage" id="view-stage"></div>'
             "<p>Deformed, to scale. Drag to rotate, scroll or pinch to zoom; hover over the contact surface for values."
-            f"{' Gauges are projected onto the front face.' if self.gauge_labels else ''}"
+            f"{' Gauges are projected onto the front face.' if self.data['gaugeLabels'] else ''}"
             "<noscript> The 3D view needs JavaScript; the pictures below show the last increment.</noscript></p></div>"
         )
 
     def script(self) -> str:
         """Return the scripts with the data and the code that draws them."""
-        data = {
-            "labels": self.labels,
-            "vertices": len(self.rest),
-            "rest": _packed(self.rest, "<f4"),
-            "moved": _packed(self.moved, "<f4"),
-            "pressure": _packed(self.pressure, "<f4"),
-            "status": _packed(self.status, "u1"),
-            "border": _packed(np.round(255.0 * self.border), "u1"),
-            "body": _packed(self.body, "<u4"),
-            "contact": _packed(self.contact, "<u4"),
-            "gauges": np.round(self.gauges, 3).tolist(),
-            "gaugeLabels": self.gauge_labels,
-            "objectPoints": _packed(self.object_points, "<f4"),
-            "objectFaces": _packed(self.object_faces, "<u4"),
-            "objectPoses": np.round(self.object_poses, 6).tolist(),
-        }
-        numbers = f'<script type="application/json" id="view-data">{embedded(data)}</script>\n'
+        numbers = f'<script type="application/json" id="view-data">{embedded(self.data)}</script>\n'
         return f"{numbers}<script>{asset('view3d.js')}</script>\n"
 
 
@@ -498,20 +465,24 @@ def view_of(states: States, gauges: Sequence[Gauge] = (), budget: int = _MOST_BY
     def borders(k: int) -> Array:
         return facet_borders(states.contact_facets, states.status[k], states.zones(k), places)
 
+    poses = np.concatenate([states.object_rotation, states.object_place[:, :, None]], axis=2)[kept]
     return View3D(
-        rest=rest,
-        body=triangles[~states.on_contact],
-        contact=triangles[states.on_contact],
-        moved=rest + states.displacement[kept][:, corners],
-        pressure=np.array([values("pressure", k) for k in kept]),
-        status=np.array([values("status", k) for k in kept]),
-        border=np.array([borders(k) for k in kept]),
-        labels=tuple(label(int(states.step[k]), states.target[k]) for k in kept),
-        gauges=np.array(at).reshape(len(kept), len(marks), 3, 3),
-        gauge_labels=tuple(mark.label for mark in marks),
-        object_points=states.object_points,
-        object_faces=states.object_faces,
-        object_poses=np.concatenate([states.object_rotation, states.object_place[:, :, None]], axis=2)[kept],
+        {
+            "labels": [label(int(states.step[k]), states.target[k]) for k in kept],
+            "vertices": len(rest),
+            "rest": _packed(rest, "<f4"),
+            "moved": _packed(rest + states.displacement[kept][:, corners], "<f4"),
+            "pressure": _packed(np.array([values("pressure", k) for k in kept]), "<f4"),
+            "status": _packed(np.array([values("status", k) for k in kept]), "u1"),
+            "border": _packed(np.round(255.0 * np.array([borders(k) for k in kept])), "u1"),
+            "body": _packed(triangles[~states.on_contact], "<u4"),
+            "contact": _packed(triangles[states.on_contact], "<u4"),
+            "gauges": np.round(np.array(at).reshape(len(kept), len(marks), 3, 3), 3).tolist(),
+            "gaugeLabels": [mark.label for mark in marks],
+            "objectPoints": _packed(states.object_points, "<f4"),
+            "objectFaces": _packed(states.object_faces, "<u4"),
+            "objectPoses": np.round(poses, 6).tolist(),
+        }
     )
 
 

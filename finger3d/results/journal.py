@@ -16,11 +16,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from finger3d._machine import made_with
+from finger3d._types import TreeView
 from finger3d.errors import Finger3dError
 from finger3d.io import atomic, cannot_write, checksum, write_json
 from finger3d.results.summary import read_json
 
-Row = Mapping[str, object]
+Row = TreeView
 
 
 class Journal:

@@ -20,7 +20,7 @@ from finger3d.contact.zones import Zone, edges_of, zones
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import CONTACT, FREE_FACES, Mesh, middles
 from finger3d.geometry.surface import Triangles
-from finger3d.io import atomic, check_arrays, read_arrays, write_arrays
+from finger3d.io import atomic, read_arrays, write_arrays
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table
@@ -279,7 +279,6 @@ def load_states(path: str | Path) -> States:
         data = read_arrays(path)
         if missing := [f.name for f in fields(States) if f.name not in data]:
             raise ValueError(f"{missing[0]} is missing")
-        check_arrays(data)
     except (OSError, ValueError) as error:
         why = " ".join(str(error).split())
         raise Finger3dError(f"{path}: cannot be read as steps of a press ({why}); press the scene again") from None

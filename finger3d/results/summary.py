@@ -303,11 +303,6 @@ class Case:
         """Whether the path converged."""
         return self.outcome.ok
 
-    @property
-    def is_section(self) -> bool:
-        """Whether it is plane stress or plane strain."""
-        return self.model.startswith("plane")
-
     def as_dict(self) -> Tree:
         """Return the entry of compare.json."""
         kept = ("model", "width_mm", "size_mm", "mesher", "outcome", "numbers", "errors", "lines", "seconds")

@@ -236,8 +236,7 @@ def _leg(table: TreeView, design: Design, obj: RigidObject, tables: SceneTable) 
     if leg["depth_mm"] is None:
         from finger3d.mechanics.march.equilibrium import forecast_depth
 
-        constants = tables.material.constants
-        material = Isotropic(constants.E_MPa, constants.nu)
+        material = _isotropic(tables.material.constants)
         way = contact_path(design, obj, (), tables.model.domain)
         leg["depth_mm"] = forecast_depth(way, material, leg["force_N"], design.height_mm, design.width_mm)
     for axis in "xz":

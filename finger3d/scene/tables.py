@@ -405,7 +405,7 @@ def _degrees(hint: Any) -> tuple[Any, ...] | None:
 
 def record_of(record: type[Record], settings: TomlTable) -> Record:
     """Return the dataclass that a table stands for, which has its fields as keys; its angles in radians."""
-    hints = _hints(record)  # type: ignore[arg-type]
+    hints = typing.get_type_hints(record, include_extras=True)
     return record(
         **{
             f.name: math.radians(getattr(settings, f"{f.name}_deg"))
@@ -414,11 +414,6 @@ def record_of(record: type[Record], settings: TomlTable) -> Record:
             for f in dataclasses.fields(record)  # type: ignore[arg-type]
         }
     )
-
-
-@functools.cache
-def _hints(record: type) -> dict[str, Any]:
-    return typing.get_type_hints(record, include_extras=True)
 
 
 def _bounded(hint: Any) -> Any:

@@ -43,11 +43,6 @@ if TYPE_CHECKING:
     from finger3d.scene import Scene, Source
 
 
-def write_scene(folder: Path, scene: Scene) -> None:
-    """Write scene.toml."""
-    write_text(folder / "scene.toml", scene.to_toml())
-
-
 def write_points(folder: Path, curve: CurvePoints, settings: CalibrationSettings) -> None:
     """Write the values of mu that are finished to calibration.csv."""
     frames, failed = curve.frames, curve.failed
@@ -70,14 +65,6 @@ def write_body(folder: Path, model: Model, problem: Problem, report: Progress) -
         system=replace(problem.system, reading_rows=rows),
     )
     ReducedModel.of(own).save(folder / "reduced.npz")
-
-
-def write_curve(folder: Path, calibration: Calibration) -> None:
-    """Write the curve, its figure and its page."""
-    write_table(calibration, folder / "calibration.csv")
-    save(calibration, folder / "calibration.json")
-    draw_calibration(folder / "calibration.png", calibration)
-    calibrate_page(folder).write(folder)
 
 
 _FILES = ("calibration.json", "calibration.csv", "calibration.png", "reduced.npz", "report.html")
@@ -144,7 +131,7 @@ def _calibrate_scene(
     if folder:
         for name in _FILES:
             (folder / name).unlink(missing_ok=True)
-        write_scene(folder, scene)
+        write_text(folder / "scene.toml", scene.to_toml())
 
     def calibrate_model(changed: Model) -> tuple[CurvePoints, Calibration]:
         curve = _press_all(changed, settings, report, folder)
@@ -156,7 +143,7 @@ def _calibrate_scene(
     if used != model.mesh:
         scene = scene.with_mesh(used)
         if folder:
-            write_scene(folder, scene)
+            write_text(folder / "scene.toml", scene.to_toml())
     seconds = {**calibration.about["seconds"], "total": time.perf_counter() - start}
     about = {**_about(scene, curve), "seconds": seconds, "mesh": {**used.as_table(), "note": chosen.note}}
     digest = hashlib.sha256(scene.to_toml().encode()).hexdigest()[:16]
@@ -164,7 +151,10 @@ def _calibrate_scene(
     if folder:
         report.stage("writing")
         write_body(folder, model, curve.problem, report)
-        write_curve(folder, calibration)
+        write_table(calibration, folder / "calibration.csv")
+        save(calibration, folder / "calibration.json")
+        draw_calibration(folder / "calibration.png", calibration)
+        calibrate_page(folder).write(folder)
     return calibration
 
 

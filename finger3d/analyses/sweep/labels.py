@@ -7,7 +7,6 @@ and the rows of the sweep: an interruption at any time loses no sample that has 
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -34,11 +33,8 @@ SAMPLE = "sample"
 
 def store_part(folder: Path, number: int, sample: Sample) -> None:
     """Write the arrays of a sample into a file of its own."""
-    (folder / PARTS).mkdir(exist_ok=True)
-    path = _part(folder, number)
-    with path.with_suffix(".tmp").open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **sample)
-    os.replace(stream.name, path)
+    with atomic(_part(folder, number)) as temporary:
+        np.savez(temporary, allow_pickle=False, **sample)
 
 
 def _part(folder: Path, number: int) -> Path:

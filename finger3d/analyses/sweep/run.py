@@ -107,8 +107,7 @@ def sweep(
             store.reload()
             report.steps_done = len(store.rows)
             store.write()
-        with store.room("report.html"):
-            sweep_page(folder).write(folder)
+        sweep_page(folder).write(folder)
     table = store.columns()
     return SweepResult(folder, table, sum(outcome != "converged" for outcome in table["outcome"]), store)
 

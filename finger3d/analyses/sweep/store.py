@@ -8,16 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 from finger3d import _extras
 from finger3d._cost import duration
 from finger3d._types import Tree
-from finger3d.analyses.sweep.labels import FILE, PARTS, SAMPLE, store_part, write_labels
+from finger3d.analyses.sweep.labels import SAMPLE, store_part, write_labels
 from finger3d.analyses.sweep.points import BodySpec, Point, Sweep
 from finger3d.errors import Finger3dError, MissingError
 from finger3d.io import atomic, claimed, write_csv
-from finger3d.mechanics.postprocess.labels import Sample
 from finger3d.progress import Progress
 from finger3d.results.journal import Journal, Row, journal_rows, number_in, opened
 from finger3d.results.summary import PressStep
@@ -56,34 +54,37 @@ class ResultStore:
         Finger3dError
             If another sweep is in the folder, another finger3d is writing there, or its files are damaged.
         MissingError
-            If the folder cannot be written.
+            If a file cannot be written while it is held; the line says how many points are kept.
         """
         path, task = self.folder / JOURNAL, self.folder / TASK
         with claimed(self.folder, "sweep"), opened(path, task, self.sweep.identity(), _difference) as j:
             self._journal: Journal = j
-            self.rows = {_number_of(row): row for row in j.rows}
-            yield self
+            self.rows = {row["point"]: row for row in j.rows}
+            try:
+                yield self
+            except Finger3dError as error:
+                if not isinstance(error.__cause__, OSError):
+                    raise
+                raise MissingError(f"{error}; {self.said()}") from None
 
     def add(self, row: Row) -> None:
         """Keep the row of a finished point.
 
         Raises
         ------
-        MissingError
+        Finger3dError
             If it cannot be written.
         """
         if SAMPLE in row:
-            with self.room(PARTS):
-                store_part(self.folder, _number_of(row), cast(Sample, row[SAMPLE]))
+            store_part(self.folder, row["point"], row[SAMPLE])
             row = {name: value for name, value in row.items() if name != SAMPLE}
-        with self.room(JOURNAL):
-            self._journal.append(row)
-        self.rows[_number_of(row)] = row
-        self.lost.pop(_number_of(row), None)
+        self._journal.append(row)
+        self.rows[row["point"]] = row
+        self.lost.pop(row["point"], None)
 
     def reload(self) -> None:
         """Read the rows from the journal: an interruption may fall between writing a row and its entry in `rows`."""
-        self.rows = {_number_of(row): row for row, _ in journal_rows(self._journal.path, self._journal.task)}
+        self.rows = {row["point"]: row for row, _ in journal_rows(self._journal.path, self._journal.task)}
 
     def lose(self, point: Point, reason: str) -> None:
         """Note why a point has no numbers."""
@@ -98,32 +99,29 @@ class ResultStore:
 
         Raises
         ------
-        MissingError
+        Finger3dError
             If they cannot be written.
         """
         columns = self.columns()
         if not columns["point"]:
             return
-        with self.room(CSV):
-            write_csv(self.folder / CSV, columns)
+        write_csv(self.folder / CSV, columns)
         if grid := [(key, marker) for key, spec in self.sweep.bodies.items() for marker in spec.grid]:
             places = {axis: [getattr(marker, axis) for _, marker in grid] for axis in ("x_mm", "y_mm", "z_mm")}
-            with self.room(GRID):
-                names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
-                write_csv(self.folder / GRID, {**names, **places})
-        with self.room(FILE):
-            write_labels(self.folder, self.sweep, self.rows, columns)
+            names = {"body": [key for key, _ in grid], "marker": [marker.name for _, marker in grid]}
+            write_csv(self.folder / GRID, {**names, **places})
+        write_labels(self.folder, self.sweep, self.rows, columns)
         if _extras.available("pyarrow"):
             import pyarrow as pa
             import pyarrow.parquet as pq
 
-            with self.room(PARQUET), atomic(self.folder / PARQUET) as temporary:
+            with atomic(self.folder / PARQUET) as temporary:
                 pq.write_table(pa.table(columns), temporary)
 
     def columns(self) -> dict[str, Column]:
         """Return the table by column: point, varied keys, numbers of the last step, readings, outcome and times."""
         rows = [row for _, row in sorted((self.rows | self.lost).items())]
-        points = [self.sweep.points[_number_of(row)] for row in rows]
+        points = [self.sweep.points[row["point"]] for row in rows]
         names = list(dict.fromkeys(name for row in rows for name in row if name not in ("point", *_LAST)))
         names.sort(key=lambda name: name not in PressStep.__dataclass_fields__)  # readings follow the other numbers
         found: dict[str, Column] = {"point": [point.number for point in points]}
@@ -148,24 +146,6 @@ class ResultStore:
     def said(self) -> str:
         """Return how many points are kept, and where."""
         return f"{len(self.rows)} of {len(self.sweep.points)} points are kept in {self.folder}"
-
-    @contextmanager
-    def room(self, name: str) -> Iterator[None]:
-        """Convert errors while the block writes a file into a MissingError that states how many points are kept."""
-        try:
-            yield
-        except (OSError, Finger3dError) as error:
-            cause = error.__cause__ or error
-            reason = (isinstance(cause, OSError) and cause.strerror) or str(cause)
-            raise MissingError(
-                f"cannot write {self.folder / name}: {reason}; {self.said()}; make room and run the same command again"
-            ) from None
-
-
-def _number_of(row: Row) -> int:
-    number = row["point"]
-    assert isinstance(number, int)
-    return number
 
 
 def _alike(values: Sequence[object]) -> Column:

@@ -34,7 +34,6 @@ CUTS = 6
 
 def march(
     problem: Problem,
-    near: Sequence[Float] = (),
     workspace: Workspace | None = None,
     cancel: Event | None = None,
     report: Progress = QUIET,
@@ -47,8 +46,6 @@ def march(
     Parameters
     ----------
     problem : Problem
-    near : sequence of (c, d) arrays, N
-        Contact forces at the ends of the increments of a similar press, as initial guesses.
     workspace, cancel, report, cuts : see `Press`
 
     Raises
@@ -57,8 +54,8 @@ def march(
         If `cancel` is set.
     """
     press = Press(problem, workspace, cancel, report, cuts)
-    for number, station in enumerate(stations(problem.model.legs)):
-        yield press.advance(station, near[number] if number < len(near) else None)
+    for station in stations(problem.model.legs):
+        yield press.advance(station)
         if press.has_failed:
             return
 
@@ -109,15 +106,11 @@ class Press:
         body = problem.without_inclusions and replace(problem.without_inclusions, model=problem.model)
         self._without_inclusions = Press(body, self.workspace, report=report) if body else None
 
-    def advance(
-        self, station: Station, guess: Float | None = None, solutions: Sequence[ContactSolution[State[Any]]] = ()
-    ) -> StepResult:
+    def advance(self, station: Station, solutions: Sequence[ContactSolution[State[Any]]] = ()) -> StepResult:
         """Advance to a station, and return the result of the increment.
 
         Parameters
         ----------
-        guess : (c, d) array, N, optional
-            Contact forces where the iteration starts; unless given, they are extrapolated from the last increment.
         solutions : sequence of ContactSolution
             Solutions of the motions that `moves_to` returns, if they are known already.
 
@@ -134,8 +127,7 @@ class Press:
             parts = [Substep(*one) for one in zip(states[:-1], states[1:], moves, strict=True)]
             end = Advanced(solutions[-1], parts, station.pose)
         elif station.load is None:
-            start = self.expected_force(move.end) if guess is None else guess
-            end = self._to_pose(move.end, start)
+            end = self._to_pose(move.end, self.expected_force(move.end))
             if end.solution.outcome is Outcome.NEWTON and self._last_in_halves():
                 end = self._to_pose(move.end, None)
         else:

@@ -30,7 +30,7 @@ _ROWS_FOR_THREADS = 1000
 
 def map_parallel(
     problem: Problem,
-    press: Callable[[Variant, Sequence[Result], Workspace, Event], Result],
+    press: Callable[[Variant, Workspace, Event], Result],
     variants: Sequence[Variant],
     most: int | None = None,
     threads_from: int | None = None,
@@ -44,8 +44,7 @@ def map_parallel(
     ----------
     problem : Problem
         The condensed body.
-    press : function of a variant, the last two results known, a workspace, and the event that cancels it
-        The results may serve as initial guess; workspace and event are for `march`.
+    press : function of a variant, a workspace, and the event that cancels it, both for `march`
     variants : sequence
     most : int, optional
         Largest number of presses at once; the number of cores unless given.
@@ -53,32 +52,27 @@ def map_parallel(
         Number of contact rows from which presses run at once; `_ROWS_FOR_THREADS` unless given.
     """
     formulation = formulation_of(problem.model)
-    last_results: tuple[Result, ...] = ()
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
     least = _ROWS_FOR_THREADS if threads_from is None else threads_from
     if len(problem.system.active_dofs) < least or at_once < 2 or problem.model.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
-            last_results = (*last_results, press(variant, last_results, workspace, cancel))[-2:]
-            yield last_results[-1]
+            yield press(variant, workspace, cancel)
         return
     waiting = iter(variants)
     # The limit on threads is set once around the pool: a limit set by a press would undo that of another.
     with one_thread(), ThreadPoolExecutor(at_once) as pool:
 
         def submitted(count: int) -> list[Future[Result]]:
-            return [
-                pool.submit(press, variant, last_results, formulation.workspace(), cancel)
-                for variant in islice(waiting, count)
-            ]
+            return [pool.submit(press, variant, formulation.workspace(), cancel) for variant in islice(waiting, count)]
 
         running = deque(submitted(at_once))
         try:
             while running:
-                last_results = (*last_results, running.popleft().result())[-2:]
+                found = running.popleft().result()
                 running.extend(submitted(1))
-                yield last_results[-1]
+                yield found
         finally:
             cancel.set()
             pool.shutdown(cancel_futures=True)
