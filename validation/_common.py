@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
@@ -176,7 +176,7 @@ def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
 
 def increment(start: ContactState, free: Float, compliance: Float, mu: float, scale: float) -> ContactSolution:
     """Solve one increment under Coulomb friction; `scale` (mm) is the length of the criterion of convergence."""
-    return solve_increment(ContactProblem.of(start, free, compliance, ContactLaw(Coulomb(mu)), scale))
+    return solve_increment(ContactProblem.of(start, free, compliance, Coulomb(mu), scale))
 
 
 @dataclass(frozen=True)

@@ -243,7 +243,7 @@ def _corrected(trial: _Trial, bordered: BorderedSystem, before: Iterate) -> _Tri
 def _solution(found: _Trial, iterations: int) -> tuple[ContactSolution[ContactState], Float] | None:
     """Return the solution and the motion of the object; None where friction has changed with the pressure."""
     problem, now = found.problem, found.iterate
-    mu = problem.law.friction.updated(problem.friction, now.status, pressure(now.force, problem.area))
+    mu = problem.law.updated(problem.friction, now.status, pressure(now.force, problem.area))
     if (mu != problem.friction).any():
         return None
     missed = residual(now.force, now.displacement, now.status, mu, problem.length_scale)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
-from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.solve import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
@@ -214,11 +213,6 @@ class Model:
             return not self.is_defined_by_increments
         costs = self.is_under_force or (self.domain == "solid" and self.refactorises)
         return not (self.is_defined_by_increments or costs)
-
-    @property
-    def contact_law(self) -> ContactLaw:
-        """Law of the interface between finger and object."""
-        return ContactLaw(self.friction)
 
     @property
     def mixed(self) -> bool:

@@ -340,7 +340,7 @@ class Increment:
         free_displacement = self.relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free_displacement[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
-        law = problem.model.contact_law
+        law = problem.model.friction
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
             contact = ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area)
