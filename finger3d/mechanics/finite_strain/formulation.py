@@ -284,12 +284,6 @@ class FiniteStrain:
         self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
     ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution with its internal variables, unless finger or object passed through the other."""
-        return self._kept_outside(increment, self._remembered(increment, solution))
-
-    def _kept_outside(
-        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
-    ) -> ContactSolution[State[DeformedBody]]:
-        """Return a solution, as not converged if the finger or the object passed through the other."""
         if not solution.outcome.ok:
             return solution
         problem, start, move = increment.problem, increment.start, increment.move
@@ -297,14 +291,6 @@ class FiniteStrain:
         through = passes_through(problem, move, before, after, start.contact.gap)
         if through or pulls(problem, start.contact, solution.state.contact, move):
             return replace(solution, state=start, outcome=Outcome.PASSED_THROUGH)
-        return solution
-
-    def _remembered(
-        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
-    ) -> ContactSolution[State[DeformedBody]]:
-        """Return a solution with the internal variables at the end of the increment."""
-        if not solution.outcome.ok:
-            return solution
         return replace(solution, state=self.remembered(increment, solution.state))
 
     def remembered(self, increment: IncrementEquations, state: State[DeformedBody]) -> State[DeformedBody]:
