@@ -20,7 +20,7 @@ from finger3d.geometry.surface import Triangles
 from finger3d.meshing.bisection import TOO_LONG, refined
 from finger3d.meshing.limits import MeshReport, check_count, mesh_report
 from finger3d.meshing.mesh_files import MAIN_BODY, MeshContents, read_contents
-from finger3d.meshing.sizing import RATE, MeshSizes, SizedPlaces, Zone
+from finger3d.meshing.sizing import RATE, MeshOptions, SizedPlaces, Zone
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -108,7 +108,7 @@ def given_mesh(path: str | Path, scale: float = 1.0) -> GivenMesh:
     return GivenMesh(str(path), content(path), scale, mesh, _surface(mesh))
 
 
-def mesh_given(design: GivenMesh, options: MeshSizes, zone: Zone) -> tuple[Mesh, MeshReport]:
+def mesh_given(design: GivenMesh, options: MeshOptions, zone: Zone) -> tuple[Mesh, MeshReport]:
     """Return the given mesh as it is, or with its cells halved where shorter edges are asked for.
 
     With `size_mm` below the measured edge length at the contact, cells are halved there, and less with the distance;
