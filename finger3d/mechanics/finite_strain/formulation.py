@@ -291,16 +291,12 @@ class FiniteStrain:
         through = passes_through(problem, move, before, after, start.contact.gap)
         if through or pulls(problem, start.contact, solution.state.contact, move):
             return replace(solution, state=start, outcome=Outcome.PASSED_THROUGH)
-        return replace(solution, state=self.remembered(increment, solution.state))
-
-    def remembered(self, increment: IncrementEquations, state: State[DeformedBody]) -> State[DeformedBody]:
-        """Return a state at the end of an increment with its internal variables."""
-        before = increment.start.body.memory
-        if self.relaxation is None or before is None:
-            return state
-        strained = increment.body.relaxing_variables(state.body.unknowns, self.relaxation.bulk)
-        memory = Step(self.relaxation.prony, increment.move.duration_s).after(before, strained)
-        return replace(state, body=replace(state.body, memory=memory))
+        memory, state = start.body.memory, solution.state
+        if self.relaxation is not None and memory is not None:
+            strained = increment.body.relaxing_variables(state.body.unknowns, self.relaxation.bulk)
+            memory = Step(self.relaxation.prony, move.duration_s).after(memory, strained)
+            state = replace(state, body=replace(state.body, memory=memory))
+        return replace(solution, state=state)
 
     def unknowns(self, problem: Problem, states: Sequence[State[DeformedBody]]) -> Iterator[Float]:
         """Yield all unknowns (N,) of each state."""
