@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
 
@@ -88,7 +88,7 @@ def problem_of(
 ) -> ContactProblem:
     """Problem of points under Coulomb's friction, which touch without force at first unless a state is given."""
     before = ContactState.at_rest(np.zeros(len(free)), free.shape[1]) if state is None else state
-    return ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(mu)), scale)
+    return ContactProblem.of(before, free, compliance, Coulomb(mu), scale)
 
 
 def random_problem(dim: int, seed: int = 0, points: int = 7) -> tuple[ContactProblem, np.ndarray]:

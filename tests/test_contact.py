@@ -10,10 +10,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from finger3d.contact.conditions import (
-    ContactLaw,
     ContactProblem,
-    NormalLaw,
-    Signorini,
     project_on_friction_cone,
     residual,
 )
@@ -84,9 +81,7 @@ def test_a_point_slips_at_the_coefficient_of_its_own_pressure() -> None:
     compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs, 1 N on 0.5 mm2
     free = np.array([[-1.0, -0.6]])
     state = ContactState.at_rest(np.zeros(1), 2)
-    found = solve_increment(
-        ContactProblem.of(state, free, compliance, ContactLaw(Saturating(0.9, 2.0)), 1.0, area=np.array([0.5]))
-    )
+    found = solve_increment(ContactProblem.of(state, free, compliance, Saturating(0.9, 2.0), 1.0, area=np.array([0.5])))
     assert found.outcome.ok
     assert found.state.status[0] == SLIP
     assert found.state.force[0] == pytest.approx([1.0, 0.9 / (1.0 + 2.0 / 2.0)], abs=1e-12)
@@ -97,7 +92,7 @@ def test_pressure_dependent_coefficients_agree_with_the_pressures_found() -> Non
     law, state = Saturating(0.8, 0.3), ContactState.at_rest(gap, 2)
     for depth, slide in ((0.2, 0.0), (0.4, 0.0), (0.4, 0.05), (0.4, 0.5)):
         free = np.column_stack([gap - depth, np.full(41, -slide)])
-        found = solve_increment(ContactProblem.of(state, free, compliance, ContactLaw(law), 1.0, area=area))
+        found = solve_increment(ContactProblem.of(state, free, compliance, law, 1.0, area=area))
         assert found.outcome.ok
         mu = law.coefficients(found.state.status, found.state.force[:, 0] / area)
         assert np.ptp(mu[found.state.force[:, 0] > 0.0]) > 0.1
@@ -113,49 +108,10 @@ def test_coefficients_that_never_agree_are_reported() -> None:
 
     state = ContactState.at_rest(np.zeros(1), 2)
     found = solve_increment(
-        ContactProblem.of(
-            state, np.array([[-1.0, -0.6]]), np.eye(2).reshape(1, 2, 1, 2), ContactLaw(Alternating(0.3)), 1.0
-        )
+        ContactProblem.of(state, np.array([[-1.0, -0.6]]), np.eye(2).reshape(1, 2, 1, 2), Alternating(0.3), 1.0)
     )
     assert found.outcome is Outcome.NO_CONVERGENCE
     assert found.state is state
-
-
-@dataclass(frozen=True)
-class Layer(NormalLaw):
-    """Winkler layer: the gap is -k p, in a linear law."""
-
-    mm_per_MPa: float
-
-    def compliance(self, area: np.ndarray) -> np.ndarray:
-        return self.mm_per_MPa / area
-
-
-def pressed(rule: RuleName, law: NormalLaw) -> np.ndarray:
-    """Force on two uncoupled points of 0.5 and 2 mm2 with a compliance of 1 mm/N, pressed by 1 mm."""
-    problem = ContactProblem.of(
-        ContactState.at_rest(np.zeros(2), 2),
-        np.array([[-1.0, 0.0], [-1.0, 0.0]]),
-        np.eye(4).reshape(2, 2, 2, 2),
-        ContactLaw(Coulomb(0.5), law),
-        1.0,
-        area=np.array([0.5, 2.0]),
-    )
-    found = RULES[rule](problem)
-    assert found.outcome.ok
-    assert found.residual <= 1e-12
-    return found.state.force[:, 0]
-
-
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize(
-    ("law", "wanted"), [(Layer(0.5), [1.0 / (1.0 + 1.0), 1.0 / (1.0 + 0.25)]), (Signorini(), [1.0] * 2)]
-)
-def test_a_layer_acts_in_series_with_the_body_and_bare_surfaces_add_nothing(
-    law: NormalLaw, wanted: list[float], rule: RuleName
-) -> None:
-    # springs in series: 1 mm over 1 mm/N of the body and k / A of the layer
-    np.testing.assert_allclose(pressed(rule, law), wanted, rtol=1e-12)
 
 
 def test_only_starting_all_stuck_depends_on_the_steps() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 import finger3d.effects
 from finger3d.cli import main
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, STICK, Coulomb, TwoCoefficients
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
@@ -259,7 +259,7 @@ def test_python_users_are_told_too_that_a_gauge_lies_outside() -> None:
 
 def test_a_point_that_slips_keeps_the_kinetic_limit_until_it_sticks() -> None:
     compliance = np.eye(2).reshape(1, 2, 1, 2)  # one point on two unit springs
-    law = ContactLaw(TwoCoefficients(0.5, 0.6, "keep"))
+    law = TwoCoefficients(0.5, 0.6, "keep")
     state = ContactState.at_rest(np.array([0.0]), 2)
     wanted = [(0.2, STICK, 0.2), (0.6, SLIP, 0.3), (0.7, SLIP, 0.3), (0.6, STICK, 0.2), (0.3, STICK, -0.1)]
     for slide, status, friction in wanted:

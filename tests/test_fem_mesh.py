@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,7 @@ from finger3d.fem.mesh import (
 from finger3d.fem.recovery import strain_and_stress
 from finger3d.fem.solids.hyperelastic import Hyperelastic, TotalLagrangian, nodal_fields
 from tests.meshes import full, grid, points_in
+from validation._common import product_rule
 
 ELEMENTS = [LINE2, LINE3, TRI3, TRI6, TET4, TET10]
 
@@ -59,10 +61,15 @@ def test_gradient_is_the_difference_quotient_of_the_shape_functions(element: Ele
         np.testing.assert_allclose(element.gradient(bary)[:, :, axis], slope, atol=1e-8)
 
 
-@pytest.mark.parametrize("dim", [1, 2, 3])
-@pytest.mark.parametrize("degree", [2, 6])
-def test_quadrature_is_exact_to_its_degree(dim: int, degree: int) -> None:
-    bary, w = quadrature(dim, degree)
+@pytest.mark.parametrize(
+    ("rule", "dim", "degree"),
+    [
+        *((quadrature, *case) for case in [(1, 2), (1, 6), (2, 2), (2, 5), (3, 2), (3, 3)]),
+        *((product_rule, *case) for case in [(1, 6), (2, 6), (3, 6)]),
+    ],
+)
+def test_quadrature_is_exact_to_its_degree(rule: Callable, dim: int, degree: int) -> None:
+    bary, w = rule(dim, degree)
     # integral of a power of a barycentric coordinate over the unit simplex
     for power in range(degree + 1):
         wanted = math.factorial(power) / math.factorial(power + dim)

@@ -20,7 +20,7 @@ from tests.mold_cases import BODIES
 # --- solids and features of molds ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z", "-x", "-y", "-z"])
+@pytest.mark.parametrize("axis", ["y", "z", "-z"])
 def test_solids_start_at_their_point_and_run_along_their_axis(axis) -> None:
     sign, i = (-1.0 if axis.startswith("-") else 1.0), "xyz".index(axis[-1])
     for solid in (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finger3d.accuracy.estimate import press_numbers
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
@@ -30,7 +30,7 @@ def problem_of(compliance: np.ndarray, before: ContactState, motion: np.ndarray,
     c, d = motion.shape
     free = np.column_stack([before.gap, before.tangential_displacement])
     free = free - (compliance.reshape(c * d, c * d) @ before.force.ravel()).reshape(c, d) + motion
-    return ContactProblem.of(before, free, compliance, ContactLaw(Coulomb(mu)), 1.0)
+    return ContactProblem.of(before, free, compliance, Coulomb(mu), 1.0)
 
 
 def pressed_points(points: int = 12, depth: float = 1.0, slide: float = 0.0) -> tuple[ContactState, np.ndarray]:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.special import roots_jacobi
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh import Mesh, boundary, quadratic, quadrature, signed_volumes
+from finger3d.fem.mesh import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.contact_points import contact_geometry
@@ -28,6 +30,26 @@ from finger3d.objects import ObjectPose, vertical_frame
 Field = Callable[[Float], Float]
 
 _DEGREE = 6  # integrates the square of a quadratic element's error, which is cubic, exactly
+
+
+@cache
+def product_rule(dim: int, degree: int) -> tuple[Float, Float]:
+    """Barycentric points (q, dim + 1) and weights (q,) that sum to the reference simplex's volume 1/dim!.
+
+    A Gauss-Jacobi product on the collapsed square or cube (Stroud 1971): positive weights, but not symmetric.
+    """
+    order = degree // 2 + 1
+    rules = []
+    for axis in range(dim):
+        x, w = roots_jacobi(order, dim - 1 - axis, 0.0)
+        rules.append(((x + 1.0) / 2.0, w / 2.0 ** (dim - axis)))
+    grids = np.meshgrid(*[r[0] for r in rules], indexing="ij")
+    weights = np.meshgrid(*[r[1] for r in rules], indexing="ij")
+    coordinates, rest = [], np.ones(order**dim)
+    for g in grids:
+        coordinates.append(rest * g.ravel())
+        rest = rest * (1.0 - g.ravel())
+    return np.stack([rest, *coordinates], axis=1), np.prod([w.ravel() for w in weights], axis=0)
 
 
 def graded(length: float, first: float, growth: float) -> Float:
@@ -98,7 +120,7 @@ def held_at(mesh: Mesh, sides: Mapping[str, Sequence[int]]) -> NDArray[np.bool_]
 
 def body_load(mesh: Mesh, force: Field) -> Float:
     """Consistent nodal loads (n, d) N of a body force (q, d) N/mm3 at points (q, d)."""
-    bary, w = quadrature(mesh.dim, _DEGREE)
+    bary, w = product_rule(mesh.dim, _DEGREE)
     _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
     psi = mesh.element.shape(bary)
     at = np.einsum("qk,ekd->eqd", psi, mesh.points[mesh.cells])
@@ -111,7 +133,7 @@ def body_load(mesh: Mesh, force: Field) -> Float:
 def side_load(mesh: Mesh, label: str, traction: Field) -> Float:
     """Consistent nodal loads (n, d) N of a traction (q, d) MPa at points (q, d) of a side."""
     facets = mesh.facets[label]
-    bary, w = quadrature(mesh.dim - 1, _DEGREE)
+    bary, w = product_rule(mesh.dim - 1, _DEGREE)
     weights = mesh.facet_element.surface_measure(mesh.points[facets], bary) * w
     psi = mesh.facet_element.shape(bary)
     at = np.einsum("qk,mkd->mqd", psi, mesh.points[facets])
@@ -151,7 +173,7 @@ def solve(
 
 def error_norms(mesh: Mesh, u: Float, exact: Field, slope: Field) -> tuple[float, float]:
     """L2 norms of the error of u (n, d) and of its gradient; `slope` gives (q, d, d), first index the component."""
-    bary, w = quadrature(mesh.dim, _DEGREE)
+    bary, w = product_rule(mesh.dim, _DEGREE)
     gradients, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
     psi = mesh.element.shape(bary)
     d = mesh.dim
@@ -167,7 +189,7 @@ def error_norms(mesh: Mesh, u: Float, exact: Field, slope: Field) -> tuple[float
 
 def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
     """L2 norm of the error of vertex pressures (n,), linear over each cell; `exact` gives (q,)."""
-    bary, w = quadrature(mesh.dim, _DEGREE)
+    bary, w = product_rule(mesh.dim, _DEGREE)
     _, det = mesh.element.physical_gradients(mesh.points[mesh.cells], bary)
     at = np.einsum("qk,ekd->eqd", mesh.element.shape(bary), mesh.points[mesh.cells])
     value = pressure[mesh.cells[:, : mesh.dim + 1]] @ bary.T
@@ -176,7 +198,7 @@ def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
 
 def increment(start: ContactState, free: Float, compliance: Float, mu: float, scale: float) -> ContactSolution:
     """Solve one increment under Coulomb friction; `scale` (mm) is the length of the criterion of convergence."""
-    return solve_increment(ContactProblem.of(start, free, compliance, ContactLaw(Coulomb(mu)), scale))
+    return solve_increment(ContactProblem.of(start, free, compliance, Coulomb(mu), scale))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.conditions import TOLERANCE, ContactLaw, ContactProblem, project_on_friction_cone, residual
+from finger3d.contact.conditions import TOLERANCE, ContactProblem, project_on_friction_cone, residual
 from finger3d.contact.friction import SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.discretise.build import widened
@@ -57,7 +57,7 @@ class EachIteration:
                 previous=state,
                 free_motion=free,
                 delassus=np.zeros((0, 0)),
-                law=ContactLaw(Coulomb(MU)),
+                law=Coulomb(MU),
                 length_scale=target.depth_mm,
                 friction=np.full(c, MU),
                 augmentation=self.rho,

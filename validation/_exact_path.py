@@ -481,7 +481,7 @@ def solve_path(problem: Problem, state: State[Float], move: Move, shares: Sequen
     delassus = problem.delassus
     if not (rotations == np.eye(d)).all():
         delassus = rotated_delassus(delassus, rotations, np.arange(len(delassus)))
-    scale, law = length_scale(problem, move), problem.model.contact_law
+    scale, law = length_scale(problem, move), problem.model.friction
     contact = ContactProblem.of(start, free, delassus, law, scale, area=problem.surface.area)
     return ExactPath(problem, move, Event(0.0, start, 0.0, 0), follow(contact, shares), bases)
 

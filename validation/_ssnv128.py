@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, STATUS_NAMES, Coulomb
 from finger3d.contact.solve import maeno_active_set, solve_increment
 from finger3d.contact.state import ContactState
@@ -73,9 +73,7 @@ class Square:
         iterations, worst, settled = 0, 0.0, 0
         for k in range(1, count + 1):
             step = {"projection": solve_increment, "paper": maeno_active_set}[rule]
-            found = step(
-                ContactProblem.of(state, k / count * self.loaded, self.compliance, ContactLaw(Coulomb(mu)), 1e-3 * SIDE)
-            )
+            found = step(ContactProblem.of(state, k / count * self.loaded, self.compliance, Coulomb(mu), 1e-3 * SIDE))
             state, settled = found.state, settled + found.outcome.ok
             iterations, worst = max(iterations, found.iterations), max(worst, found.residual)
         ux = self.slide(state)

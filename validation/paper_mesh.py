@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import OPEN, STICK, Coulomb
 from finger3d.contact.solve import maeno_active_set, solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
@@ -76,7 +76,7 @@ class Coarse:
         found = []
         for step in range(1, 11):
             free = np.stack([top - 0.1 * step, np.zeros(count)], axis=1)
-            found.append(RULES[rule](ContactProblem.of(state, free, compliance, ContactLaw(Coulomb(mu)), 0.1 * step)))
+            found.append(RULES[rule](ContactProblem.of(state, free, compliance, Coulomb(mu), 0.1 * step)))
             state = found[-1].state
         return found
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactLaw, ContactProblem
+from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState
@@ -133,7 +133,7 @@ def _one_point(random: np.random.Generator, loads: int) -> Iterator[Row]:
         for gap, slip in random.uniform((0.005, 0.3), (0.03, 0.5), size=(loads, 2)):
             free = np.array([[gap, -slip]])
             at_rest = ContactState.at_rest(np.zeros(1), 2)
-            problem = ContactProblem.of(at_rest, free, compliance, ContactLaw(Coulomb(mu)), 1.0)
+            problem = ContactProblem.of(at_rest, free, compliance, Coulomb(mu), 1.0)
             guesses = random.normal(size=(20, 1, 2)) * 3.0
             ends = [solve_increment(problem, np.abs(guess) * [1.0, np.sign(guess[0, 1])]) for guess in guesses]
             forces = np.array([end.state.force[0] for end in ends if end.outcome.ok])

@@ -25,7 +25,6 @@ from scipy.optimize import brentq
 from scipy.signal import residue
 
 from finger3d._types import Float
-from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import OPEN, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.fem.assembly import Stiffness, stiffness
@@ -84,7 +83,7 @@ class StandIn:
         material = Isotropic(1.0, self.nu)
         return SimpleNamespace(
             rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
-            materials=lambda labels: (material,), object=Plane(), contact_law=ContactLaw(Coulomb(0.0)),
+            materials=lambda labels: (material,), object=Plane(),
             design=SimpleNamespace(height_mm=HEIGHT_MM), is_defined_by_increments=False,
         )  # fmt: skip
 

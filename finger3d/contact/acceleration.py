@@ -2,7 +2,6 @@
 
 - Warm start: the initial guess alternates a normal contact problem (friction fixed) and a friction problem (normal
   forces fixed), each solved approximately (Panagiotopoulos 1975).
-- Assembly in place: the matrix of an active set is made from the Delassus operator by scaling and adding rows.
 - Mixed precision: in 3D and under moderate friction the matrices are factored in single precision.
 - Chord iterations: the factors are reused while they reduce the residual.
 - Products with the Delassus operator end at the last point that bears a force; the deepest points come first.
@@ -19,7 +18,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,16 @@ from threadpoolctl import ThreadpoolController
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem, lengths, project_on_friction_cone
-from finger3d.contact.newton import ActiveSet, ActiveSetSystem, Iterate, NewtonResult, Precision, lu_solver, newton
+from finger3d.contact.newton import (
+    ActiveSet,
+    ActiveSetSystem,
+    Iterate,
+    NewtonResult,
+    Precision,
+    lu_solver,
+    newton,
+    submatrix,
+)
 
 Array = NDArray[np.floating[Any]]
 Solve = Callable[[Array], Array]
@@ -62,9 +70,6 @@ _FRICTION_CHANGE, _NORMAL_CHANGE = 1e-4, 1e-3
 _NEARLY_FIXED = 1e-2
 """Relative mismatch below which the expected forces are the initial guess themselves."""
 
-_ROWS_IN_CACHE = 64
-"""Rows of the Delassus operator gathered at a time, which takes half the time and memory of one gather."""
-
 _ONE_THREAD_BELOW = 3000
 """Rows of the Delassus operator below which two threads gain little; on a busy machine they lose a factor of 10."""
 
@@ -76,11 +81,11 @@ def accelerated_newton(problem: ContactProblem, expected: Float, limit: int, dam
     precision = first_precision(problem)
     spent = 0
     if precision is np.float32:
-        single = newton(problem, start, FLOAT32_ITERATIONS, damped, precision, chord_iterations, assemble_in_place)
+        single = newton(problem, start, FLOAT32_ITERATIONS, damped, precision, chord_iterations)
         if single.solved:
             return single
         spent = single.iterations
-    double = newton(problem, start, limit, damped, correct=chord_iterations, assembly=assemble_in_place)
+    double = newton(problem, start, limit, damped, correct=chord_iterations)
     return replace(double, iterations=spent + double.iterations)
 
 
@@ -120,36 +125,6 @@ class ShortProducts(ContactProblem):
         forces = force.ravel()
         count = int(np.flatnonzero(forces)[-1:].sum()) + 1 if forces.any() else 0
         return rows[:, :count] @ forces[:count]
-
-
-def assemble_in_place(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:
-    """Return the matrix (k, k) of an active set, as `finger3d.contact.newton.assemble` does.
-
-    The transposed Delassus operator between the points that touch is overwritten: rows are combined to (W P)^T first,
-    then columns are weighted, and the transpose is returned.  A definite operator is symmetric.
-    """
-    slip_dofs = active.slip_dofs
-    touched = np.concatenate([active.active_dofs, *slip_dofs])
-    transposed = problem.delassus if problem.is_definite else problem.delassus.T
-    matrix = _submatrix(transposed, touched, precision)
-    rho, mu_e, t, a = (  # an operand in double precision would make all of it double
-        cast(Array, x.astype(precision, copy=False))
-        for x in (problem.augmentation.ravel(), active.slip_force_direction, active.tangent, active.turning)
-    )
-    m, s = len(active.active_dofs), len(active.slip_points)
-    normal, *tangents = (slice(m + i * s, m + (i + 1) * s) for i in range(-1, len(slip_dofs)))
-    for i, rows in enumerate(tangents):
-        matrix[normal] += mu_e[:, i, None] * matrix[rows]
-    matrix[:, :m] *= rho[active.active_dofs]
-    if active.is_3d:
-        first, second = tangents
-        matrix[first] *= t[:, 0, None]
-        matrix[first] += t[:, 1, None] * matrix[second]
-        matrix[: m + s, first] *= a * t[:, 0] * rho[slip_dofs[0]]
-        matrix[: m + s, first] += matrix[: m + s, second] * (a * t[:, 1] * rho[slip_dofs[1]])
-        across = np.arange(m, m + s)
-        matrix[across, across] += 1.0 - a
-    return matrix[: active.size, : active.size].T
 
 
 def chord_iterations(problem: ContactProblem, system: ActiveSetSystem, initial: Iterate) -> Iterate:
@@ -241,15 +216,6 @@ def _deepest(gap: Float, closing: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return gap <= np.quantile(gap[closing], _DEEP) if closing.any() else closing
 
 
-def _submatrix(delassus: Float, dofs: NDArray[np.int64], precision: Precision) -> Array:
-    """Return the Delassus operator (k, k) between directions (k,); some rows at a time stay in the cache."""
-    submatrix = np.empty((len(dofs), len(dofs)), precision)
-    for first in range(0, len(dofs), _ROWS_IN_CACHE):
-        part = slice(first, first + _ROWS_IN_CACHE)
-        submatrix[part] = delassus[dofs[part]].take(dofs, axis=1)
-    return submatrix
-
-
 def _normal_contact(
     problem: ContactProblem, expected: Float, touches: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], Array, Solve]:
@@ -269,7 +235,7 @@ def _normal_contact(
     open_gap = problem.gap(force)
     for _ in range(_ACTIVE_SETS):
         points = np.flatnonzero(touches)
-        solve_normal: Solve = lu_solver(_submatrix(problem.delassus, points * d, _PRECISION[d]), reuse=d > 2)
+        solve_normal: Solve = lu_solver(submatrix(problem.delassus, points * d, _PRECISION[d]), reuse=d > 2)
         force[:] = 0.0
         penetration: Array = (-open_gap[points]).astype(_PRECISION[d])
         force[points, 0] = normal = solve_normal(penetration)
@@ -300,7 +266,7 @@ class _ActivePoints(NamedTuple):
     def of(cls, problem: ContactProblem, points: NDArray[np.int64], solve_normal: Solve) -> _ActivePoints:
         d, k = problem.free_motion.shape[1], len(points)
         dofs = (np.arange(d)[:, None] + points * d).ravel()
-        block = _submatrix(problem.delassus, dofs, _PRECISION[d])
+        block = submatrix(problem.delassus, dofs, _PRECISION[d])
         free, rho = (a.ravel()[dofs].astype(block.dtype) for a in (problem.free_motion, problem.augmentation))
         coupling, tangential = block[:k, k:], block[k:, k:]
         rho = rho[k:]

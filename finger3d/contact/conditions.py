@@ -13,42 +13,15 @@ Equivalently r = P(r - rho w), where P projects on the friction cone and rho > 0
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
+from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.contact.state import ContactState, pressure
 from finger3d.errors import Outcome
-
-
-class NormalLaw(ABC):
-    """Relation between gap and normal force of a contact point."""
-
-    @abstractmethod
-    def compliance(self, area: Float) -> Float:
-        """Return the compliance (c,) mm/N of the interface at points with tributary areas (c,) mm2."""
-
-
-@dataclass(frozen=True)
-class Signorini(NormalLaw):
-    """Unilateral contact of bare surfaces (Maeno 2004, Eqs. 1 and 2): no gap where a force acts."""
-
-    def compliance(self, area: Float) -> Float:
-        """Return zeros."""
-        return np.zeros(len(area))
-
-
-@dataclass(frozen=True)
-class ContactLaw:
-    """Friction law and normal law of an interface."""
-
-    friction: FrictionLaw = field(default_factory=Coulomb)
-    normal: NormalLaw = field(default_factory=Signorini)
-
 
 TOLERANCE = 1e-8
 """Largest residual of an increment that is called converged."""
@@ -66,7 +39,7 @@ class ContactProblem:
         Gap and increment of tangential displacement that the points would have without contact forces.
     delassus : (c d, c d) array, mm/N
         Relative displacement per contact force.
-    law : ContactLaw
+    law : FrictionLaw
     length_scale : float, mm
         Length by which violated gaps and slips are divided in the residual: the press depth.
     friction : (c,) array
@@ -83,7 +56,7 @@ class ContactProblem:
     previous: ContactState
     free_motion: Float
     delassus: Float
-    law: ContactLaw
+    law: FrictionLaw
     length_scale: float
     friction: Float
     augmentation: Float
@@ -96,7 +69,7 @@ class ContactProblem:
         previous: ContactState,
         free_displacement: Float,
         delassus: Float,
-        law: ContactLaw,
+        law: FrictionLaw,
         length_scale: float,
         augmentation: Float | None = None,
         area: Float | None = None,
@@ -114,18 +87,13 @@ class ContactProblem:
         motion = free_displacement.copy()
         motion[:, 1:] -= previous.tangential_displacement
         matrix = delassus.reshape(motion.size, motion.size)
-        compliance = np.zeros(0) if area is None else law.normal.compliance(area)
-        if compliance.any():
-            normals = np.arange(0, motion.size, motion.shape[1])
-            matrix = matrix.copy()
-            matrix[normals, normals] += compliance
         return cls(
             previous=previous,
             free_motion=motion,
             delassus=matrix,
             law=law,
             length_scale=length_scale,
-            friction=law.friction.coefficients(previous.status, pressure(previous.force, area)),
+            friction=law.coefficients(previous.status, pressure(previous.force, area)),
             augmentation=augmentation_parameters(matrix, motion.shape[1]) if augmentation is None else augmentation,
             area=area,
             is_definite=augmentation is None,

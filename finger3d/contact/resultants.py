@@ -11,7 +11,6 @@ from finger3d._types import Float
 from finger3d.contact.acceleration import (
     FLOAT32_ITERATIONS,
     ShortProducts,
-    assemble_in_place,
     chord_step,
     first_precision,
     threads_for,
@@ -95,7 +94,7 @@ class BorderedSystem(NamedTuple):
         cls, problem: ContactProblem, active: ActiveSet, conditions: ForceConditions, precision: Precision = np.float64
     ) -> BorderedSystem:
         """Assemble and factor the equations; raises LinAlgError if those of the active set are singular."""
-        system = ActiveSetSystem.of(problem, active, precision, assemble_in_place)
+        system = ActiveSetSystem.of(problem, active, precision)
         motion = conditions.motion.T.reshape(-1, *problem.free_motion.shape)
         changes = [active.force(system.solve(-active.weighted(problem, one))) for one in motion]
         return cls(system, conditions, np.array(changes))
@@ -243,7 +242,7 @@ def _corrected(trial: _Trial, bordered: BorderedSystem, before: Iterate) -> _Tri
 def _solution(found: _Trial, iterations: int) -> tuple[ContactSolution[ContactState], Float] | None:
     """Return the solution and the motion of the object; None where friction has changed with the pressure."""
     problem, now = found.problem, found.iterate
-    mu = problem.law.friction.updated(problem.friction, now.status, pressure(now.force, problem.area))
+    mu = problem.law.updated(problem.friction, now.status, pressure(now.force, problem.area))
     if (mu != problem.friction).any():
         return None
     missed = residual(now.force, now.displacement, now.status, mu, problem.length_scale)

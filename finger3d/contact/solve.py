@@ -71,7 +71,7 @@ def solve_increment(problem: ContactProblem, guess: Float | None = None) -> Cont
         Its outcome is CONVERGED only if the residual of the conditions, evaluated afterwards, is at most `TOLERANCE`.
     """
     previous = problem.previous
-    law = problem.law.friction
+    law = problem.law
     if problem.refusal:
         return ContactSolution(previous, problem.refusal, np.inf, 0, "none")
     with threads_for(problem.free_motion.size):

@@ -219,7 +219,7 @@ def stiffness(mesh: Mesh, elastic: LinearElasticity, thickness: float = 1.0) -> 
         Width of a 2D section (1 for a solid), so that forces are N.
     """
     d = mesh.dim
-    bary, w = quadrature(d, 2 if mesh.element.is_quadratic else 1)
+    bary, w = quadrature(d, 2)
     pattern = Pattern.of(mesh, elastic.mixed)
     data = np.zeros(len(pattern.indices))
     hats = bary  # the linear shape functions

@@ -131,8 +131,7 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
 
     In 1D it is Gauss and Legendre's rule. Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix
     1973), degree 3 in 3D is Keast's 5-point rule (1986), whose weight at the centre is negative, and degree 5 in 2D is
-    Radon's symmetric 7-point rule (1948). Any other is a Gauss-Jacobi product on the collapsed square or cube (Stroud
-    1971): positive weights, but not symmetric.
+    Radon's symmetric 7-point rule (1948). There is no other.
     """
     if dim == 1:
         x, w = np.polynomial.legendre.leggauss(degree // 2 + 1)
@@ -152,20 +151,7 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
     if degree == 3 and dim == 3:
         ends = np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0
         return np.vstack([np.full((1, 4), 0.25), ends]), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)
-    from scipy.special import roots_jacobi
-
-    order = degree // 2 + 1
-    rules = []
-    for axis in range(dim):
-        x, w = roots_jacobi(order, dim - 1 - axis, 0.0)
-        rules.append(((x + 1.0) / 2.0, w / 2.0 ** (dim - axis)))
-    grids = np.meshgrid(*[r[0] for r in rules], indexing="ij")
-    weights = np.meshgrid(*[r[1] for r in rules], indexing="ij")
-    coordinates, rest = [], np.ones(order**dim)
-    for g in grids:
-        coordinates.append(rest * g.ravel())
-        rest = rest * (1.0 - g.ravel())
-    return np.stack([rest, *coordinates], axis=1), np.prod([w.ravel() for w in weights], axis=0)
+    raise ValueError(f"no rule of degree {degree} for a simplex of dimension {dim}")
 
 
 def _inverted(matrix: Float) -> tuple[Float, Float]:
@@ -395,6 +381,14 @@ def reflect_into_part(point: Float, direction: Float, axes: tuple[str, ...], dim
     """Return a place and a direction (3,) in the meshed part (d,), reflected if they lie in a mirror image."""
     sign = np.array([-1.0 if a in axes and v < 0.0 else 1.0 for a, v in zip("xyz", point, strict=True)])
     return (point * sign)[:dim], (direction * sign)[:dim]
+
+
+def signs_into_part(points: Float, axes: Iterable[str]) -> Float:
+    """Return the factors (p, d), 1 or -1, that reflect points (p, d) into the meshed part."""
+    sign = np.ones_like(points)
+    for k in axis_numbers(axes):
+        sign[points[:, k] < 0.0, k] = -1.0
+    return sign
 
 
 def unfold(mesh: Mesh, axes: tuple[int, ...]) -> tuple[Mesh, Int, Float]:

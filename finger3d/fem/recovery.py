@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Elasticity
-from finger3d.fem.mesh import Mesh, MeshPart, axis_numbers, locate, part_of_facets, quadrature, signed_volumes
+from finger3d.fem.mesh import Mesh, MeshPart, locate, part_of_facets, quadrature, signed_volumes, signs_into_part
 
 Across = Callable[[Float, Float], tuple[Float, Float]]
 
@@ -161,9 +161,7 @@ class StrainReader:
     def at(cls, mesh: Mesh, points: Float, axes: tuple[str, ...]) -> StrainReader:
         """Find the cells of points (p, d)."""
         d = mesh.dim
-        turn = np.ones_like(points)
-        for i in axis_numbers(axes):
-            turn[:, i] = np.where(points[:, i] < 0.0, -1.0, 1.0)
+        turn = signs_into_part(points, axes)
         cells, bary = locate(mesh, points * turn)
         inside = cells >= 0
         nodes = mesh.points[mesh.cells[cells[inside]]]

@@ -210,6 +210,12 @@ def restrict(surface: BoundarySurface, keep: NDArray[np.bool_] | Int) -> Boundar
     )
 
 
+def points_at(surface: BoundarySurface, nodes: Int, face: NDArray[np.int8]) -> BoundarySurface:
+    """Return the contact points of a surface at some nodes (k,) of some faces (k,), in this order."""
+    place = {key: k for k, key in enumerate(zip(surface.nodes.tolist(), surface.face.tolist(), strict=True))}
+    return restrict(surface, np.array([place[key] for key in zip(nodes.tolist(), face.tolist(), strict=True)]))
+
+
 def contact_face(surface: BoundarySurface) -> BoundarySurface:
     """Return the points of the contact face."""
     on_face = surface.face == CONTACT

@@ -13,7 +13,6 @@ from finger3d._types import Array, Float
 
 if TYPE_CHECKING:
     from OCP.STEPControl import STEPControl_Reader
-    from OCP.TDF import TDF_Label
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopoDS import TopoDS_Shape
 
@@ -115,48 +114,18 @@ def _label(name: str) -> str:
 
 def _product_names(path: str, solids: Sequence[TopoDS_Shape]) -> list[str]:
     """Return the name of the product that each solid belongs to; empty where the file has one product only."""
-    from OCP.collections import Sequence_TDF_Label
-    from OCP.STEPCAFControl import STEPCAFControl_Reader
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDF import TDF_Label
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopLoc import TopLoc_Location
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+    from build123d import import_step
 
-    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
-    reader = STEPCAFControl_Reader()
-    reader.SetNameMode(True)
-    reader.ReadFile(path)
-    reader.Transfer(document)
-    named_solids: list[tuple[Float, str]] = []
-
-    def visit(entry: TDF_Label, location: TopLoc_Location) -> None:
-        product = entry
-        if XCAFDoc_ShapeTool.IsReference_s(entry):
-            product = TDF_Label()
-            XCAFDoc_ShapeTool.GetReferredShape_s(entry, product)
-            location = location.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(entry))
-        components = Sequence_TDF_Label()
-        if XCAFDoc_ShapeTool.GetComponents_s(product, components):
-            for component in components:
-                visit(component, location)
-        else:
-            shape = XCAFDoc_ShapeTool.GetShape_s(product).Moved(location)
-            named_solids.extend(
-                (_centre(s), _attribute(product)) for s in _inside(shape, TopAbs_ShapeEnum.TopAbs_SOLID)
-            )
-
-    free = Sequence_TDF_Label()
-    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
-    if free.Length() == 1 and not XCAFDoc_ShapeTool.IsAssembly_s(free.Value(1)):
+    body = import_step(path)
+    named = [
+        (_centre(solid.wrapped.Moved(leaf.location.inverse().wrapped).Moved(leaf.global_location.wrapped)), leaf.label)
+        for leaf in body.leaves
+        for solid in leaf.solids()
+    ]
+    if not body.children or not named:
         return [""] * len(solids)
-    for entry in free:
-        visit(entry, TopLoc_Location())
-    if not named_solids:
-        return [""] * len(solids)
-    centres = np.array([centre for centre, _ in named_solids])
-    return [named_solids[int(np.linalg.norm(centres - _centre(solid), axis=1).argmin())][1] for solid in solids]
+    centres = np.array([centre for centre, _ in named])
+    return [named[int(np.linalg.norm(centres - _centre(solid), axis=1).argmin())][1] for solid in solids]
 
 
 def _centre(solid: TopoDS_Shape) -> Float:
@@ -168,12 +137,3 @@ def _centre(solid: TopoDS_Shape) -> Float:
     BRepGProp.VolumeProperties_s(solid, properties)
     centre = properties.CentreOfMass()
     return np.array([centre.X(), centre.Y(), centre.Z()])
-
-
-def _attribute(entry: TDF_Label) -> str:
-    """Return the name of an entry of the document."""
-    from OCP.TCollection import TCollection_AsciiString
-    from OCP.TDataStd import TDataStd_Name
-
-    name = TDataStd_Name()
-    return str(TCollection_AsciiString(name.Get()).ToCString()) if entry.FindAttribute(name.GetID_s(), name) else ""

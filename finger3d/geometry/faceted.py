@@ -33,7 +33,7 @@ class Network:
     @cached_property
     def _sides(self) -> tuple[Int, Int]:
         """Edges (e, 2), and the patches (e, 2) on their two sides, the smaller one first."""
-        a, b, edges = _neighbours(self.surface)
+        a, b, edges = self.surface.neighbours
         return edges, np.sort(np.stack([self.patch[a], self.patch[b]], axis=1), axis=1)
 
     @cached_property
@@ -51,7 +51,7 @@ class Network:
             edges, sides = self._sides
             shared = edges[np.all(sides == sorted(patches), axis=1)]
             if len(shared):
-                return _on_segments(points, self.surface.points[shared])
+                return on_segments(points, self.surface.points[shared])
         corners = [v for v, here in enumerate(self.at_point) if here.issuperset(patches)]
         if not corners:
             return None
@@ -60,8 +60,8 @@ class Network:
         return value
 
 
-def _on_segments(points: Float, segments: Float) -> Float:
-    """Closest points (n, 3) of segments (s, 2, 3)."""
+def on_segments(points: Float, segments: Float) -> Float:
+    """Return the closest points (n, d) of segments (s, 2, d)."""
     out = np.zeros_like(points)
     best = np.full(len(points), np.inf)
     for start, stop in segments:
@@ -89,7 +89,7 @@ class Faceted:
     @cached_property
     def radius(self) -> float:
         """A small radius of curvature on the patch, mm: from the angles between neighbours; inf where it is flat."""
-        a, b, edge = _neighbours(self.triangles)
+        a, b, edge = self.triangles.neighbours
         angle = np.arccos(np.clip(np.einsum("ij,ij->i", self.triangles.normals[a], self.triangles.normals[b]), -1, 1))
         bent = (angle > _LEAST_BEND) & (angle < math.acos(_CREASE_COSINE))
         if not bent.any():
@@ -149,19 +149,9 @@ def _looks_up(surface: Triangles, base: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _joined(surface: Triangles, kind: Int) -> Int:
     """Return the number (m,) of the patch of each triangle; a patch is of one kind and has no crease."""
-    a, b, _ = _neighbours(surface)
+    a, b, _ = surface.neighbours
     joined = (kind[a] == kind[b]) & (np.einsum("ij,ij->i", surface.normals[a], surface.normals[b]) > _CREASE_COSINE)
     return connected(len(kind), a[joined], b[joined])
-
-
-def _neighbours(surface: Triangles) -> tuple[Int, Int, Int]:
-    """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two."""
-    edges = np.sort(surface.edges, axis=1)
-    order = np.lexsort(edges.T)
-    edges = edges[order]
-    owner = np.repeat(np.arange(len(surface.faces)), 3)[order]
-    pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
-    return owner[pair], owner[pair + 1], edges[pair]
 
 
 def coarser(body: Tessellation, tolerance: float) -> Tessellation:

@@ -18,7 +18,7 @@ from finger3d._extras import require
 from finger3d._ranges import number
 from finger3d._types import Float
 from finger3d.errors import Finger3dError
-from finger3d.geometry.surface import Triangles, connected
+from finger3d.geometry.surface import Triangles, connected, has_three_corners
 from finger3d.geometry.surface_checks import crossings, mistake
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
     """Merge equal points, and near points along open edges; triangles without area are dropped."""
     _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
     points, faces = points[first], number.reshape(-1)[faces]
-    surface = Triangles(points, _proper(faces))
+    surface = Triangles(points, faces[has_three_corners(faces)])
     unique, count = np.unique(np.sort(surface.edges, axis=1), axis=0, return_counts=True)
     loose = np.unique(unique[count == 1])
     if not len(loose) or not np.isfinite(points).all():
@@ -175,13 +175,8 @@ def welded(points: Float, faces: NDArray[np.int64]) -> Triangles:
     near = loose[cKDTree(points[loose]).query_pairs(_WELD_DISTANCE * surface.size, output_type="ndarray")]
     number = connected(len(points), *near.T)
     _, first = np.unique(number, return_index=True)
-    return Triangles(points[first], _proper(number[faces]))
-
-
-def _proper(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    a, b, c = faces.T
-    value: NDArray[np.int64] = faces[(a != b) & (b != c) & (c != a)]
-    return value
+    faces = number[faces]
+    return Triangles(points[first], faces[has_three_corners(faces)])
 
 
 def read_solid(path: Path) -> Solid:

@@ -29,6 +29,10 @@ Up: TypeAlias = Literal["y", "z"]
 
 SMALLEST_MM, LARGEST_MM = 0.2, 5000.0
 
+_UNIT = (
+    "was it drawn in another unit? The numbers of an STL file are read as mm; give its scale in [finger], such as "
+    "25.4 for inches"
+)
 _BASE_NAME = "base"  # of a face in a STEP file
 _BASE_FLATNESS = 1e-5  # largest distance of the base from its plane, over the size
 _DOWNWARD = 1.0 - 1e-6  # least component along -y of the base's unit normal
@@ -89,6 +93,15 @@ class FileDesign(Design):
         """Return the corners (k, 2), x and z in mm, of the triangles that face up; one of them may touch first."""
         up = self.surface.normals[:, 1] > 0.0
         return self.surface.points[np.unique(self.surface.faces[up])][:, ::2]
+
+
+def check_size(path: object, size: Float, unit: str) -> None:
+    """Raise a Finger3dError for a body of a size (3,) that is too small or too large; it asks for the unit."""
+    if not SMALLEST_MM <= float(np.linalg.norm(size)) <= LARGEST_MM:
+        raise Finger3dError(
+            f"{path}: the body is {in_mm(*size)} large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; "
+            f"{unit}"
+        )
 
 
 def extent(design: Design) -> str:
@@ -301,7 +314,7 @@ def of_surface(surface: Triangles, name: str, upside_down: bool = False) -> Impo
 def _on_its_base(
     path: str, digest: str, scale: float, upside_down: bool, surface: Triangles, solid: Solid | None
 ) -> Imported:
-    _check_size(path, surface)
+    check_size(path, surface.high - surface.low, _UNIT)
     base = _base(path, surface, "highest" if upside_down else "lowest")
     corners = surface.corners[base].reshape(-1, 3)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
@@ -346,16 +359,6 @@ def _turn(path: Path, solid: Solid, base: list[Face]) -> Callable[[Solid], Solid
             "must be its outermost plane"
         )
     return turned
-
-
-def _check_size(path: str, surface: Triangles) -> None:
-    if not SMALLEST_MM <= surface.size <= LARGEST_MM:
-        extent = " x ".join(f"{e:.4g}" for e in surface.high - surface.low)
-        raise Finger3dError(
-            f"{path}: the body is {extent} mm large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; was "
-            "it drawn in another unit? The numbers of an STL file are read as mm; give its scale in [finger], such as "
-            "25.4 for inches"
-        )
 
 
 def _base(path: str, surface: Triangles, which: str) -> NDArray[np.bool_]:

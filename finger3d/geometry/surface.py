@@ -166,6 +166,16 @@ class Triangles:
         return self.faces[:, _EDGES].reshape(-1, 2)
 
     @cached_property
+    def neighbours(self) -> tuple[Int, Int, Int]:
+        """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two; each pair of successive ones."""
+        edges = np.sort(self.edges, axis=1)
+        order = np.lexsort(edges.T)
+        edges = edges[order]
+        owner = np.repeat(np.arange(len(self.faces)), 3)[order]
+        pair = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+        return owner[pair], owner[pair + 1], edges[pair]
+
+    @cached_property
     def area_vectors(self) -> Float:
         """Normals (m, 3) as long as the area, mm2."""
         a, b, c = self.corners.transpose(1, 0, 2)
@@ -398,6 +408,12 @@ class Triangles:
         far = length > 1e-9 * self.size
         normal[far] = out[far] * (sign[far] / length[far])[:, None]
         return sign * length, normal
+
+
+def has_three_corners(faces: Int) -> Bool:
+    """Return which triangles (m,) have three different corners."""
+    a, b, c = faces.T
+    return np.asarray((a != b) & (b != c) & (c != a))
 
 
 def connected(count: int, a: Int, b: Int) -> Int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.geometry.cad import OUTSIDE, Glued, GluedFace, labelled_faces
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface import Triangles, has_three_corners
 
 if TYPE_CHECKING:
     from build123d import Compound, Face, Shape, Solid
@@ -270,13 +270,8 @@ def voids_of(solid: Solid | Compound, tolerance_mm: float) -> Triangles:
 
 def _seams_at_points(triangles: Int, face: Int, count: int) -> Int:
     """Number (n,) of edges at every point that lie between different faces."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    owner = np.repeat(face, 3)
-    order = np.lexsort([owner, edges[:, 1], edges[:, 0]])
-    edges, owner = edges[order], owner[order]
-    between = (edges[1:] == edges[:-1]).all(axis=1) & (owner[1:] != owner[:-1])
-    seams = np.unique(edges[1:][between], axis=0)
-    return np.bincount(seams.ravel(), minlength=count)
+    a, b, edges = Triangles(np.zeros((count, 3)), triangles).neighbours  # in the order of the faces
+    return np.bincount(np.unique(edges[face[a] != face[b]], axis=0).ravel(), minlength=count)
 
 
 def triangulated(solid: Shape, faces: list[Face], tolerance_mm: float, angle: float) -> tuple[Float, Int, Int]:
@@ -299,8 +294,7 @@ def triangulated(solid: Shape, faces: list[Face], tolerance_mm: float, angle: fl
         np.round(points / _WELD).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
     points, triangles = points[first], weld.reshape(-1)[triangles]
-    a, b, c = triangles.T
-    good = (a != b) & (b != c) & (c != a)  # a sphere's pole is an edge without length
+    good = has_three_corners(triangles)  # a sphere's pole is an edge without length
     return points, triangles[good], face[good]
 
 

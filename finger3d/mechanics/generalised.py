@@ -18,6 +18,7 @@ from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.resultants import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
+from finger3d.fem.tensors import in_space
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose
 from finger3d.objects.rigid import rotation
@@ -181,9 +182,7 @@ def resultants(problem: Problem, pose: ObjectPose, points: Float, numbers: Seque
 def _fields(problem: Problem, pose: ObjectPose, points: Float, numbers: Sequence[int], axes: Float) -> Float:
     """Return the motions of points (n, d) in a body that turns about axes (3, 3) through its reference point."""
     d, placed = points.shape[1], problem.placed(pose)
-    arm = np.zeros((len(points), 3))
-    arm[:, :d] = placed.brought_together(points)
-    arm -= reference_point(problem, pose)
+    arm = in_space(placed.brought_together(points)) - reference_point(problem, pose)
     found = [
         np.tile(_DIRECTIONS[j], (len(arm), 1)) if j in _DIRECTIONS else np.cross(axes[j - 3], arm) for j in numbers
     ]

@@ -315,9 +315,7 @@ def contact_table(points: ContactPoints, step: StepResult) -> Tree:
     padded = np.zeros((len(state.accumulated_slip), points.dim))
     padded[:, 1:] = state.accumulated_slip
     slip = points.to_global(padded)
-    along = np.zeros_like(padded)
-    along[:, 0] = 1.0
-    normal = points.to_global(along)
+    normal = _normals(points, state)
     return {
         "face": [FREE_FACES[k] for k in points.face],
         "x_mm": points.points[:, 0],

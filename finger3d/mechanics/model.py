@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Literal
 
-from finger3d.contact.conditions import ContactLaw
 from finger3d.contact.friction import Coulomb, FrictionLaw
 from finger3d.contact.solve import STEP_DEPENDENT_RULES, RuleName
 from finger3d.fem.laws import IsochoricLaw
@@ -15,7 +14,7 @@ from finger3d.fem.laws.material import RIGID_RATIO, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.geometry.design import Design
 from finger3d.mechanics.readings import Column, Gauge, Marker, Reading, Taxel
-from finger3d.meshing.sizing import Mesher, SizedPlaces
+from finger3d.meshing.sizing import MeshOptions
 from finger3d.objects import (
     ContactPath,
     FirstTouch,
@@ -85,33 +84,6 @@ class Leg:
         return ObjectPose(
             self.depth_mm, self.slide_x_mm, self.slide_z_mm, time_s, self.turn_x, self.turn_y, self.turn_z
         )
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
-
-    `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
-    free end.  `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face
-    close to them; at 1 the mesh is not refined.
-    `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
-    lengths there, once a press has found it.
-    """
-
-    size_mm: float
-    base_size_mm: float
-    mesher: Mesher = "ftetwild"
-    layers: int = 2
-    gauge_refinement: float = 1.0
-    stick_refinement: float = 1.0
-    borders: SizedPlaces | None = None
-
-    def as_table(self) -> dict[str, float | str]:
-        """The keys of ``[mesh]`` in a scene."""
-        sizes: dict[str, float | str] = {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm}
-        finer = {} if self.gauge_refinement == 1.0 else {"gauge_refinement": self.gauge_refinement}
-        finer |= {} if self.stick_refinement == 1.0 else {"stick_refinement": self.stick_refinement}
-        return sizes | finer | {"mesher": self.mesher}
 
 
 @dataclass(frozen=True)
@@ -214,11 +186,6 @@ class Model:
             return not self.is_defined_by_increments
         costs = self.is_under_force or (self.domain == "solid" and self.refactorises)
         return not (self.is_defined_by_increments or costs)
-
-    @property
-    def contact_law(self) -> ContactLaw:
-        """Law of the interface between finger and object."""
-        return ContactLaw(self.friction)
 
     @property
     def mixed(self) -> bool:

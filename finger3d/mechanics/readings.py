@@ -225,14 +225,8 @@ class Taxel:
         """Return the row (1, N) of the pressure: nodal forces are the stiffness times the unknowns."""
         upper = body.stiffness.upper
         on_forces = np.zeros(upper.shape[0])
-        on_forces[: body.mesh.points.size] = self.base_displacement(body)
+        on_forces[1 : body.mesh.points.size : body.mesh.dim] = self._weights(body)
         return sp.csr_matrix(times(upper, on_forces))
-
-    def base_displacement(self, body: MeshedBody) -> Float:
-        """Return the nodal displacements (n d,) whose work with the nodal forces is the pressure, per mm2."""
-        displacement = np.zeros(body.mesh.points.shape)
-        displacement[:, 1] = self._weights(body)
-        return displacement.ravel()
 
     def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
         """Return the pressure (1,)."""
@@ -320,7 +314,13 @@ class Gauge:
 
     def at_finite_strain(self, body: MeshedBody, u: Float, forces: Float) -> Float:
         """Return the relative elongation of the line, (1,)."""
-        return np.array([self.finite_strain(body.mesh, u, body.axes)])
+        from finger3d.fem.solids.hyperelastic import stretch
+
+        mesh, axes = body.mesh, body.axes
+        if self.is_point:
+            return np.array([stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))])
+        start, end = (moved_place(mesh, u, place, axes) for place in self.ends)
+        return np.array([float(np.linalg.norm(end - start)) / self.length_mm - 1.0])
 
     def row(self, mesh: Mesh, axes: tuple[str, ...]) -> sp.csr_matrix:
         """Return the row (1, n d) that gives the strain from small displacements of a meshed part."""
@@ -329,15 +329,6 @@ class Gauge:
             return strain_row(mesh, *reflect_into_part(self.middle, along, axes, mesh.dim))
         start, end = (displacement_row(mesh, *reflect_into_part(x, along, axes, mesh.dim)) for x in self.ends)
         return sp.csr_matrix((end - start) / self.length_mm)
-
-    def finite_strain(self, mesh: Mesh, u: Float, axes: tuple[str, ...]) -> float:
-        """Return the relative elongation of the line under displacements u (n, d), mm, of a meshed part."""
-        from finger3d.fem.solids.hyperelastic import stretch
-
-        if self.is_point:
-            return stretch(mesh, u, *reflect_into_part(self.middle, self.direction, axes, mesh.dim))
-        start, end = (moved_place(mesh, u, place, axes) for place in self.ends)
-        return float(np.linalg.norm(end - start)) / self.length_mm - 1.0
 
 
 ORDER = 1.2

@@ -30,7 +30,7 @@ from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
 from finger3d.fem.recovery import displacement
 from finger3d.fem.surface import BoundarySurface
-from finger3d.fem.tensors import rotated_delassus
+from finger3d.fem.tensors import in_space, rotated_delassus
 from finger3d.mechanics.discretise.contact_points import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Loads, Workspace, length_scale
@@ -77,7 +77,7 @@ def moves_too_far(problem: Problem, move: Move, gap: Float, carried: Float) -> b
     farthest = int(length.argmax())
     if not length[farthest]:
         return False
-    motion = _in_space(carried[farthest][None]) @ problem.placed(move.start).turned
+    motion = in_space(carried[farthest][None]) @ problem.placed(move.start).turned
     return bool(length[farthest] > _MOST_CHORD * thing.mean_chord(motion[0] / length[farthest]) * (1.0 + 1e-9))
 
 
@@ -96,8 +96,8 @@ def passes_through(problem: Problem, move: Move, before: Float, after: Float, ga
     if thing.is_flat:
         return False
     points = problem.surface.points
-    start = problem.placed(move.start).to_own(_in_space(points + before))
-    path = problem.placed(move.end).to_own(_in_space(points + after)) - start
+    start = problem.placed(move.start).to_own(in_space(points + before))
+    path = problem.placed(move.end).to_own(in_space(points + after)) - start
     length = np.linalg.norm(path, axis=1)
     near = np.flatnonzero((np.maximum(gap, 0.0) < length) & (length > 0.0))
     value, normal = thing.distance(start[near])
@@ -144,11 +144,6 @@ def pulls(problem: Problem, before: ContactState, after: ContactState, move: Mov
     return normal[0] <= 0.0 < normal[1] - _TOUCHES * float(np.abs(after.force).max(initial=0.0))
 
 
-def _in_space(vectors: Float) -> Float:
-    """Return vectors (n, d) as (n, 3)."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
 _TARGET = 1e-9
 """Error of the geometry at which the iteration ends; below `TOLERANCE`, to which other errors add."""
 
@@ -165,8 +160,8 @@ more than this."""
 _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
 
-_MEMORY = 3
-"""Earlier displacements from which the next is extrapolated (Anderson 1965)."""
+_MEMORY, _SAME = 3, 1e-10
+"""Earlier displacements from which the next is extrapolated, and relative difference of their steps that is none."""
 
 
 @dataclass(frozen=True)
@@ -217,15 +212,19 @@ def solve_increment(
     return IncrementToForces(problem, state, move, body, workspace.tracker, wanted).solve(guess)
 
 
-def extrapolated(tried: list[Float], results: list[Float]) -> Float:
-    """Return the next displacement from those tried and those found from them, by Anderson's method."""
-    if len(tried) == 1:
-        return results[-1]
-    residuals = np.stack([(g - x).ravel() for x, g in zip(tried, results, strict=True)])
-    change = residuals[1:] - residuals[:-1]
-    moved = np.stack([(b - a).ravel() for a, b in zip(results, results[1:], strict=False)])
-    weights = np.linalg.lstsq(change.T, residuals[-1], rcond=1e-10)[0]
-    return np.asarray(results[-1] - (weights @ moved).reshape(results[-1].shape))
+def accelerated(ends: Sequence[Float], steps: Sequence[Float], rcond: float | None = None) -> Float:
+    """Return the next z (m,) of a fixed-point iteration z -> g(z), accelerated by secants (Anderson 1965).
+
+    It is the combination of g(z) in the last iterations, with weights of sum 1, that has the shortest step.
+
+    Parameters
+    ----------
+    ends : g(z) (m,) of each iteration
+    steps : (k,), g(z) - z or as much of it as is to be short
+    rcond : singular value of the differences of steps, over the largest, that counts as none
+    """
+    weights = np.linalg.lstsq(np.diff(steps, axis=0).T, steps[-1], rcond=rcond)[0]
+    return np.asarray(ends[-1] - weights @ np.diff(ends, axis=0))
 
 
 @dataclass(frozen=True)
@@ -301,7 +300,10 @@ class Increment:
             tried, displacements = [*tried, seen[0]][-_MEMORY:], [*displacements, seen[1]][-_MEMORY:]
             expansion_point, following = displacement, after
             if len(tried) > 1:
-                expansion_point = extrapolated(tried, displacements) + increment.moved_from(self)
+                ends = [one.ravel() for one in displacements]
+                steps = [(end - one.ravel()) for end, one in zip(ends, tried, strict=True)]
+                expansion_point = accelerated(ends, steps, _SAME).reshape(displacement.shape)
+                expansion_point += increment.moved_from(self)
                 following = increment.geometry(expansion_point)
             geometry = following.holding(held, geometry)
         if error > TOLERANCE:
@@ -340,7 +342,7 @@ class Increment:
         free_displacement = self.relative(geometry, expansion_point, self.body.past @ vertical_frame(d))
         free_displacement[:, 1:] += start.tangential_displacement
         scale, area = length_scale(problem, self.move), problem.surface.area
-        law = problem.model.contact_law
+        law = problem.model.friction
         rotations = geometry.from_reference
         if (rotations == np.eye(d)).all():
             contact = ContactProblem.of(start, free_displacement, self.body.delassus, law, scale, area=area)
@@ -491,8 +493,7 @@ def carried_by_object(problem: Problem, move: Move, displacement: Float) -> Floa
     d, start, end = displacement.shape[1], move.start, move.end
     if start.turns == end.turns and problem.system.second is None:
         return np.broadcast_to((end.displacement - start.displacement)[:d], displacement.shape)
-    points = np.zeros((len(displacement), 3))
-    points[:, :d] = problem.surface.centroids + displacement
+    points = in_space(problem.surface.centroids + displacement)
     return problem.placed(end).moved_from(problem.placed(start), points)[:, :d]
 
 

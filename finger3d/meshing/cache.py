@@ -17,7 +17,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.io import read_arrays, write_arrays
-from finger3d.meshing.sizing import MeshSizes, Zone
+from finger3d.meshing.sizing import MeshOptions, Zone
 
 _PACKAGES = {"ftetwild": ("pytetwild", "build123d"), "netgen": ("netgen-mesher", "build123d")}
 
@@ -29,7 +29,7 @@ def folder() -> Path:
     return Path(os.environ.get("FINGER3D_CACHE") or user_cache_dir("finger3d")) / "meshes"
 
 
-def key(design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...]) -> str:
+def key(design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...]) -> str:
     """Return the SHA-256 of the design, all source that draws and meshes it, sizes, zone, symmetry, and versions."""
     try:
         code = hashlib.sha256(Path(inspect.getfile(type(design))).read_bytes()).hexdigest()

@@ -13,7 +13,7 @@ from finger3d.geometry.design import Design
 from finger3d.meshing import cache
 from finger3d.meshing.given import GivenMesh, mesh_given
 from finger3d.meshing.limits import MeshReport, check_sizes, is_possible, mesh_report
-from finger3d.meshing.sizing import MeshSizes, Zone, count_cells, rounded_zone, sizing
+from finger3d.meshing.sizing import MeshOptions, Zone, count_cells, rounded_zone, sizing
 from finger3d.meshing.swept import cell_count, mesh_swept
 from finger3d.meshing.unstructured.solids import box
 from finger3d.progress import QUIET, Progress
@@ -21,7 +21,7 @@ from finger3d.progress import QUIET, Progress
 
 def mesh_solid(
     design: Design,
-    options: MeshSizes,
+    options: MeshOptions,
     zone: Zone,
     symmetry: tuple[str, ...] = (),
     report: Progress = QUIET,
@@ -50,7 +50,7 @@ def mesh_solid(
 
 
 def is_meshable(
-    design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...] = (), rows: float = 0.0
+    design: Design, options: MeshOptions, zone: Zone, dim: int, symmetry: tuple[str, ...] = (), rows: float = 0.0
 ) -> bool:
     """Return whether a mesh of these edge lengths with `rows` of contact is estimated to fit, without making it.
 
@@ -73,7 +73,7 @@ def is_meshable(
 
 
 def _mesh_unstructured(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
+    design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, MeshReport]:
     """Mesh a design by fTetWild or netgen, or read the mesh from the cache."""
     check_sizes(design, options, 3)

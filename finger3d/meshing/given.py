@@ -13,14 +13,14 @@ import numpy as np
 from finger3d._ranges import four_digits
 from finger3d._types import Float, Int
 from finger3d.errors import Finger3dError
-from finger3d.fem.mesh import EDGES, FACETS, Mesh, curved_jacobians, curved_volume, quadratic, signed_volumes
+from finger3d.fem.mesh import EDGES, FACETS, Mesh, boundary, curved_jacobians, curved_volume, quadratic, signed_volumes
 from finger3d.geometry.files import content, welded
-from finger3d.geometry.imported import LARGEST_MM, SMALLEST_MM, FileDesign
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.imported import FileDesign, check_size
+from finger3d.geometry.surface import Triangles, connected
 from finger3d.meshing.bisection import TOO_LONG, refined
 from finger3d.meshing.limits import MeshReport, check_count, mesh_report
 from finger3d.meshing.mesh_files import MAIN_BODY, MeshContents, read_contents
-from finger3d.meshing.sizing import RATE, MeshSizes, SizedPlaces, Zone
+from finger3d.meshing.sizing import RATE, MeshOptions, SizedPlaces, Zone
 
 if TYPE_CHECKING:
     from build123d import Solid
@@ -30,6 +30,7 @@ NEEDED = ("contact", "base")
 """Facets that a file must name."""
 
 _KEPT = ("contact", "base", "walls", "ends")  # names of facets with a meaning; others are walls
+_UNIT = "was it meshed in another unit? Its numbers are read as mm; give its scale in [finger], such as 1000 for metres"
 _CUTS = ("symmetry_x", "symmetry_z")
 _LEVEL = 1e-6  # largest distance of the base from its plane, over the size
 _STRAIGHT = 1e-9  # largest distance of a node from the middle of its edge on a straight facet, over the size
@@ -108,7 +109,7 @@ def given_mesh(path: str | Path, scale: float = 1.0) -> GivenMesh:
     return GivenMesh(str(path), content(path), scale, mesh, _surface(mesh))
 
 
-def mesh_given(design: GivenMesh, options: MeshSizes, zone: Zone) -> tuple[Mesh, MeshReport]:
+def mesh_given(design: GivenMesh, options: MeshOptions, zone: Zone) -> tuple[Mesh, MeshReport]:
     """Return the given mesh as it is, or with its cells halved where shorter edges are asked for.
 
     With `size_mm` below the measured edge length at the contact, cells are halved there, and less with the distance;
@@ -173,31 +174,22 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
         raise Finger3dError(
             f"{path}: facets are named '{cuts[0]}', but symmetry is not used with a mesh; give the whole finger"
         )
-    used, cells = np.unique(contents.cells, return_inverse=True)
+    corners = contents.cells[:, :4]
+    used, cells = np.unique(corners, return_inverse=True)
+    cells = cells.reshape(corners.shape)
     numbers = np.full(len(contents.points), -1)
     numbers[used] = np.arange(len(used))
-    mesh = Mesh(contents.points[used], cells.reshape(contents.cells.shape), {})
-    facets, key = _boundary(mesh)
-    named = np.sort(numbers[contents.triangles], axis=1)
+    facets = boundary(cells, 3)
+    named, key = (np.sort(triangles, axis=1) for triangles in (numbers[contents.triangles], facets))
     label = _labels(path, contents, named, key)
     labelled = {name: facets[label == name] for name in _KEPT}
     part, part_labels = _parts(contents)
-    whole = replace(mesh, facets=labelled, part=part, part_labels=part_labels)
-    return whole if mesh.element.is_quadratic else quadratic(whole)
-
-
-def _boundary(mesh: Mesh) -> tuple[Int, Int]:
-    """Return the outward boundary facets (m, 3 | 6), and their corners (m, 3) in ascending order."""
-    local = FACETS[3]
-    if mesh.element.is_quadratic:
-        number = {tuple(sorted(edge)): 4 + k for k, edge in enumerate(EDGES[3].tolist())}
-        middles = [[number[tuple(sorted((f[i], f[j])))] for i, j in EDGES[2].tolist()] for f in local.tolist()]
-        local = np.hstack([local, np.array(middles)])
-    faces = mesh.cells[:, local].reshape(-1, local.shape[1])
-    corners = np.sort(faces[:, :3], axis=1)
-    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
-    chosen = np.sort(first[count == 1])
-    return faces[chosen], corners[chosen]
+    mesh = quadratic(Mesh(contents.points[used], cells, labelled, part, part_labels))
+    if contents.cells.shape[1] == 4:
+        return mesh
+    points = mesh.points.copy()
+    points[mesh.cells[:, 4:]] = contents.points[contents.cells[:, 4:]]  # the middles of curved edges
+    return replace(mesh, points=points)
 
 
 def _labels(path: Path, contents: MeshContents, named: Int, boundary: Int) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
@@ -251,15 +243,11 @@ def _check_cells(path: Path, mesh: Mesh) -> None:
 
 def _check_connected(path: Path, mesh: Mesh) -> None:
     """Refuse bodies that share no facets."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     corners = np.sort(mesh.cells[:, FACETS[3]].reshape(-1, 3), axis=1)
     _, number = np.unique(corners, axis=0, return_inverse=True)
     count = len(mesh.cells)
     cell, face = np.repeat(np.arange(count), 4), count + number.reshape(-1)
-    links = coo_matrix((np.ones(len(cell)), (cell, face)), shape=(int(face.max()) + 1,) * 2)
-    bodies = connected_components(links, directed=False)[0]
+    bodies = int(connected(int(face.max()) + 1, cell, face).max()) + 1
     if bodies > 1:
         raise Finger3dError(
             f"{path}: the tetrahedra are {bodies} bodies that share no facets; mesh them as one, with common nodes "
@@ -271,12 +259,7 @@ def _on_its_base(path: Path, mesh: Mesh) -> Mesh:
     """Return the mesh with the middle of its base at the origin; refuse a base that is not the lowest plane."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     size = float(np.linalg.norm(high - low))
-    if not SMALLEST_MM <= size <= LARGEST_MM:
-        extent = " x ".join(f"{e:.4g}" for e in high - low)
-        raise Finger3dError(
-            f"{path}: the body is {extent} mm large, allowed: a diagonal of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; was "
-            "it meshed in another unit? Its numbers are read as mm; give its scale in [finger], such as 1000 for metres"
-        )
+    check_size(path, high - low, _UNIT)
     nodes = np.unique(mesh.facets["base"])
     level = mesh.points[nodes, 1]
     y0, y1 = float(level.min()), float(level.max())

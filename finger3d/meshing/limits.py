@@ -15,7 +15,7 @@ from finger3d._ranges import at_most
 from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh, curved_volume, min_angle_deg
 from finger3d.geometry.design import Design
-from finger3d.meshing.sizing import MeshSizes, Sizing, count_cells
+from finger3d.meshing.sizing import MeshOptions, Sizing, count_cells
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def mesh_report(
     )
 
 
-def check_sizes(design: Design, options: MeshSizes, dim: int) -> None:
+def check_sizes(design: Design, options: MeshOptions, dim: int) -> None:
     """Raise a Finger3dError for edge lengths that are not positive, in the wrong order, or exceed the finger."""
     for key in ("size_mm", "base_size_mm"):
         value = getattr(options, key)
@@ -99,7 +99,7 @@ def is_possible(cells: float, dim: int, cap: float = math.inf, rows: float = 0.0
     return mesh_gb(cells, dim) + rows_gb(rows) <= MEMORY_SHARE * _machine_gb() and cells <= cap
 
 
-def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.inf) -> None:
+def check_count(cells: float, dim: int, options: MeshOptions, cap: float = math.inf) -> None:
     """Raise a Finger3dError for a mesh estimated to need too much memory or more than `cap` cells."""
     if is_possible(cells, dim, cap):
         return
@@ -116,7 +116,7 @@ def check_count(cells: float, dim: int, options: MeshSizes, cap: float = math.in
     )
 
 
-def checked_tets(design: Design, field: Sizing, options: MeshSizes) -> float:
+def checked_tets(design: Design, field: Sizing, options: MeshOptions) -> float:
     """Return the estimated number of tets of an unstructured mesh; raise a Finger3dError if these are too many."""
     cells = count_cells(design, field)
     check_count(cells, 3, options, MAX_TETS)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from finger3d._cost import tets_made
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
+from finger3d.fem.tensors import in_space
 from finger3d.geometry.design import Design
 
 if TYPE_CHECKING:
@@ -23,26 +24,6 @@ Mesher = Literal["ftetwild", "netgen", "swept"]
 
 Zone = tuple[float, float, float, float]
 """x_min, x_max, z_min, z_max in mm: where contact is predicted."""
-
-
-class MeshSizes(Protocol):
-    """Edge lengths of a mesh, and the mesher of solids."""
-
-    @property
-    def size_mm(self) -> float:
-        """Edge length in the contact zone."""
-
-    @property
-    def base_size_mm(self) -> float:
-        """Edge length far from the contact zone."""
-
-    @property
-    def mesher(self) -> Mesher:
-        """Mesher of solids."""
-
-    @property
-    def layers(self) -> int:
-        """Least number of layers of a swept mesh over half the width."""
 
 
 _CLASSES_PER_DOUBLING = 2
@@ -70,6 +51,33 @@ class SizedPlaces:
         return np.asarray(self.size + self.rate * np.maximum(self.tree.query(points)[0] - self.reach, 0.0))
 
 
+@dataclass(frozen=True)
+class MeshOptions:
+    """Edge lengths at the contact and far from it (mm), and the mesher (solids only; sections are structured).
+
+    `layers` is the least number of layers of a swept mesh over half the width; one layer cannot follow the bulge of a
+    free end.  `gauge_refinement` is the edge length at the contact over that around gauges and on the contact face
+    close to them; at 1 the mesh is not refined.
+    `stick_refinement` is the edge length at the contact over that at the border of stick, and `borders` are the edge
+    lengths there, once a press has found it.
+    """
+
+    size_mm: float
+    base_size_mm: float
+    mesher: Mesher = "ftetwild"
+    layers: int = 2
+    gauge_refinement: float = 1.0
+    stick_refinement: float = 1.0
+    borders: SizedPlaces | None = None
+
+    def as_table(self) -> dict[str, float | str]:
+        """The keys of ``[mesh]`` in a scene."""
+        sizes: dict[str, float | str] = {"size_mm": self.size_mm, "base_size_mm": self.base_size_mm}
+        finer = {} if self.gauge_refinement == 1.0 else {"gauge_refinement": self.gauge_refinement}
+        finer |= {} if self.stick_refinement == 1.0 else {"stick_refinement": self.stick_refinement}
+        return sizes | finer | {"mesher": self.mesher}
+
+
 @dataclass(frozen=True, eq=False)
 class Grading:
     """Edge length as a function of position: the least of ``h_k + rate |x - x_k|`` over points x_k.
@@ -88,8 +96,7 @@ class Grading:
 
     def at(self, points: Float, rate: float) -> Float:
         """Return the edge length (n,) mm at points (n, d), at the mirror images of the part too."""
-        places = np.zeros((len(points), 3))
-        places[:, : points.shape[1]] = points
+        places = in_space(points)
         places[:, [0, 2]] = np.abs(places[:, [0, 2]])
         classes = np.round(_CLASSES_PER_DOUBLING * np.log2(self.sizes)).astype(int)
         out = np.full(len(points), math.inf)
@@ -177,7 +184,7 @@ class Sizing:
         return bool(self.zone[:, 2].min() <= inner[0] and self.zone[:, 2].max() >= inner[1])
 
 
-def rounded_zone(design: Design, options: MeshSizes, zone: Zone) -> Zone:
+def rounded_zone(design: Design, options: MeshOptions, zone: Zone) -> Zone:
     """Return the zone widened to multiples of the edge length in the footprint, so that similar zones share a mesh."""
     size = options.size_mm
     reach = (design.half_length_mm, design.half_length_mm, 0.5 * design.width_mm, 0.5 * design.width_mm)
@@ -188,7 +195,7 @@ def rounded_zone(design: Design, options: MeshSizes, zone: Zone) -> Zone:
     return clipped[0], clipped[1], clipped[2], clipped[3]
 
 
-def sizing(design: Design, options: MeshSizes, zone: Zone, low: Float, high: Float) -> Sizing:
+def sizing(design: Design, options: MeshOptions, zone: Zone, low: Float, high: Float) -> Sizing:
     """Return the size field of a body in the box from `low` to `high` (3,), mm.
 
     Raises

@@ -16,14 +16,14 @@ from finger3d.geometry.design import Design, lacks_section
 from finger3d.geometry.section import Arc, Flat, Section
 from finger3d.meshing.grid import GridLayout, Sizes, folded_zone, rows
 from finger3d.meshing.limits import MeshReport, check_count, check_sizes, mesh_report
-from finger3d.meshing.sizing import MeshSizes, Zone
+from finger3d.meshing.sizing import MeshOptions, Zone
 
 _AXIS = {"x": 0, "z": 2}
 _LEAST_ANGLE_DEG = 0.5  # of a cell; smaller angles occur where a wall or an edge is far thinner than the mesh
 
 
 def mesh_section(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
+    design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...] = ()
 ) -> tuple[Mesh, MeshReport]:
     """Mesh the section of an extruded design with quadratic triangles, an exact mirror image of itself about x = 0.
 
@@ -47,7 +47,7 @@ def mesh_section(
 
 
 def mesh_swept(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...] = ()
+    design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...] = ()
 ) -> tuple[Mesh, MeshReport]:
     """Mesh an extruded design with quadratic tets, exactly symmetric about x = 0 and z = 0; see :func:`mesh_section`.
 
@@ -69,25 +69,25 @@ def mesh_swept(
     return whole, _fit(mesh_report(whole, multiple, section.area_mm2 * design.width_mm, seconds), design, options)
 
 
-def cell_count(design: Design, options: MeshSizes, zone: Zone, dim: int, symmetry: tuple[str, ...]) -> float:
+def cell_count(design: Design, options: MeshOptions, zone: Zone, dim: int, symmetry: tuple[str, ...]) -> float:
     """Return the number of cells of a mesh of :func:`mesh_section` or :func:`mesh_swept`, without making it."""
     return 2.0 * len(_layout(design, options, zone, dim)[0].points) * _copies(design, options, dim, symmetry)
 
 
-def _layers(design: Design, options: MeshSizes) -> int:
+def _layers(design: Design, options: MeshOptions) -> int:
     """Return the number of layers over half the width."""
     # Friction varies along z as it does along x, so no layer is thicker than the edge length at the contact.
     return max(options.layers, math.ceil(0.5 * design.width_mm / options.size_mm - 1e-9))
 
 
-def _copies(design: Design, options: MeshSizes, dim: int, symmetry: tuple[str, ...]) -> int:
+def _copies(design: Design, options: MeshOptions, dim: int, symmetry: tuple[str, ...]) -> int:
     """Return the number of cells for each triangle of the half section."""
     each = 1 if dim == 2 else 3 * _layers(design, options)
     mirrors = sum(axis not in symmetry for axis in "xz"[: dim - 1])
     return int(each * 2**mirrors)
 
 
-def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
+def _fit(quality: MeshReport, design: Design, options: MeshOptions) -> MeshReport:
     """Return the report, or raise a Finger3dError for cells that are too flat."""
     if quality.min_dihedral_deg >= _LEAST_ANGLE_DEG:
         return quality
@@ -97,14 +97,14 @@ def _fit(quality: MeshReport, design: Design, options: MeshSizes) -> MeshReport:
     )
 
 
-def _grid(design: Design, options: MeshSizes, zone: Zone, dim: int, copies: int) -> tuple[GridLayout, Section]:
+def _grid(design: Design, options: MeshOptions, zone: Zone, dim: int, copies: int) -> tuple[GridLayout, Section]:
     """Return the rows of the half section; a mesh of `copies` cells per triangle must fit the memory."""
     layout, section = _layout(design, options, zone, dim)
     check_count(2.0 * len(layout.points) * copies, dim, options)
     return layout, section
 
 
-def _layout(design: Design, options: MeshSizes, zone: Zone, dim: int) -> tuple[GridLayout, Section]:
+def _layout(design: Design, options: MeshOptions, zone: Zone, dim: int) -> tuple[GridLayout, Section]:
     section = design.section()
     if section is None:
         what, allowed = ("model.domain", "'solid'") if dim == 2 else ("mesh.mesher = 'swept'", "'ftetwild'")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d.errors import Finger3dError
+from finger3d.geometry.faceted import on_segments
 from finger3d.geometry.surface import Triangles
 
 if TYPE_CHECKING:
@@ -70,13 +71,10 @@ def disc(middle: Sequence[float], diameter: float) -> CrossSection:
 
 def inside(region: CrossSection, point: Sequence[float]) -> bool:
     """Return whether a point lies in a region, by the even-odd rule."""
-    x, y = point
-    crossed = 0
-    for polygon in region.to_polygons():
-        ends = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
-        a, b = ends[(ends[:, 0, 1] > y) != (ends[:, 1, 1] > y)].transpose(1, 0, 2)
-        crossed += int((x < a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])).sum())
-    return crossed % 2 == 1
+    from matplotlib.path import Path
+
+    place = point[0], point[1]
+    return sum(Path(polygon).contains_point(place) for polygon in region.to_polygons()) % 2 == 1
 
 
 def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]:
@@ -84,16 +82,9 @@ def nearest(region: CrossSection, point: Sequence[float]) -> tuple[float, float]
     target = np.asarray(point, dtype=float)
     if inside(region, point):
         return float(target[0]), float(target[1])
-    best, distance = target, np.inf
-    for polygon in region.to_polygons():
-        a, along = polygon, np.roll(polygon, -1, axis=0) - polygon
-        length = np.maximum(np.einsum("ij,ij->i", along, along), 1e-300)
-        fraction = np.clip(np.einsum("ij,ij->i", target - a, along) / length, 0.0, 1.0)
-        feet = a + fraction[:, None] * along
-        off = np.linalg.norm(feet - target, axis=1)
-        if off.min() < distance:
-            best, distance = feet[int(off.argmin())], float(off.min())
-    return float(best[0]), float(best[1])
+    sides = [np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1) for polygon in region.to_polygons()]
+    x, z = on_segments(target[None], np.concatenate([*sides, np.zeros((0, 2, 2))]))[0]
+    return float(x), float(z)
 
 
 def difference(body: Triangles, tool: Triangles) -> Triangles:

@@ -15,15 +15,12 @@ if TYPE_CHECKING:
 
 
 Place = tuple[float, float, float]
-Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Axis = Literal["y", "z", "-z"]
 
 _ROTATIONS = {
     "z": (0, 0, 0),
     "-z": (180, 0, 0),
     "y": (-90, 0, 0),
-    "-y": (90, 0, 0),
-    "x": (0, 90, 0),
-    "-x": (0, -90, 0),
 }  # degrees that turn z onto the axis
 
 LEAD_IN = 0.15
@@ -83,7 +80,7 @@ def _along(start: Place, distance: float, axis: Axis) -> Place:
     return moved[0], moved[1], moved[2]
 
 
-def one(shape: Shape, name: str, advice: str = "choose a thicker --wall-mm") -> Solid:
+def one(shape: Shape, name: str, advice: str = "change the body, or choose another --split") -> Solid:
     """Return the one valid solid of a shape.
 
     Raises

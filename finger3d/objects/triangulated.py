@@ -65,17 +65,7 @@ class MeshObject(RigidObject):
 
     def profile(self, x: Float, z: Float) -> Float:
         """Return where a vertical line from below first meets the body, exact on its triangles; nan beside it."""
-        x, z = (np.ascontiguousarray(v, dtype=float) for v in np.broadcast_arrays(x, z))
-        # Every increment evaluates the same points: their heights are kept until other points are given.
-        key = (x.tobytes(), z.tobytes())
-        if key not in self._known:
-            self._known.clear()
-            self._known[key] = self.triangles.height(x, z)
-        return self._known[key].copy()
-
-    @cached_property
-    def _known(self) -> dict[tuple[bytes, bytes], Float]:
-        return {}
+        return self.triangles.height(x, z)
 
     def lowest_point(self, turned: Float) -> Float:
         """Return the lowest point after a rotation."""

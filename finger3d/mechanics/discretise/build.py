@@ -20,7 +20,7 @@ from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import elasticity_of, moduli_of
 from finger3d.fem.mesh import CONTACT, Mesh
 from finger3d.fem.solvers.condense import Condensation, condense, stiffened
-from finger3d.fem.surface import BoundarySurface, local_rows, restrict
+from finger3d.fem.surface import BoundarySurface, local_rows, points_at, restrict
 from finger3d.mechanics.discretise.body_mesh import locally_refined, stretched, with_points_of
 from finger3d.mechanics.discretise.contact_points import MARGIN, contact_geometry, may_touch
 from finger3d.mechanics.discretise.problem import (
@@ -146,11 +146,8 @@ def _moved(problem: Problem, model: Model) -> Mesh:
 
 def _same_points(problem: Problem, model: Model, mesh: Mesh) -> BoundarySurface:
     """Return the contact points of a problem in a mesh that has moved."""
-    own = free_surface(problem.model, problem.mesh, problem.body.thickness)
     free = free_surface(model, mesh, 1.0 if mesh.dim == 3 else model.design.width_mm)
-    place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(own.nodes, own.face, strict=True))}
-    face = problem.surface
-    return restrict(free, np.array([place[int(n), int(f)] for n, f in zip(face.nodes, face.face, strict=True)]))
+    return points_at(free, problem.surface.nodes, problem.surface.face)
 
 
 def _condensed(

@@ -114,23 +114,6 @@ class ContactPoints:
         nearest = np.flatnonzero(end & (self.face == CONTACT))
         return self.points[nearest, 0], nearest
 
-    def rim(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return which points (m,) of a zone an edge joins with a point outside it."""
-        i, j = self.edges.T
-        out = np.zeros(len(inside), dtype=bool)
-        out[i[inside[i] & ~inside[j]]] = True
-        out[j[inside[j] & ~inside[i]]] = True
-        return out
-
-    def resolved(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return which points (m,) of a zone lie where it is three points wide: inner ones and their neighbours."""
-        inner = inside & ~self.rim(inside)
-        i, j = self.edges.T
-        out = inner.copy()
-        out[i[inner[j] & inside[i]]] = True
-        out[j[inner[i] & inside[j]]] = True
-        return out
-
     def sides_of(self, place: tuple[float, float]) -> Float:
         """Return on which sides (m, 2) of a place (x, z), mm, the points are: -1, 1, or 0 at the place."""
         apart = self.points[:, ::2] - place

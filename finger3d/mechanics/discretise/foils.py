@@ -28,8 +28,6 @@ from finger3d.fem.surface import displacement_rows
 from finger3d.mechanics.model import Foils, Model
 from finger3d.mechanics.readings import Gauge
 
-_COINCIDENT = 1e-9  # mm, and radians
-
 
 @dataclass(frozen=True)
 class EmbeddedBars:
@@ -79,14 +77,12 @@ class EmbeddedBars:
 
 def foil_mirrors(model: Model) -> frozenset[str]:
     """Return the planes, "x" and "z", about which the foils of all gauges together are symmetric."""
-    foils = [_geometry(gauge) for gauge in model.gauges]
+    foils = {_place(gauge) for gauge in model.gauges}
     images = {
         "x": [replace(g, x_mm=-g.x_mm, angle=math.pi - g.angle) for g in model.gauges],
         "z": [replace(g, z_mm=-g.z_mm) for g in model.gauges],
     }
-    return frozenset(
-        axis for axis, image in images.items() if all(any(_coincide(_geometry(g), h) for h in foils) for g in image)
-    )
+    return frozenset(axis for axis, image in images.items() if {_place(gauge) for gauge in image} <= foils)
 
 
 def discretised_foils(inclusions: Foils, model: Model, mesh: Mesh, axes: tuple[str, ...]) -> EmbeddedBars:
@@ -182,12 +178,8 @@ def _key(a: Float, b: Float, axes: tuple[str, ...], dim: int) -> tuple[float, ..
     return tuple(np.round(np.concatenate(images), 9) + 0.0)
 
 
-def _geometry(gauge: Gauge) -> Float:
-    """Return middle (mm), direction within half a turn, and length, which identify a foil."""
-    return np.array([gauge.x_mm, gauge.y_mm, gauge.z_mm, gauge.angle % math.pi, gauge.length_mm])
-
-
-def _coincide(a: Float, b: Float) -> bool:
-    apart = np.abs(a - b)
-    apart[3] = min(apart[3], math.pi - apart[3])
-    return bool((apart <= _COINCIDENT).all())
+def _place(gauge: Gauge) -> tuple[float, ...]:
+    """Return a key of middle (mm), direction within half a turn, and length, which identify a foil."""
+    twice = 2.0 * gauge.angle
+    place = [gauge.x_mm, gauge.y_mm, gauge.z_mm, math.cos(twice), math.sin(twice), gauge.length_mm]
+    return tuple(np.round(place, 9) + 0.0)

@@ -245,9 +245,9 @@ class Problem:
         """All unknowns (N,) of the part's body under contact forces (c, d)."""
         return self.unknowns_of_rows(self.row_forces(force))
 
-    def unknowns_of(self, forces: Sequence[Float], block: int = _AT_ONCE) -> Iterator[Float]:
-        """All unknowns (N,) for each of several forces (c, d), by solutions for about `block` unknowns at once."""
-        at_once = max(1, block // self.body.stiffness.upper.shape[0])
+    def unknowns_of(self, forces: Sequence[Float]) -> Iterator[Float]:
+        """All unknowns (N,) for each of several forces (c, d), by solutions for many at once."""
+        at_once = max(1, _AT_ONCE // self.body.stiffness.upper.shape[0])
         for first in range(0, len(forces), at_once):
             rows = np.stack([self.row_forces(force) for force in forces[first : first + at_once]], axis=1)
             yield from self.unknowns_of_rows(rows).T

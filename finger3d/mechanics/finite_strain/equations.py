@@ -312,7 +312,7 @@ class IncrementEquations:
             start,
             free_displacement,
             delassus,
-            problem.model.contact_law,
+            problem.model.friction,
             self.length_scale,
             self._augmentation,
             problem.surface.area,

@@ -284,12 +284,6 @@ class FiniteStrain:
         self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
     ) -> ContactSolution[State[DeformedBody]]:
         """Return a solution with its internal variables, unless finger or object passed through the other."""
-        return self._kept_outside(increment, self._remembered(increment, solution))
-
-    def _kept_outside(
-        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
-    ) -> ContactSolution[State[DeformedBody]]:
-        """Return a solution, as not converged if the finger or the object passed through the other."""
         if not solution.outcome.ok:
             return solution
         problem, start, move = increment.problem, increment.start, increment.move
@@ -297,24 +291,12 @@ class FiniteStrain:
         through = passes_through(problem, move, before, after, start.contact.gap)
         if through or pulls(problem, start.contact, solution.state.contact, move):
             return replace(solution, state=start, outcome=Outcome.PASSED_THROUGH)
-        return solution
-
-    def _remembered(
-        self, increment: FiniteIncrement, solution: ContactSolution[State[DeformedBody]]
-    ) -> ContactSolution[State[DeformedBody]]:
-        """Return a solution with the internal variables at the end of the increment."""
-        if not solution.outcome.ok:
-            return solution
-        return replace(solution, state=self.remembered(increment, solution.state))
-
-    def remembered(self, increment: IncrementEquations, state: State[DeformedBody]) -> State[DeformedBody]:
-        """Return a state at the end of an increment with its internal variables."""
-        before = increment.start.body.memory
-        if self.relaxation is None or before is None:
-            return state
-        strained = increment.body.relaxing_variables(state.body.unknowns, self.relaxation.bulk)
-        memory = Step(self.relaxation.prony, increment.move.duration_s).after(before, strained)
-        return replace(state, body=replace(state.body, memory=memory))
+        memory, state = start.body.memory, solution.state
+        if self.relaxation is not None and memory is not None:
+            strained = increment.body.relaxing_variables(state.body.unknowns, self.relaxation.bulk)
+            memory = Step(self.relaxation.prony, move.duration_s).after(memory, strained)
+            state = replace(state, body=replace(state.body, memory=memory))
+        return replace(solution, state=state)
 
     def unknowns(self, problem: Problem, states: Sequence[State[DeformedBody]]) -> Iterator[Float]:
         """Yield all unknowns (N,) of each state."""

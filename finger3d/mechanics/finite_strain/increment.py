@@ -34,6 +34,7 @@ from finger3d.mechanics.finite_strain.body import DeformedBody, Linearisation
 from finger3d.mechanics.finite_strain.equations import NEW_TANGENT, Configuration, IncrementEquations
 from finger3d.mechanics.generalised import GeneralisedForces, motions, resultants
 from finger3d.mechanics.history import State, StepResult
+from finger3d.mechanics.small_strain import accelerated
 from finger3d.objects import Move, ObjectPose
 
 _DISTORTED = 0.7
@@ -345,7 +346,8 @@ class FiniteIncrement(IncrementEquations):
         if secants is not None:
             reached = np.concatenate([now.x + step, solution.state.force.ravel(), increment._free(increment.move.end)])
             secants[:] = [*secants[-_SECANTS:], (reached, step)]
-            end, coordinates = np.split(_accelerated(secants), [len(step) + force.size])
+            ends, steps = zip(*secants, strict=True)
+            end, coordinates = np.split(accelerated(ends, steps), [len(step) + force.size])
             step, force = end[: len(step)] - now.x, end[len(step) :].reshape(force.shape)
             solution = replace(solution, state=replace(solution.state, force=force))
             increment = increment._at(coordinates)
@@ -353,20 +355,6 @@ class FiniteIncrement(IncrementEquations):
             return solution, (increment, *increment.moved(now, step, solution.state.force))
         except InvertedError:
             return solution, None
-
-
-def _accelerated(iterations: _Secants) -> Float:
-    """Return the next z (m,) of a fixed-point iteration z -> g(z), accelerated by secants (Anderson 1965).
-
-    It is the combination of g(z) in the last iterations, with weights of sum 1, that has the shortest step.
-
-    Parameters
-    ----------
-    iterations : g(z) (m,) of each, and its step (k,), g(z) - z or as much of it as is to be short
-    """
-    ends, steps = (np.array(one) for one in zip(*iterations, strict=True))
-    weights = np.linalg.lstsq(np.diff(steps, axis=0).T, steps[-1])[0]
-    return np.asarray(ends[-1] - weights @ np.diff(ends, axis=0))
 
 
 def _extrapolated(points: Sequence[tuple[float, Float]], share: float) -> Float:

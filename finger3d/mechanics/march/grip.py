@@ -7,7 +7,6 @@ its base like the first.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +17,7 @@ from finger3d._types import Float
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import elasticity_of
 from finger3d.fem.mesh import Mesh, reflected, side_by_side
-from finger3d.fem.surface import BoundarySurface, restrict
+from finger3d.fem.surface import BoundarySurface, points_at
 from finger3d.mechanics.discretise.problem import ContactSystem, Problem, free_surface
 from finger3d.mechanics.discretise.symmetry import held_dofs
 from finger3d.mechanics.history import State
@@ -144,7 +143,5 @@ def two(mesh: Mesh, base: float) -> Mesh:
 
 def _candidates(free: BoundarySurface, finger: Problem) -> BoundarySurface:
     """Return the candidate points of both fingers, those of the first one first, each in the order of the finger's."""
-    nodes, face = finger.surface.nodes, finger.surface.face
-    place = {(int(node), int(label)): k for k, (node, label) in enumerate(zip(free.nodes, free.face, strict=True))}
-    both: Sequence[int] = [*nodes, *(nodes + len(finger.mesh.points))]
-    return restrict(free, np.array([place[int(n), int(f)] for n, f in zip(both, [*face, *face], strict=True)]))
+    nodes = finger.surface.nodes
+    return points_at(free, np.concatenate([nodes, nodes + len(finger.mesh.points)]), np.tile(finger.surface.face, 2))

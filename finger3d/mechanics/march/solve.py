@@ -191,19 +191,10 @@ class Press:
         begins = move.may_close_gaps and not self.state.contact.force.any()
         return move.cut(*FIRST_PARTS) if begins and self.problem.model.begins_in_parts else (move,)
 
-    def solved(
-        self,
-        start: State[Any],
-        moves: Sequence[Move],
-        guess: Float | None = None,
-        near: Sequence[Substep] = (),
-    ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
-        """Solve motions one after another from a state, which stays that of the press; see `solved_in_turn`."""
-        self._end_if_cancelled()
-        return solved_in_turn(self.problem, self.workspace, start, moves, self._cuts, guess, near)
-
     def _to_pose(self, pose: ObjectPose, guess: Float | None) -> Advanced:
-        return Advanced(*self.solved(self.state, self.moves_to(pose), guess), pose)
+        self._end_if_cancelled()
+        moves = self.moves_to(pose)
+        return Advanced(*solved_in_turn(self.problem, self.workspace, self.state, moves, self._cuts, guess), pose)
 
     def _end_if_cancelled(self) -> None:
         if self._cancel is not None and self._cancel.is_set():

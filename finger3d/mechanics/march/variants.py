@@ -33,7 +33,7 @@ def map_parallel(
     press: Callable[[Variant, Workspace, Event], Result],
     variants: Sequence[Variant],
     most: int | None = None,
-    threads_from: int | None = None,
+    threads_from: int = _ROWS_FOR_THREADS,
 ) -> Generator[Result, None, None]:
     """Press one body as several variants, and yield the results in the order of the variants.
 
@@ -49,13 +49,12 @@ def map_parallel(
     most : int, optional
         Largest number of presses at once; the number of cores unless given.
     threads_from : int, optional
-        Number of contact rows from which presses run at once; `_ROWS_FOR_THREADS` unless given.
+        Number of contact rows from which presses run at once.
     """
     formulation = formulation_of(problem.model)
     at_once = min(len(variants), cores() if most is None else most)
     cancel = Event()
-    least = _ROWS_FOR_THREADS if threads_from is None else threads_from
-    if len(problem.system.active_dofs) < least or at_once < 2 or problem.model.refactorises:
+    if len(problem.system.active_dofs) < threads_from or at_once < 2 or problem.model.refactorises:
         workspace = formulation.workspace()
         for variant in variants:
             yield press(variant, workspace, cancel)
@@ -100,9 +99,7 @@ class PressedVariant(Generic[T]):
     failure: str = ""
 
 
-def press_variants(
-    problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None = None
-) -> list[PressedVariant[T]]:
+def press_variants(problem: Problem, models: Sequence[Model], read: Read[T]) -> list[PressedVariant[T]]:
     """Press changed models beside a problem, each in as many increments.
 
     A variant shares the condensed body where only friction, path or a rigid object differ, and else the cells of the
@@ -116,12 +113,12 @@ def press_variants(
     read : of each press
     """
     if problem.model.finite_strain:
-        return _share_tangents(problem, models, read, cancel)
+        return _share_tangents(problem, models, read)
 
     def pressed(model: Model) -> PressedVariant[T]:
         try:
             own = _problem(problem, model)[0]
-            return _variant(own, list(march(own, cancel=cancel)), read)
+            return _variant(own, list(march(own)), read)
         except FAILURES as error:
             return _failed(model, error)
 
@@ -137,9 +134,7 @@ def _problem(problem: Problem, model: Model) -> tuple[Problem, bool]:
         return build(model), True
 
 
-def _share_tangents(
-    problem: Problem, models: Sequence[Model], read: Read[T], cancel: Event | None
-) -> list[PressedVariant[T]]:
+def _share_tangents(problem: Problem, models: Sequence[Model], read: Read[T]) -> list[PressedVariant[T]]:
     from finger3d.mechanics.march.groups import march_in_groups  # a press in small strain needs none of it
 
     variants: dict[int, PressedVariant[T]] = {}
@@ -156,12 +151,12 @@ def _share_tangents(
             (others if is_new else alike)[number] = own
     numbers = [*list(alike)[: len(alike) // 2], None, *list(alike)[len(alike) // 2 :]]
     several = [problem if number is None else alike[number] for number in numbers]
-    for place, steps in march_in_groups(several, formulation_of(problem.model).workspace(), cancel or Event()):
+    for place, steps in march_in_groups(several, formulation_of(problem.model).workspace(), Event()):
         own_number = numbers[place]
         for number in itself if own_number is None else [own_number]:
             variants[number] = _variant(several[place], steps, read)
     for number, own in others.items():
-        variants[number] = _variant(own, list(march(own, cancel=cancel)), read)
+        variants[number] = _variant(own, list(march(own)), read)
     return [variants[number] for number in range(len(models))]
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Tree
-from finger3d.fem.mesh import FREE_FACES, axis_numbers
+from finger3d.fem.mesh import FREE_FACES, signs_into_part
 from finger3d.fem.recovery import displacement
 from finger3d.fem.surface import values_over
+from finger3d.fem.tensors import in_space
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.problem import Problem
@@ -65,9 +66,7 @@ class MarkerGrid:
     def at(cls, problem: Problem, markers: Sequence[Marker]) -> MarkerGrid:
         """Return markers on any mesh of the finger; one beside the facets of a curved rim is read at the nearest."""
         mesh, places = problem.mesh, np.array([m.place[: problem.dim] for m in markers])
-        sign = np.ones_like(places)
-        for k in axis_numbers(problem.axes):
-            sign[places[:, k] < 0.0, k] = -1.0
+        sign = signs_into_part(places, problem.axes)
         places *= sign
         facets = mesh.facets["contact"]
         if problem.dim == 3:
@@ -120,14 +119,9 @@ def marker_table(
         **{key: np.repeat([pose[key] for pose in poses], len(markers)) for key in poses[0] if key != "time_s"},
         "marker": [m.name for m in markers] * len(steps),
     }
-    places, displacements = np.tile([m.place for m in markers], (len(steps), 1)), _in_space(np.vstack(moved))
+    places, displacements = np.tile([m.place for m in markers], (len(steps), 1)), in_space(np.vstack(moved))
     columns |= {f"{axis}_mm": places[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"displacement_{axis}_mm": displacements[:, k] for k, axis in enumerate("xyz")}
     known = np.full((len(steps), len(markers), 3), np.nan)
     known[-1] = [[(errors or {}).get(c.key, np.nan) for c in displacement_columns(m.name)] for m in markers]
     return columns | {f"error_{axis}_mm": known[..., k].ravel() for k, axis in enumerate("xyz")}
-
-
-def _in_space(vectors: Float) -> Float:
-    """Return vectors (k, d) with three components."""
-    return np.hstack([vectors, np.zeros((len(vectors), 3 - vectors.shape[1]))])

@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import Design
 from finger3d.meshing.limits import checked_tets
-from finger3d.meshing.sizing import RATE, MeshSizes, Sizing, Zone, sizing
+from finger3d.meshing.sizing import RATE, MeshOptions, Sizing, Zone, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,
@@ -41,7 +41,7 @@ _MOST_POINTS = 2_000_000  # of the size field
 
 
 def new_mesh(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
+    design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.unstructured.snap import UnusableMeshError

@@ -22,7 +22,7 @@ from finger3d._types import Float, Int
 from finger3d.fem.mesh import FACETS, TET4, TRI3, Mesh, cell_angles_deg, curved_jacobians, quadratic
 from finger3d.geometry.cad import OUTSIDE
 from finger3d.geometry.faceted import Faceted, moved_onto
-from finger3d.geometry.surface import Triangles
+from finger3d.geometry.surface import Triangles, connected
 from finger3d.geometry.tessellate import CadFace, ImplicitPlane, Tessellation
 
 _MOST_SAMPLES = 20_000
@@ -127,8 +127,6 @@ class Seams:
 
         The `candidates` (n, f) belong to a group as well if they join a face of the set smoothly.
         """
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree
 
         count = sets.shape[1]
@@ -141,8 +139,7 @@ class Seams:
                 links.append(np.stack([both * count + i, both * count + j]))
         if not links or not (pairs := np.hstack(links)).size:
             return sets
-        joined = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(sets.size, sets.size))
-        group = connected_components(joined, directed=False)[1]
+        group = connected(sets.size, *pairs)
         several = np.unique(pairs)
         several = several[np.isin(group[several], group[several[sets.ravel()[several]]])]
         distance = self.distance(points, several // count, several % count)

@@ -22,7 +22,7 @@ from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.geometry.surface_checks import mistake
 from finger3d.meshing.limits import checked_tets
-from finger3d.meshing.sizing import MeshSizes, Sizing, Zone, sizing
+from finger3d.meshing.sizing import MeshOptions, Sizing, Zone, sizing
 from finger3d.meshing.unstructured import _meshers
 from finger3d.meshing.unstructured.solids import (
     box,
@@ -53,7 +53,7 @@ _DECIMATION_SHARE = 0.02  # of the envelope: displacement of an STL surface by t
 
 
 def new_mesh(
-    design: Design, options: MeshSizes, zone: Zone, symmetry: tuple[str, ...], report: Progress
+    design: Design, options: MeshOptions, zone: Zone, symmetry: tuple[str, ...], report: Progress
 ) -> tuple[Mesh, float, float]:
     """Return the mesh, the volume (mm3) of the whole body, and the seconds spent on CAD."""
     from finger3d.meshing.unstructured.snap import UnusableMeshError
