@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -52,8 +54,12 @@ def test_fields_of_the_end_and_of_every_kept_step(solid: PressResult) -> None:
         grid(solid.out / "nothing")
 
 
-def test_a_notebook_shows_one_line_and_the_picture(solid: PressResult, tmp_path: Path) -> None:
+def test_a_notebook_shows_numbers_and_the_picture(solid: PressResult, tmp_path: Path) -> None:
+    html = solid._repr_html_()
     force = solid.summary()["steps"][-1]["normal_force_N"]
+    assert re.search(rf"<td[^>]*>normal force</td><td[^>]*>{force:.5g} N</td>", html)
+    assert "<script>" not in html  # of the scene's title
+    assert all(escape(text) in html for text in solid.summary()["advice"])
     assert repr(solid).endswith(f": converged, 4 steps, {force:.5g} N at 0.5 mm>")
     picture = solid.plot_contact()
     assert picture._repr_png_().startswith(b"\x89PNG")
@@ -61,7 +67,10 @@ def test_a_notebook_shows_one_line_and_the_picture(solid: PressResult, tmp_path:
     assert (tmp_path / "new" / "contact.png").stat().st_size > 10_000
 
 
-def test_what_a_notebook_prints_of_the_other_objects_is_short(solid: PressResult, tmp_path: Path) -> None:
+def test_what_a_notebook_prints_of_the_other_objects_is_short_and_its_html_is_whole(
+    solid: PressResult, tmp_path: Path
+) -> None:
+    from finger3d._notebook import card
     from finger3d.analyses.compare import Comparison
     from finger3d.mechanics.discretise.build import build
     from finger3d.results.summary import Case
@@ -85,6 +94,16 @@ def test_what_a_notebook_prints_of_the_other_objects_is_short(solid: PressResult
         assert repr(found).startswith(f"<{name}")
         assert len(repr(found)) < 250
         assert "\n" not in repr(found)
+    parts = {
+        "Scene": ("E_MPa = 1.0", "domain = plane-stress", "steps = 4"),
+        "Calibration": ("Gauge &lt;g&gt;", "second-order fit", "mu is found to 0.1 or better"),
+        "Comparison": ("1.50 ± 0.10", "plane &lt;b&gt;", escape(str(finger3d.Outcome.NO_CONVERGENCE)), "2D would do"),
+    }
+    for name, texts in parts.items():
+        html = shown[name]._repr_html_()  # type: ignore[attr-defined]
+        assert all(text in html for text in texts), (name, html)
+    assert "1 remark<" in card("t", "s", folded=["<a>"])
+    assert "&lt;a&gt;" in card("t", "s", folded=["<a>"])
 
 
 def test_without_a_folder_the_files_go_with_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,6 +126,7 @@ def test_a_folder_opens_as_the_result_that_was_written_there(solid: PressResult)
     for table in ("history", "contact"):
         assert opened.to_dataframe(table).equals(solid.to_dataframe(table))
     assert np.array_equal(opened.to_pyvista(2)["pressure"], solid.to_pyvista(2)["pressure"])
+    assert opened._repr_html_() == solid._repr_html_()
     assert opened.plot_contact() == solid.plot_contact()
     assert opened.plot_forces() == solid.plot_forces()
 

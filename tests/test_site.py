@@ -20,6 +20,7 @@ import pytest
 from PIL import Image
 
 import finger3d
+from finger3d._notebook import card
 from finger3d.cli import main
 from tests.scenes import HALF_CYLINDER, SECTION
 
@@ -219,3 +220,9 @@ def test_the_script_draws_the_sketches_that_open_the_pages(root: Path, tmp_path:
         opening = (theory / f"{name}.md").read_text(encoding="utf-8").split("$")[0]
         assert f"]({name}.png)\n\n" in opening
         assert len(opening.split()) > 40
+
+
+def test_all_text_is_escaped() -> None:
+    html = card("<t>", "<s>", [("<r>",)], ["<n>"], ["<f>"], ["<h>"])
+    assert all(f"&lt;{letter}&gt;" in html for letter in "tsrnfh")
+    assert not any(f"<{letter}>" in html for letter in "trnfh")

@@ -31,7 +31,7 @@ from finger3d.progress import Progress
 from . import _verdict
 from ._rows import COLUMNS, Result, Row, Settled, score
 
-NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "progress.py", "py.typed")
+NO_NUMBERS = ("cli/*", "plotting/*", "report/*", "__main__.py", "_notebook.py", "progress.py", "py.typed")
 """Files of the package that only draw, write pages, report progress or parse commands. A change of any other one makes
 the results of all studies out of date."""
 

@@ -73,7 +73,7 @@ measured = {
 calibration = finger3d.calibrate(
     "fig9.toml", "g36", "out/calibration", tolerances=measured
 )
-print(calibration.verdict())
+calibration
 
 # %%
 mu = np.linspace(calibration.mu[0], calibration.mu[-1], 200)

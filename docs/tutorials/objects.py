@@ -63,11 +63,11 @@ _ = Path("ball.toml").write_text(
     SCENE.format(object=BALL, depth=0.8, more=MESH)
 )
 ball = finger3d.press("ball.toml", figures=False, error=False)
-print(*ball.summary()["warnings"], sep="\n")
+ball
 
 # %% [markdown]
 # The middle of the ball is 3 mm beside the apex of the dome. Contact forces act along the normals of the ball, so
-# that the finger is also pushed towards -x, although the ball moves straight down. The warning is right: extents need
+# that the finger is also pushed towards -x, although the ball moves straight down. The remark is right: extents need
 # more contact points, hence a smaller `size_mm` and more time. All numbers have their units in their names.
 
 # %%

@@ -61,8 +61,7 @@ base_size_mm = 3.2
 comparison = finger3d.compare(
     "finger.toml", "out/compare", widths=[4.0, 24.0]
 )
-print(*(" | ".join(row) for row in comparison.table), sep="\n")
-print(*comparison.verdict, sep="\n")
+comparison
 
 # %% [markdown]
 # Plane strain holds the material between two rigid walls; a nearly incompressible finger that is free at its ends

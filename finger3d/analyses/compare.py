@@ -382,6 +382,18 @@ class Comparison:
         """One line."""
         return f"<Comparison of {len(self.cases)} cases: {self.outcome}; {self.out}>"
 
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+        from finger3d.report.build import number
+        from finger3d.results.summary import FORCE
+
+        rows = [
+            (c.model, f"{c.width_mm:g}", number(c.numbers[FORCE], c.errors.get(FORCE)) if c.ok else str(c.outcome))
+            for c in self.cases
+        ]
+        said = f"{self.outcome}, {len(self.cases)} cases"
+        return card("2D against 3D", said, rows, self.verdict, head=("model", "width (mm)", "force per width (N/mm)"))
+
     @property
     def outcome(self) -> Outcome:
         """Outcome of the first case that did not converge, else CONVERGED."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from finger3d._extras import require
 from finger3d._types import Tree
+from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.errors import Finger3dError, Outcome
 from finger3d.io import atomic
 from finger3d.mechanics.history import History
@@ -250,6 +251,18 @@ class PressResult:
         good = self._good()
         last = f", {good[-1].normal_force_N:.5g} N at {good[-1].depth_mm:.4g} mm" if good else ""
         return f"{self._numbers['outcome']}, {len(good)} steps{last}"
+
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+        from finger3d.report.build import number
+        from finger3d.report.press import headline
+
+        good, bars = self._good(), ErrorBars.of_summary(self._numbers)
+        rows = [
+            (row.name, f"{number(row.value, row.error)} {row.unit}".strip())
+            for row in (headline(good[-1], bars) if good else ())
+        ]
+        return card(self._title, self._status(), rows, self._numbers["warnings"], self._numbers["advice"])
 
 
 def _picture(draw: Callable[..., None], *arguments: object) -> Picture:

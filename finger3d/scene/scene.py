@@ -67,6 +67,21 @@ class Scene:
         effects = f", {', '.join(self.effects)}" if self.effects else ""
         return f"<Scene {self.title}: {self.design}, {self.domain}{effects}>"
 
+    def _repr_html_(self) -> str:
+        """Return the tables with all defaults, as HTML."""
+        from finger3d._notebook import card
+
+        rows = [
+            (name, ", ".join(f"{k} = {v}" for k, v in settings.items()) if isinstance(settings, Mapping) else "")
+            for name, settings in self.as_dict().items()
+            if name not in ("title", "gauge", "marker", "taxel", "effects") and settings is not None
+        ]
+        named = [(f"{kind} {g['name']}", g) for kind in ("gauge", "marker", "taxel") for g in self.as_dict()[kind]]
+        effects = self.as_dict()["effects"].items()
+        named += [(f"effect {name}", settings) for name, settings in effects if isinstance(settings, Mapping)]
+        rows += [(name, ", ".join(f"{k} = {v}" for k, v in given.items() if k != "name")) for name, given in named]
+        return card(self.title, self.domain, rows)
+
     @property
     def open_effects(self) -> tuple[str, ...]:
         """Names of the effects that a press uses only if the scene calls for them; see `effects_by_need.settled`."""

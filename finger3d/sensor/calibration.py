@@ -60,6 +60,12 @@ class Calibration(SensorModel):
         """Return one line: readings, range of mu, number of points."""
         return f"<Calibration of {self.title}: {len(self.mu)} values of mu, {self.mu[0]:g} to {self.mu[-1]:g}>"
 
+    def _repr_html_(self) -> str:
+        from finger3d._notebook import card
+
+        rows = [(name.strip(), str(said)) for name, said in summary(self)]
+        return card(self.title.capitalize(), f"{len(self.mu)} values of mu", rows, [self.verdict()])
+
     def estimates(self, readings: Float, noise: Float | None = None, tolerances: bool = True) -> list[Estimate]:
         """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
         stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
