@@ -40,8 +40,10 @@ COLOUR = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9\d|10[0-7])(?:;[\d;]*)
         (["press", "scene.toml"], "give --out FOLDER"),
         (["press", "scene.toml", "--ouut", "out"], "--out instead of --ouut"),
         (["plan", "scene.toml", "--set"], "--set"),
-        (["validate"], "validate"),
-        (["design", "scene.toml", "--out", "out"], "design"),
+        (["completion", "bash"], "completion is gone: use finger3d --completion SHELL"),
+        (["schema"], "schema is gone: use finger3d new --schema"),
+        (["validate"], "validate is gone: use python -m validation"),
+        (["design", "scene.toml", "--out", "out"], "design is gone: use finger3d optimise"),
     ],
 )
 def test_wrong_arguments_end_with_2_and_one_line(arguments, expected, tmp_path, monkeypatch, capsys) -> None:

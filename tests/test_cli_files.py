@@ -60,9 +60,11 @@ def test_the_command_writes_a_mold(scene, tmp_path, capsys, monkeypatch) -> None
     ("arguments", "told"),
     [
         (["--shrinkage", "0.01"], "--mold"),
-        (["--mold", "--riser", "0.04"], "--riser"),
-        (["--mold", "--carrier"], "--carrier"),
-        (["--ascii"], "--ascii"),
+        (["--mold", "--riser", "0.04"], "--riser is gone: .*--pour-mm"),
+        (["--mold", "--carrier"], "--carrier is gone: .*rigid = true"),
+        (["--mold", "--no-plugs"], "--no-plugs is gone: .*tape"),
+        (["--mold", "--wall-mm", "4"], "--wall-mm is gone: .*8 mm"),
+        (["--ascii"], "--ascii is gone"),
         (["--mold", "--set", "gauge=[]", "--split-mm", "11"], "split"),
     ],
 )

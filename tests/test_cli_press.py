@@ -343,7 +343,7 @@ def test_a_solid_without_opengl(solid: Path, tmp_path: Path, monkeypatch: pytest
         (["cut", "--png", "a.png"], 3, "incomplete"),
         (["whole", "--step", "1"], 2, "--step"),
         (["whole", "--png", "a.jpg"], 2, ".png"),
-        (["whole", "--gif", "a.gif"], 2, "--gif"),
+        (["whole", "--gif", "a.gif"], 2, "--gif is gone"),
         (["whole", "--png", "a.png", "--step", "9"], 2, "increment 9 "),
         (["swept"], 2, "not finished"),
         (["swept", "--png", "a.png"], 2, "swept"),

@@ -14,6 +14,7 @@ from finger3d._extras import absent, message
 from finger3d._interruption import termination_interrupts
 from finger3d._machine import enough_address_space
 from finger3d.cli.common import Interrupted, app
+from finger3d.cli.options import gone
 from finger3d.cli.printing import complain, fill_descriptors, least_width, safe_streams
 from finger3d.errors import OUT_OF_MEMORY, Finger3dError, MissingError, out_of_memory
 
@@ -59,7 +60,7 @@ def _run(arguments: Sequence[str], program: App) -> int:
         complain("give --out FOLDER, the folder for the results" if no_out else str(error))
         return Finger3dError.exit_code
     except CycloptsError as error:
-        complain(f"{error} (finger3d --help lists the commands and options)")
+        complain(gone(error, arguments) or f"{error} (finger3d --help lists the commands and options)")
         return Finger3dError.exit_code
     except (Finger3dError, Interrupted) as error:
         complain(str(error))
