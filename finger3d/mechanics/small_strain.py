@@ -190,28 +190,6 @@ class LinearBody:
         return np.asarray(moved @ frame)
 
 
-def solve_increment(
-    problem: Problem,
-    state: State[Float],
-    move: Move,
-    body: LinearBody,
-    guess: Float | None,
-    workspace: Workspace,
-    wanted: GeneralisedForces | None = None,
-) -> ContactSolution[State[Float]]:
-    """Advance a state as the object moves, or to forces that are wanted.
-
-    Returns
-    -------
-    ContactSolution
-        Its body's state is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps and
-        directions at the displacement found agree with those that the forces were solved with.
-    """
-    if wanted is None:
-        return Increment(problem, state, move, body, workspace.tracker).solve(guess)
-    return IncrementToForces(problem, state, move, body, workspace.tracker, wanted).solve(guess)
-
-
 def accelerated(ends: Sequence[Float], steps: Sequence[Float], rcond: float | None = None) -> Float:
     """Return the next z (m,) of a fixed-point iteration z -> g(z), accelerated by secants (Anderson 1965).
 
@@ -443,6 +421,24 @@ class IncrementToForces(Increment):
         return replace(self, move=Move(self.move.start, wanted.moved(end, moved)), is_exact=is_exact), solution
 
 
+def increment_of(
+    problem: Problem,
+    state: State[Float],
+    move: Move,
+    body: LinearBody,
+    workspace: Workspace,
+    wanted: GeneralisedForces | None = None,
+) -> Increment:
+    """Return the increment from a state as the object moves, or to forces that are wanted.
+
+    Its solution's state of the body is the displacement (c, d) mm of the contact points.  It is CONVERGED only if gaps
+    and directions at the displacement found agree with those that the forces were solved with.
+    """
+    if wanted is None:
+        return Increment(problem, state, move, body, workspace.tracker)
+    return IncrementToForces(problem, state, move, body, workspace.tracker, wanted)
+
+
 def motion_until_touch(problem: Problem, state: State[Any], move: Move) -> Float:
     """Return the motion (c, d) mm of open points until they touch; zero in a press that its increments define."""
     if problem.model.is_defined_by_increments:
@@ -523,7 +519,7 @@ class SmallStrain:
     ) -> ContactSolution[State[Float]]:
         """Solve contact along the normals of the object."""
         body = LinearBody(problem.delassus, np.zeros_like(state.body))
-        return solve_increment(problem, state, move, body, guess, workspace, wanted)
+        return increment_of(problem, state, move, body, workspace, wanted).solve(guess)
 
     def unknowns(self, problem: Problem, states: Sequence[State[Float]]) -> Iterator[Float]:
         """Yield the unknowns from the forces, by one back-substitution for many states."""

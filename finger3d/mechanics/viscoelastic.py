@@ -34,7 +34,7 @@ from finger3d.mechanics.formulation import Loads, Workspace
 from finger3d.mechanics.generalised import GeneralisedForces
 from finger3d.mechanics.history import State
 from finger3d.mechanics.readings import Column, of_kind
-from finger3d.mechanics.small_strain import LinearBody, at_rest, linear_gap, linear_loads, solve_increment
+from finger3d.mechanics.small_strain import LinearBody, at_rest, increment_of, linear_gap, linear_loads
 from finger3d.objects import Move, ObjectPose
 
 _FACTORS_KEPT = 5
@@ -314,7 +314,7 @@ class Viscoelastic:
         memory, step = state.body.memory, Step(self.relaxation.prony, move.duration_s)
         body, linear = self.respond(problem, memory, step, workspace)
         before = State(state.contact, state.body.displacement, state.last)
-        solution = solve_increment(problem, before, move, linear, guess, workspace, wanted)
+        solution = increment_of(problem, before, move, linear, workspace, wanted).solve(guess)
         if solution.state is before:
             return solution.with_state(state)
         contact = problem.row_forces(problem.upright_force(solution.state.contact))

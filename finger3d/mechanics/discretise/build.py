@@ -19,7 +19,7 @@ from finger3d.errors import Finger3dError
 from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import elasticity_of, moduli_of
 from finger3d.fem.mesh import CONTACT, Mesh
-from finger3d.fem.solvers.condense import Condensation, condense, stiffened
+from finger3d.fem.solvers.condense import condense, stiffened
 from finger3d.fem.surface import BoundarySurface, local_rows, points_at, restrict
 from finger3d.mechanics.discretise.body_mesh import locally_refined, stretched, with_points_of
 from finger3d.mechanics.discretise.contact_points import MARGIN, contact_geometry, may_touch
@@ -130,9 +130,7 @@ def changed(problem: Problem, model: Model) -> Problem:
     if model.design != own.design:
         mesh = _moved(problem, model)
         candidates = _same_points(problem, model, mesh)
-    inner = model.inclusions is not None or model.object_compliance is not None
-    known = problem.body.condensed if model.finite_strain and not inner else None
-    return _condensed(model, mesh, problem.body.report, candidates, QUIET, problem, known)
+    return _condensed(model, mesh, problem.body.report, candidates, QUIET, problem)
 
 
 def _moved(problem: Problem, model: Model) -> Mesh:
@@ -157,14 +155,13 @@ def _condensed(
     candidates: BoundarySurface,
     report: Progress,
     like: Problem | None = None,
-    known: Condensation | None = None,
 ) -> Problem:
     """Assemble and condense a mesh of a model to its candidate points.
 
     Parameters
     ----------
-    like : problem on the same cells, whose symmetry and whose elastic object's cells it shares
-    known : condensation to use in place of its own
+    like : problem on the same cells, whose symmetry and whose elastic object's cells it shares; at finite strain also
+        its condensation, which only begins the iteration, unless foils or an elastic object change it
     """
     contact, axes = model.first_contact, like.axes if like else symmetry(model)
     thickness = 1.0 if mesh.dim == 3 else model.design.width_mm
@@ -186,6 +183,8 @@ def _condensed(
         expected = f"about {duration(seconds)} and {size.press_gb(count):.2g} GB, without error bars"
         report.say(f"warning: mesh.size_mm = {model.mesh.size_mm:g} takes {expected}")
     fixed = held_dofs(mesh, axes, model.held_ends)
+    bare = model.inclusions is None and model.object_compliance is None
+    known = like.body.condensed if like and model.finite_strain and bare else None
     condensed = known or condense(matrix, fixed, rows)
     delassus, reading_rows = contact_rows(condensed.compliance, active, candidates, count)
     mirrored, points = unfold_points(model, mesh, candidates, axes, elastic)

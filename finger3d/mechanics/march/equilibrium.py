@@ -57,21 +57,14 @@ def solved_in_turn(
     moves: Sequence[Move],
     cuts: int,
     guess: Float | None = None,
-    near: Sequence[Substep] = (),
 ) -> tuple[ContactSolution[State[Any]], list[Substep]]:
     """Solve the parts of an increment one after another; the guess (c, d), N, of the forces is that of the last.
 
-    A part that does not converge is halved and repeated from the same state, at most `cuts` times.  If as many parts of
-    a similar increment at finite strain are given, `near`, each begins its iteration at the end expected from its like.
+    A part that does not converge is halved and repeated from the same state, at most `cuts` times.
     """
     found, parts, now = list[ContactSolution[State[Any]]](), list[Substep](), state
-    for number, move in enumerate(moves):
+    for move in moves:
         start = guess if move is moves[-1] else None
-        if len(near) == len(moves):
-            one, other = near[number].after, near[number].before
-            share = (move.length_ratio(near[number].move) or 1.0) - 1.0
-            now = expecting(now, move, (one, other), share)
-            start = one.contact.force + share * (one.contact.force - other.contact.force)
         end, more = _solved(problem, workspace, now, move, cuts, start)
         found, parts, now = [*found, end], parts + more, end.state
         if not end.outcome.ok:
@@ -133,17 +126,6 @@ def frictional_dissipation(problem: Problem, before: ContactState, after: Contac
     end = after.force[:, 0]
     ratio = np.divide(0.5 * (before.force[:, 0] + end), end, out=np.ones_like(end), where=end > 0.0)
     return problem.symmetry.total(lost * ratio)
-
-
-def expecting(state: State[Any], move: Move, ends: tuple[State[Any], State[Any]], share: float) -> State[Any]:
-    """Return a state at finite strain from which the increment begins its iteration at an expected end.
-
-    The end has the unknowns ``ends[0] + share (ends[0] - ends[1])``.
-    """
-    one, other = (end.body.unknowns for end in ends)
-    end = one + share * (one - other)
-    before = Move(move.at(-1.0), move.start), 2.0 * state.body.unknowns - end
-    return replace(state, body=replace(state.body, previous=before))
 
 
 _DEEPEST = 0.99
