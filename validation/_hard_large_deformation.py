@@ -29,7 +29,6 @@ from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import quadrature
 from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import Design, designs
-from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
@@ -43,6 +42,7 @@ from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
 from ._rows import Result, Row, Settled, at_least, at_most, grouped, of_records, settled
+from .triangulated_objects import of_trimesh
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -162,7 +162,7 @@ def _object(rng: np.random.Generator, solid: bool) -> RigidObject:
             return Wave(x_mm=x, wavelength_mm=float(length), amplitude_mm=float(amplitude))
         case "mesh" if solid:
             ball = trimesh.creation.icosphere(subdivisions=3, radius=float(rng.uniform(6.0, 15.0)))
-            return MeshObject(x_mm=x, surface=Triangles(np.array(ball.vertices), np.array(ball.faces)))
+            return MeshObject(x_mm=x, surface=of_trimesh(ball))
     return Plane(tilt=float(np.radians(rng.uniform(-10.0, 10.0))) if rng.uniform() < 0.5 else 0.0)
 
 
