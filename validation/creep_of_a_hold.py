@@ -57,7 +57,6 @@ COLUMNS = (
     "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min "
     "least_grip_N"
 )
-TEXT = ("program", "pads")
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,8 @@ def run(quick: bool) -> Result:
     """Quick: a coarse pad, and 2 s of two of MuJoCo's models."""
     ours, least = finger3d_hold(5.0 if quick else 2.5, 6 if quick else 60)
     if importlib.util.find_spec("mujoco") is None:
-        theirs = _committed()
+        kept = committed_instead("creep_of_a_hold", "MuJoCo", "pip install mujoco, or the extra dev")
+        theirs = [tuple(line.values()) for line in kept if line["program"] == "MuJoCo"]
     else:
         theirs = [_line(grip, 2.0 if quick else HOLD_S) for grip in GRIPS[: 2 if quick else None]]
     lines = [("finger3d", "block, E = 1 MPa", 0.0, 0.0, 0.0, 0.0, 0.0, ours, 0.0, least), *theirs]
@@ -165,13 +165,6 @@ def _line(grip: Grip, seconds: float) -> tuple[Any, ...]:
     formula = np.nan if grip.noslip else grip.formula()
     shown = 1e3 * grip.step_s, grip.impratio, float(grip.noslip), float(contacts)
     return "MuJoCo", grip.pads, grip.pad_kg, *shown, fall * 60.0 / seconds, formula, mujoco_least_grip(grip)
-
-
-def _committed() -> list[tuple[Any, ...]]:
-    """MuJoCo's lines of the committed table."""
-    kept = committed_instead("creep_of_a_hold", "MuJoCo", "pip install mujoco, or the extra dev")
-    lines = [line for line in kept if line["program"] == "MuJoCo"]
-    return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
 
 
 def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[Row]:
