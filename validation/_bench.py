@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._machine import cores
+from finger3d._machine import child_environment, cores
 from finger3d.analyses.press import press
 from finger3d.analyses.pressed_body import presses
 from finger3d.analyses.sweep.run import sweep
@@ -38,6 +38,7 @@ from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.progress import Progress
 
+from ._cost import factored, free_part
 from ._press import changed, converged, fig9_finger
 from ._rows import Row, at_most
 from .beside_ansys import SCENES
@@ -89,10 +90,9 @@ def measured(size: float) -> dict[str, float]:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     del problem  # frees the memory of its factor
     problem, again = _pressed(size)
-    free = np.setdiff1d(np.arange(problem.body.stiffness.upper.shape[0]), problem.body.fixed_dofs)
-    upper = problem.body.stiffness.upper[free][:, free]
+    upper = free_part(problem)
     del problem
-    return _least([found, again]) | {"peak_MB": peak, "factorisation": _plain(upper)}
+    return _least([found, again]) | {"peak_MB": peak, "factorisation": factored(upper)[0]}
 
 
 def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
@@ -109,19 +109,6 @@ def _under_all(problem: Problem, mus: Sequence[float]) -> None:
         raise AssertionError("not every mu converged")
 
 
-def _plain(upper: Any) -> float:
-    """Seconds of one factorisation, analysis included, as anyone may call it."""
-    from pypardiso import PyPardisoSolver
-
-    solver = PyPardisoSolver(mtype=-2)
-    for number, value in ((1, 1), (2, 3), (10, 13), (21, 1)):
-        solver.set_iparm(number, value)
-    upper.sort_indices()
-    seconds = _seconds(lambda: solver.factorize(upper))
-    solver.free_memory(everything=True)
-    return seconds
-
-
 def _child(size: float) -> dict[str, float]:
     """`measured` in a process of its own, which starts with a clean memory; and the condensation by MUMPS in another.
 
@@ -133,10 +120,8 @@ def _child(size: float) -> dict[str, float]:
 
 
 def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    package = str(Path(__file__).resolve().parents[1])
-    paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
     # a user's Python keeps what it compiled; one that may not would compile all of finger3d in every run
-    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": ""}
+    environment = {**child_environment(), "PYTHONDONTWRITEBYTECODE": ""}
     return subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +10,8 @@ from numpy.typing import NDArray
 
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactLaw, ContactProblem, project_on_friction_cone, residual
-from finger3d.contact.friction import SLIP, STICK, Coulomb
+from finger3d.contact.friction import Coulomb
+from finger3d.contact.newton import ActiveSet
 from finger3d.contact.state import ContactState, next_state
 from finger3d.mechanics.discretise.build import widened
 from finger3d.mechanics.discretise.problem import Problem
@@ -24,8 +24,8 @@ from ._cost import MU, rows_of
 class EachIteration:
     """The paper's way with the product's iteration: each one solves the whole body again, sets and all.
 
-    Unknowns are the body's and the forces of touching points: ``K u = R^T E x`` and ``T (free + R u) + D x = 0`` with E
-    and T as in `finger3d.contact.newton.force_of_sets`; friction makes the matrix unsymmetric.
+    Unknowns are the body's and the forces of touching points: ``K u = R^T P x`` and ``D (free + R u) + diag(1 - a) x =
+    0`` with P, D and a as in `finger3d.contact.newton.ActiveSet`; friction makes the matrix unsymmetric.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -88,45 +88,16 @@ class EachIteration:
         """Forces (c, d) and free unknowns (N,) that solve the equations of the sets: one factorisation."""
         from pypardiso import PyPardisoSolver
 
-        expand, test, own = self._equations(status, trial)
-        matrix = sp.bmat([[self.whole, -(expand @ self.read).T], [test @ self.read, sp.diags(own)]], format="csr")
+        active = ActiveSet.of(problem, status, trial)
+        forces, weights = active.force_matrix(), active.weight_matrix(problem.augmentation)
+        own = np.zeros(active.size)
+        own[np.flatnonzero(np.isin(active.active_dofs, self.locked))] = 1.0
+        own[len(active.active_dofs) :] = 1.0 - active.turning if active.is_3d else []
+        matrix = sp.bmat([[self.whole, -(self.read.T @ forces)], [weights @ self.read, sp.diags(own)]], format="csr")
         matrix.sort_indices()
-        right = np.concatenate([np.zeros(len(self.free)), -(test @ problem.free_motion.ravel())])
+        right = np.concatenate([np.zeros(len(self.free)), -(weights @ problem.free_motion.ravel())])
         solver = PyPardisoSolver()
         x = solver.solve(matrix, right)
         solver.free_memory(everything=True)
         self.solves += 1
-        return (expand.T @ x[len(self.free) :]).reshape(trial.shape), x[: len(self.free)]
-
-    def _equations(self, status: NDArray[np.int8], trial: Float) -> tuple[sp.csr_matrix, sp.csr_matrix, Float]:
-        """E, T and the diagonal of D; a sticking point has d unknowns, a slipping one f_n and, in 3D, f across."""
-        c, d = trial.shape
-        stick, slip = np.flatnonzero(status == STICK), np.flatnonzero(status == SLIP)
-        length = np.linalg.norm(trial[slip, 1:], axis=1)
-        length = np.where(length > 0.0, length, 1.0)
-        e = trial[slip, 1:] / length[:, None]
-        turn = np.minimum(MU * trial[slip, 0] / length, 1.0) if d == 3 else np.zeros(0)
-        across = np.stack([-e[:, 1], e[:, 0]], axis=1) if d == 3 else np.zeros((0, 1))
-        held, normal = (stick[:, None] * d + np.arange(d)).ravel(), slip * d
-        side = (slip[:, None] * d + np.arange(1, d)).ravel()
-        n, k, w = len(held), len(slip), len(turn)
-        at_n, at_w = n + np.arange(k), np.repeat(n + k + np.arange(w), d - 1)
-        beside = side[: w * (d - 1)]
-        expand = _sparse(
-            [np.ones(n + k), MU * e, across], [np.arange(n), at_n, np.repeat(at_n, d - 1), at_w],
-            [held, normal, side, beside], (n + k + w, c * d),
-        )  # fmt: skip
-        test = _sparse(
-            [np.ones(n + k), turn[:, None] * across], [np.arange(n), at_n, at_w], [held, normal, beside],
-            (n + k + w, c * d),
-        )  # fmt: skip
-        own = np.zeros(n + k + w)
-        own[:n][np.isin(held, self.locked)] = 1.0
-        if w:
-            own[n + k :] = (1.0 - turn) / self.rho[slip, -1]
-        return expand, test, own
-
-
-def _sparse(values: list[Float], rows: list[Any], columns: list[Any], shape: tuple[int, int]) -> sp.csr_matrix:
-    data = np.concatenate([v.ravel() for v in values])
-    return sp.csr_matrix((data, (np.concatenate(rows), np.concatenate(columns))), shape=shape)
+        return active.force(x[len(self.free) :]), x[: len(self.free)]
