@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from scipy import sparse
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactLaw, ContactProblem
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import SLIP, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
@@ -177,6 +177,28 @@ def pressure_error(mesh: Mesh, pressure: Float, exact: Field) -> float:
 def increment(start: ContactState, free: Float, compliance: Float, mu: float, scale: float) -> ContactSolution:
     """Solve one increment under Coulomb friction; `scale` (mm) is the length of the criterion of convergence."""
     return solve_increment(ContactProblem.of(start, free, compliance, ContactLaw(Coulomb(mu)), scale))
+
+
+def marched(
+    gap: Float, compliance: Float, mu: float, path: Iterable[tuple[float, float]], least: float = 0.0
+) -> Iterator[tuple[ContactSolution, float]]:
+    """Solutions, and energy lost so far (mJ), through (depth, slide along the first tangent), mm, from a gap (c,).
+
+    Parameters
+    ----------
+    least : smallest length of the criterion of convergence, which else is the depth, mm
+    """
+    d, lost = compliance.shape[1], 0.0
+    state = ContactState.at_rest(gap, d)
+    for depth, slide in path:
+        free = np.zeros((len(gap), d))
+        free[:, 0], free[:, 1] = gap - depth, -slide
+        found = increment(state, free, compliance, mu, max(depth, least))
+        if not found.outcome.ok:
+            raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
+        slips, before, state = found.state.status == SLIP, state, found.state
+        lost -= float((state.force[:, 1:] * (state.accumulated_slip - before.accumulated_slip))[slips].sum())
+        yield found, lost
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,11 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import quadrature
-from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN
@@ -41,6 +39,7 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
+from ._paper import moved
 from ._rows import Result, Row, Settled, at_least, at_most, grouped, of_records, settled
 from .triangulated_objects import of_trimesh
 
@@ -224,7 +223,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
 def _least_volume(problem: Problem, step: StepResult) -> float:
     """Smallest determinant of the deformation gradient at the quadrature points, in the plane of a section."""
     mesh = problem.mesh
-    u: Float = displacement(mesh, next(formulation_of(problem.model).unknowns(problem, [step.meshed_state])))
+    u = moved(problem, step)
     gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], quadrature(mesh.dim, 2)[0])
     slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
     return float(np.linalg.det(slope + np.eye(mesh.dim)).min())

@@ -22,6 +22,7 @@ from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 
@@ -163,10 +164,7 @@ def strains(frame: StepResult, count: int, line: str = "", finite: bool = False)
 
 def moved(problem: Problem, frame: StepResult) -> Float:
     """Displacement (n, d) mm of the meshed part, recovered from the contact forces of a frame."""
-    own = np.flatnonzero(np.all(problem.symmetry.mirror_sign == 1.0, axis=1))
-    first = own[np.argsort(problem.symmetry.image_of[own])]
-    force = frame.state.force[first] / problem.symmetry.multiplicity[first][:, None]
-    return displacement(problem.mesh, problem.unknowns(force))
+    return displacement(problem.mesh, next(formulation_of(problem.model).unknowns(problem, [frame.meshed_state])))
 
 
 said = listed(__file__)

@@ -20,10 +20,9 @@ from scipy.optimize import brentq
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import Wave, Wedge
 
 from ._common import (
@@ -40,6 +39,7 @@ from ._common import (
     quarter_block,
     rate,
 )
+from ._halfplane import CANDIDATES, on_block
 from ._rows import Result, Row, exact_columns
 
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
@@ -87,10 +87,8 @@ def wedge_errors(at: Float, p: Float, force: float) -> tuple[float, float]:
 
 def own_path(count: int) -> float:
     """Force over the closed form at equal a, mean of depths, by the product's own mesher and symmetry."""
-    block = designs()["block"](half_length_mm=HEIGHT, height_mm=HEIGHT, width_mm=1.0)
-    mesh = MeshOptions(1.0 / count, 0.25 * HEIGHT, "swept")
     legs = tuple(Leg(d, steps=1) for d in WEDGE_DEPTHS)
-    problem = build(Model(block, Isotropic(1.0, NU), mesh, legs, TIP, domain="plane-strain"), margin=-0.2)
+    problem = build(on_block(TIP, Isotropic(1.0, NU), count, legs, HEIGHT), margin=CANDIDATES)
     right = np.flatnonzero(problem.points.points[:, 0] >= 0.0)
     right = right[np.argsort(problem.points.points[right, 0])]
     at, area = problem.points.points[right, 0], problem.points.area[right]

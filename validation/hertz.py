@@ -37,6 +37,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import body, contact_axis, convergence, distance, ellipse, graded, quarter_block, rate
+from ._halfplane import CANDIDATES, on_block
 from ._layer import line, point
 from ._rows import Result, Row, exact_columns, rms, together, zero
 
@@ -82,13 +83,10 @@ def press(
 ) -> tuple[Problem, list[StepResult]]:
     """Press to 20 depths with half-widths near 0.7 to 1; `count` points to a."""
     depths = [line(v / height, nu).depth * v**2 / RADIUS for v in np.linspace(0.7, 1.0, 20)]
-    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)
-    mesh = MeshOptions(1.0 / count, 0.25 * height, "swept")
-    legs = tuple(Leg(d, steps=1) for d in depths)
-    held = domain == "solid"
-    model = Model(block, Isotropic(1.0, nu), mesh, legs, Cylinder(radius_mm=RADIUS), domain=domain, held_ends=held)
+    legs, bar = tuple(Leg(d, steps=1) for d in depths), Cylinder(radius_mm=RADIUS)
+    more = {"width": width, "domain": domain, "held_ends": domain == "solid"}
     # points that the rigid cylinder overlaps by 0.2 of the depth reach to 2 a here, far beyond the contact
-    problem = build(model, margin=-0.2)
+    problem = build(on_block(bar, Isotropic(1.0, nu), count, legs, height, **more), margin=CANDIDATES)
     return problem, list(march(problem))
 
 

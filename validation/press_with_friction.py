@@ -12,9 +12,9 @@ import numpy as np
 
 from finger3d.contact.friction import SLIP
 
-from . import _halfspace, _rings
+from . import _halfplane, _halfspace, _rings
 from ._common import ticks_at
-from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+from ._halfplane import RADIUS, Profile, compliance, line, loading, under
 from ._increments import PlainCoulomb
 from ._rows import Result, Row, exact_columns, listed, together
 
@@ -54,13 +54,9 @@ def numbers(profiles: list[Profile], nu: float) -> np.ndarray:
 
     The first, second and fourth are means over the second half of a self-similar loading, D is at its end.
     """
-    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
-    force = sum(p.force for p in half)
-    last = profiles[-1]
-    stuck = not (last.status == SLIP).any()
-    lost = np.array([end_force_loss(profiles), last.frame.dissipation_mJ]) / (compliance(nu) * last.force**2)
-    ratios = force / sum(hertz(nu, p.reach if stuck else p.a) for p in half), sum(p.outward for p in half) / force
-    return np.array([*ratios, lost[0], np.mean([p.c / p.a for p in half]), lost[1]])
+    last, soft = profiles[-1], compliance(nu)
+    force, outward, stick, lost = _halfplane.numbers(profiles, soft, by_reach=not (last.status == SLIP).any())
+    return np.array([force, outward, end_force_loss(profiles) / (soft * last.force**2), stick, lost])
 
 
 def _line(quick: bool) -> Result:

@@ -133,11 +133,9 @@ class StandIn:
 def on_rings(nu: float, count: int) -> StandIn:
     """Rings a / count wide on the exact half-space."""
     body = _rings.rings(nu, round(1.1 * count), round(1.1 * count) / count)
-    rest = (body.edges[1:] ** 2 + body.edges[:-1] ** 2) / (4.0 * RADIUS)
-    flat = body.compliance.reshape(2 * len(rest), -1)
-    condensed = SimpleNamespace(compliance=flat)
-    area = np.pi * np.diff(body.edges**2)
-    return StandIn(rest, area, body.compliance, condensed, np.arange(len(flat)), parts=1, nu=nu)
+    flat = body.compliance.reshape(2 * len(body.area), -1)
+    condensed, dofs = SimpleNamespace(compliance=flat), np.arange(len(flat))
+    return StandIn(body.gap(RADIUS), body.area, body.compliance, condensed, dofs, parts=1, nu=nu)
 
 
 def on_tets(nu: float, points: int) -> StandIn:
