@@ -19,20 +19,18 @@ import numpy as np
 
 from finger3d.accuracy.changes import Change, changing_numbers
 from finger3d.accuracy.model_error import Judgement, at_large_deformation, largest_principal_strain
-from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Model
 from finger3d.objects import Cylinder, Plane, Sphere
 
-from ._drawn import FAR, NEAR, UNDER, drawn
+from ._drawn import FAR, NEAR, UNDER, Shape, drawn, scene
 from ._press import fig9_finger, in_edges
 from ._rows import Result, Row, columns, listed
 
@@ -88,18 +86,13 @@ def solids(count: int) -> Iterator[tuple[str, Model]]:
         fig9 = fig9_finger(12.0 + 28.0 * u[0])
         half = designs()["half_cylinder"](radius_mm=5.0, width_mm=3.0 + 5.0 * u[0])
         block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=10.0 + 6.0 * u[0])
-        shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
+        shapes: tuple[Shape, ...] = (
             (fig9, Plane(), FAR, 10.0, 3.0),
             (half, Cylinder(radius_mm=10.0), NEAR, 1.0, 0.35),
             (block, Sphere(radius_mm=10.0), UNDER, 1.2, 0.7),
         )
-        design, rigid, gauges, depth, size = shapes[number % 3]
-        nu, mu = 0.3 + 0.19 * u[1], 0.03 * 40.0 ** u[2]
-        model = Model(
-            design, Isotropic(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg((0.5 + 0.5 * u[3]) * depth),),
-            object=rigid, friction=Coulomb(mu), gauges=gauges, domain="solid",
-        )  # fmt: skip
-        yield f"solid {number}: {type(rigid).__name__} on {design.name}, nu = {nu:.3g}, mu = {mu:.3g}", model
+        name, model = scene(shapes[number % 3], 0.3 + 0.19 * u[1], 0.03 * 40.0 ** u[2], 0.5 + 0.5 * u[3])
+        yield f"solid {number}: {name}", model
 
 
 def scenes(quick: bool) -> Iterator[tuple[str, Model]]:

@@ -31,15 +31,14 @@ from finger3d.analyses.pressed_body import presses
 from finger3d.analyses.sweep.run import sweep
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Model
 from finger3d.progress import Progress
 
 from ._cost import factored, free_part
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_model
 from ._rows import Row, at_most
 from .beside_ansys import SCENES
 from .label_rate import DRAWN, OBJECTS
@@ -65,10 +64,9 @@ FIVE_AGAINST_ONE = {"in ten increments": 1.6, "in increments chosen by their err
 the time of the whole command with one press."""
 
 
-def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
+def fig9(size: float, domain: Domain = "solid") -> Model:
     """The finger at an edge length."""
-    options, legs = MeshOptions(size, GRADING.get(size, 4.0) * size, mesher), (Leg(10.0, steps=10),)
-    return Model(fig9_finger(), Isotropic(1.0, 0.49), options, legs, friction=Coulomb(0.25), domain=domain)
+    return fig9_model(0.49, size, GRADING.get(size, 4.0) * size, domain, friction=Coulomb(0.25))
 
 
 def _seconds(act: Callable[[], Any]) -> float:

@@ -30,19 +30,14 @@ from finger3d.objects import Plane
 from finger3d.scene import scene_of
 
 from ._common import free_motion, increment
-from ._press import changed
-from ._rows import Row, at_least, at_most
+from ._press import block_tables, changed
+from ._rows import ROBUST, Row, at_least, at_most
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
-ROBUST = "what a robust method does; REFERENCES.md, 8.2"
-SCENE: Tree = {
-    "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 10.0},
-    "material": {"E_MPa": 1.0, "nu": 0.3},
-    "friction": {"mu": 0.25},
-    "model": {"domain": "plane-strain"},
-    "mesh": {"size_mm": 1.0, "base_size_mm": 3.0, "mesher": "swept"},
-    "press": {"depth_mm": 0.5, "steps": 2},
-}
+SCENE = block_tables(
+    (10.0, 10.0, 10.0), 1.0, 0.3, (1.0, 3.0), friction={"mu": 0.25}, model={"domain": "plane-strain"},
+    press={"depth_mm": 0.5, "steps": 2},
+)  # fmt: skip
 
 
 def rows(quick: bool) -> list[Row]:

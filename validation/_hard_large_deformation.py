@@ -40,7 +40,7 @@ from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
 from ._paper import moved
-from ._rows import Result, Row, Settled, at_least, at_most, grouped, of_records, settled
+from ._rows import GOAL, ROBUST, Result, Row, Settled, at_least, at_most, grouped, of_records, settled
 from .triangulated_objects import of_trimesh
 
 HEIGHT = 10.0
@@ -49,8 +49,6 @@ RESOLVED, RESOLVED_QUICK = {2: 49, 3: 11}, {2: 2, 3: 0}
 BALLS = ((5.0, 0.8), (8.0, 0.8), (15.0, 1.0))
 """Radius and depth, mm, of balls that touch nothing but the middle of a block."""
 
-GOAL = "goal of this project"
-ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 RESOLVED_WIDTH = 5.0
 _NU, _MU = (0.3, 0.4, 0.45, 0.49, 0.5), (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0, 100.0)
 

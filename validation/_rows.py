@@ -25,6 +25,10 @@ Measure = Literal["relative", "absolute", "at most", "at least"]
 PAPER = "Maeno 2004"
 """Beginning of the reference of a statement of the paper."""
 
+GOAL = "goal of this project"
+ROBUST = "what a robust method does; REFERENCES.md, 8.2"
+"""References of many rows."""
+
 COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
 """Columns of a results file."""
 

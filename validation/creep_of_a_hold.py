@@ -42,7 +42,7 @@ from finger3d.objects import TIME
 from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
-from ._press import changed, converged
+from ._press import block_tables, changed, converged
 from ._rows import Result, Row, columns, committed_instead, listed
 from .held_weights import largest_change
 
@@ -129,15 +129,11 @@ def mujoco_least_grip(grip: Grip) -> float:
 
 def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
     """Largest change in the hold, mm, and the least grip, N."""
-    tables = {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 20.0, "width_mm": 20.0},
-        "object": {"shape": "box", "size_mm": (40.0, 40.0, 120.0)},
-        "material": {"E_MPa": 1.0, "nu": 0.45},
-        "friction": {"mu": MU},
-        "grip": {"force_N": NORMAL, "mass_g": 1e3 * MASS * G / 9.80665, "steps": 2},
-        "mesh": {"size_mm": size, "base_size_mm": 2.0 * size, "mesher": "swept"},
-        "effects": {"auto": False},
-    }
+    tables = block_tables(
+        (10.0, 20.0, 20.0), 1.0, 0.45, (size, 2.0 * size), object={"shape": "box", "size_mm": (40.0, 40.0, 120.0)},
+        friction={"mu": MU}, grip={"force_N": NORMAL, "mass_g": 1e3 * MASS * G / 9.80665, "steps": 2},
+        effects={"auto": False},
+    )  # fmt: skip
     problem = build(scene_of(tables).model())
     close, weigh = problem.model.legs
     hold = replace(weigh, steps=increments, duration_s=HOLD_S)

@@ -18,14 +18,13 @@ from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, Model
 
 from ._paper import STRAIN, STRESS, said
-from ._press import changed, fig9_finger, paper_gauges
+from ._press import changed, fig9_model, paper_gauges
 from ._rows import Result, Row, at_least, at_most, columns, together
 
 NOISE, ERROR = 1.5e-4, 0.1
@@ -158,9 +157,8 @@ def _gauge(name: str, leaning: str, y: float, z: float, length: float = 0.0, sid
 
 def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> Model:
     size = (6.0 if quick else 2.5) if domain == "solid" else 3.0 if quick else 2.0 if large else 1.0
-    mesh = MeshOptions(size, 3.0 * size, "swept")
     legs = (Leg(10.0, steps=4 if quick else 10 if large else 80),)
-    model = Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, gauges=tuple(gauges), domain=domain)
+    model = fig9_model(nu, size, 3.0 * size, domain, legs=legs, gauges=tuple(gauges))
     return LargeDeformation().apply(model) if large else model
 
 
@@ -240,10 +238,8 @@ MUS_FOIL = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)
 
 def model(quick: bool) -> Model:
     """The finger with the gauge and its mirror image, in small strain."""
-    gauges = paper_gauges(4.0)
-    mesh = MeshOptions(5.0, 12.0, "swept") if quick else MeshOptions(2.0, 6.0, "swept")
-    legs = (Leg(10.0, steps=5 if quick else 10),)
-    return FOIL.apply(Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, friction=Coulomb(0.25), gauges=gauges))
+    sizes, legs = (5.0, 12.0) if quick else (2.0, 6.0), (Leg(10.0, steps=5 if quick else 10),)
+    return FOIL.apply(fig9_model(0.49, *sizes, legs=legs, friction=Coulomb(0.25), gauges=paper_gauges(4.0)))
 
 
 def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:

@@ -24,6 +24,7 @@ from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
 
+from ._press import block_tables
 from ._rows import Result, Row, columns, listed
 
 judged = listed(__file__)
@@ -71,15 +72,11 @@ class Model:
 
 def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> dict[str, Any]:
     """The ball on the block."""
-    return {
-        "finger": {"geometry": "block", "half_length_mm": 10.375, "height_mm": 4.0, "width_mm": 25.25},
-        "material": {"E_MPa": E_MPa, "nu": nu},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": min(2.0 * size, 4.0)},
-        "object": {"shape": "sphere", "radius_mm": 7.5},
-        "friction": {"mu": mu},
-        "press": {"depth_mm": 2.4, "steps": 12},
-        "effects": {"large_deformation": LAWS[law]},
-    }
+    return block_tables(
+        (10.375, 4.0, 25.25), E_MPa, nu, (size, min(2.0 * size, 4.0)), friction={"mu": mu},
+        object={"shape": "sphere", "radius_mm": 7.5}, press={"depth_mm": 2.4, "steps": 12},
+        effects={"large_deformation": LAWS[law]},
+    )  # fmt: skip
 
 
 def run(quick: bool) -> Result:

@@ -23,14 +23,13 @@ import numpy as np
 from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Plane
 
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_finger, fig9_model
 from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -73,7 +72,7 @@ class Sliding:
 def model(width: float, size: float) -> Model:
     """The finger of Fig. 9 with another width."""
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=5.0, slide_z_mm=5.0, turn_y=1.0))
-    return Model(fig9_finger(width), Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
+    return fig9_model(NU, size, 10.0, design=fig9_finger(width), legs=legs, friction=Coulomb(MU))
 
 
 def centres(problem: Problem, width: float, across: tuple[float, ...]) -> list[float]:
