@@ -23,9 +23,7 @@ from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
 from finger3d.objects import Cylinder, Plane, Sphere
@@ -105,22 +103,17 @@ def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
     yield from solids(SOLIDS)
 
 
-def last(problem: Problem) -> StepResult:
-    """Return the last increment of a press, converged or not."""
-    return list(march(problem))[-1]
-
-
 def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     """Yield the changes by large deformation where a press estimates them."""
     problem = build(model)
-    step = last(problem)
+    *_, step = march(problem)
     strain = formulation_of(problem.model).fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
     (found,) = Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
     estimate = found.estimate.of_press(changing_numbers(problem, step))
     truth = build(LargeDeformation().apply(model))
-    end = last(truth)
+    *_, end = march(truth)
     if end.outcome.ok:
         numbers = changing_numbers(truth, end)
         for number, change in estimate.changes.items():

@@ -22,7 +22,7 @@ from finger3d.fem.mesh import Mesh, boundary, quadratic, quadrature, signed_volu
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.contact_points import contact_geometry
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
 from finger3d.objects import ObjectPose, vertical_frame
 
 Field = Callable[[Float], Float]
@@ -208,19 +208,13 @@ class Body:
     surface: BoundarySurface
     compliance: Float
 
-    def press(
-        self, gap: Float, mu: float = 0.0, previous: ContactState | None = None, scale: float | None = None
-    ) -> ContactSolution:
-        """Forces under a rigid gap (c,) mm at rest, negative where the object would overlap."""
-        d = self.compliance.shape[1]
-        free = np.zeros((len(gap), d))
-        free[:, 0] = gap
-        start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
-        return increment(start, free, self.compliance, mu, scale or float(-gap.min()))
-
     def normal_force(self, gap: Float) -> Float:
-        """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction; NaN if that does not settle."""
-        found = self.press(gap)
+        """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction, negative where the object would
+        overlap; NaN if that does not settle."""
+        d = self.compliance.shape[1]
+        start, free = ContactState.at_rest(np.maximum(gap, 0.0), d), np.zeros((len(gap), d))
+        free[:, 0] = gap
+        found = increment(start, free, self.compliance, 0.0, float(-gap.min()))
         return found.state.force[:, 0] if found.outcome.ok else np.full(len(gap), np.nan)
 
     def gap(self, height: Field) -> Float:
@@ -246,9 +240,7 @@ def body(
     locked = held[face.nodes][:, [1, 0, 2][:d]].ravel()
     free = np.flatnonzero(~locked)
     small = condense(matrix, np.flatnonzero(held.ravel()), rows[free], solver).compliance
-    whole = np.diag(np.full(c * d, np.diagonal(small).max()))
-    whole[np.ix_(free, free)] = small
-    return Body(face, whole.reshape(c, d, c, d))
+    return Body(face, scatter_to_points(small, free, c, d))
 
 
 def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
@@ -256,6 +248,12 @@ def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
     inner = np.abs(x) < reach
     slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
     return float(np.sqrt(-top / slope)), float(np.sqrt(top))
+
+
+def ellipse_error(x: Float, p: Float, a: float, peak: float) -> float:
+    """L2 norm of the error of nodal pressures p (n,) at ascending x (n,) over that of the ellipse of half-width a."""
+    fine = np.linspace(0.0, 1.3 * a, 8001)
+    return distance(np.interp(fine, x, p), peak * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2)))
 
 
 def distance(got: Float, wanted: Float) -> float:

@@ -40,8 +40,8 @@ def scene(
     legs = (Leg(share * depth, steps=steps),)
     if slide:
         legs += (replace(legs[0], **{key: factor * share * depth for key, factor in slide.items()}),)
-    mesh = MeshOptions(size * edge, 4.0 * size * edge, "swept")
-    plane = "" if domain == "solid" else f"{domain}, "
+    mesher, plane = ("swept", "") if domain == "solid" else ("ftetwild", f"{domain}, ")  # of sections both are the same
+    mesh = MeshOptions(size * edge, 4.0 * size * edge, mesher)
     model = Model(
         design, Isotropic(1.0, nu), mesh, legs, object=rigid, friction=Coulomb(mu), gauges=gauges, domain=domain
     )

@@ -200,3 +200,22 @@ def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: dict
     for axes, quantity in zip(panels[:, 0], quantities, strict=True):
         axes.set_ylabel(quantity)
     panels[0, 0].legend(title=legend, frameon=False)
+
+
+def draw_by_mu(
+    panels: Sequence[Any], x: Float, profiles: Sequence[Profile], strains: Sequence[Float], gauges: dict[int, Float]
+) -> None:
+    """Draw friction along x at x > 0, strains (mus, n) at x (n,), and gauges (mus,) by angle, a panel each."""
+    from matplotlib import colormaps
+
+    first, *inner, last = panels
+    for i, (mu, profile) in enumerate(zip(MUS, profiles, strict=True)):
+        colour, on = colormaps["plasma"](0.85 * i / 4), profile.x >= 0.0
+        first.plot(profile.x[on], profile.q[on], color=colour, lw=1.1, label=f"{mu:g}")
+        for axes, strain in zip(inner, strains, strict=True):
+            axes.plot(x, strain[i], color=colour, lw=1.1)
+    for i, angle in enumerate((15, 30, 45, 60)):
+        last.plot(MUS, gauges[angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
+    for axes in panels:
+        axes.axhline(0.0, color="#999999", lw=0.7)
+        axes.set_xlabel("mu" if axes is last else "x (mm)")

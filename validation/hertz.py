@@ -36,7 +36,7 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
-from ._common import body, contact_axis, convergence, distance, ellipse, graded, quarter_block, rate
+from ._common import body, contact_axis, convergence, ellipse, ellipse_error, graded, quarter_block, rate
 from ._halfplane import CANDIDATES, on_block
 from ._layer import line, point
 from ._rows import Result, Row, exact_columns, rms, together, zero
@@ -72,10 +72,9 @@ def contact(x: Float, p: Float, force: float, modulus: float) -> Contact:
     p0 = 2.0 * force / (np.pi * a)
     half_width, peak = ellipse(x, p, 0.9 * a)
     fine = np.linspace(0.0, 1.3 * a, 8001)
-    hertz = p0 * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2))
     drawn = np.interp(fine, x, p)
     moment = 2.0 * np.sqrt(np.sum(drawn * fine**2) / np.sum(drawn)) / a
-    return Contact(half_width / a, float(moment), peak / p0, distance(drawn, hertz))
+    return Contact(half_width / a, float(moment), peak / p0, ellipse_error(x, p, a, p0))
 
 
 def press(
