@@ -34,7 +34,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_finger, in_increments
 
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
@@ -185,8 +185,7 @@ def factored(upper: sp.csr_matrix) -> tuple[float, float]:
 
 def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:
     """Frames of a press in so many increments."""
-    legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
-    return converged(changed(problem, legs=legs), workspace)
+    return converged(changed(problem, legs=in_increments(problem.model.legs, count)), workspace)
 
 
 def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:

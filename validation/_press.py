@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal
 
 from finger3d._types import Tree
 from finger3d.contact.friction import Coulomb, FrictionLaw
@@ -80,11 +80,16 @@ def converged(problem: Problem, workspace: Workspace | None = None) -> list[Step
     return steps
 
 
+def in_increments(legs: Sequence[Leg], count: int | Literal["auto"]) -> tuple[Leg, ...]:
+    """Return legs with a number of increments each."""
+    return tuple(replace(leg, steps=count) for leg in legs)
+
+
 def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[StepResult]:
     """Return the increments of a press under another friction, and in that many increments a leg."""
     law = Coulomb(friction) if isinstance(friction, int | float) else friction
-    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
-    return converged(changed(problem, friction=law, legs=legs))
+    legs = problem.model.legs
+    return converged(changed(problem, friction=law, legs=in_increments(legs, steps) if steps else legs))
 
 
 def in_edges(model: Model, factor: float) -> Model:

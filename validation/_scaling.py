@@ -14,9 +14,10 @@ from typing import Any
 from finger3d._machine import child_environment
 from finger3d.analyses.press import press
 from finger3d.progress import Progress
-from finger3d.scene import Scene, parse
+from finger3d.scene import Scene, load
 
 from ._child import peak_mb, reset_peak
+from ._press import GEOMETRIES
 
 BODIES = 16
 STAGES = ("mesh", "assembly", "condensation", "contact", "output", "error bars and page")
@@ -78,14 +79,10 @@ def prepare() -> None:
 
 
 def _scene(size: float, base: float) -> Scene:
-    return parse(
-        {
-            "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
-                       "edge_height_mm": 36.6, "width_mm": 20.0},
-            "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.25}, "press": {"depth_mm": 10.0, "steps": 10},
-            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"}, "effects": {"auto": False},
-        }
-    )  # fmt: skip
+    mesh = f"mesh={{size_mm={size}, base_size_mm={base}, mesher='swept'}}"
+    return load(
+        GEOMETRIES / "fig9.toml", ["gauge=[]", "material.nu=0.49", "press.steps=10", "effects.auto=false", mesh]
+    )
 
 
 def sweep_seconds(size: Size, workers: int) -> float:

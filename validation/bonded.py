@@ -27,7 +27,6 @@ from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
@@ -47,6 +46,7 @@ from ._common import (
 )
 from ._corner import clamped_free, extrapolated, observed
 from ._layer import line, point
+from ._press import converged
 from ._rows import Result, Row, exact_columns, together, zero
 
 RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force
@@ -75,8 +75,7 @@ def _model(a: float, nu: float, sizes: tuple[float, float], indenter: Any, meshe
 
 def forces(model: Model) -> Float:
     """Forces (N) at the ends of the legs by the product's own path."""
-    frames = list(march(build(model, margin=1.0)))
-    return np.array([f.state.force[:, 0].sum() if f.outcome.ok else np.nan for f in frames])
+    return np.array([frame.state.force[:, 0].sum() for frame in converged(build(model, margin=1.0))])
 
 
 def line_errors(a: float, nu: float, count: int) -> Errors:

@@ -23,6 +23,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
+from finger3d.io import write_csv
 
 from ._press import block_tables
 from ._rows import Result, Row, columns, listed
@@ -99,8 +100,8 @@ def _identified(law: str, mu: float, nu: float, size: float, folder: Path) -> Mo
     for count in (4, 3):
         out = folder / f"{law} {mu} {nu} {count}"
         out.mkdir(parents=True)
-        rows = [f"{d},{f},{SHARE * f}" for d, f in zip(DEPTHS[:count], FORCES[:count], strict=True)]
-        (out / "bench.csv").write_text("\n".join(["depth_mm,normal_force_N,normal_force_N_std", *rows]) + "\n")
+        table = {"depth_mm": DEPTHS, "normal_force_N": FORCES, "normal_force_N_std": SHARE * FORCES}
+        write_csv(out / "bench.csv", {name: values[:count] for name, values in table.items()})
         found[count] = identify(scene(law, mu, nu, size), out / "bench.csv", FREE, out)
     modulus, zero = found[4].fitted.values
     curve, values = found[3].curve, found[3].fitted.values

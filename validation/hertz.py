@@ -39,6 +39,7 @@ from finger3d.objects import Cylinder, Sphere
 from ._common import body, contact_axis, convergence, ellipse, ellipse_error, graded, quarter_block, rate
 from ._halfplane import CANDIDATES, on_block
 from ._layer import line, point
+from ._press import converged
 from ._rows import Result, Row, exact_columns, rms, together, zero
 
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
@@ -224,8 +225,8 @@ def own_path(nu: float, count: int) -> float:
     samples = problem.surface.samples
     square = (problem.surface.average @ (samples[:, 0] ** 2 + samples[:, 2] ** 2))[problem.symmetry.image_of]
     ratios = []
-    for frame in march(problem):
-        f = frame.state.force[:, 0] if frame.outcome.ok else np.full(len(square), np.nan)
+    for frame in converged(problem):
+        f = frame.state.force[:, 0]
         ratios.append(f.sum() / force_at(float(np.sqrt(2.5 * (f @ square) / f.sum())), nu))
     return float(np.mean(ratios))
 

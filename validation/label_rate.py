@@ -24,6 +24,7 @@ import numpy as np
 from finger3d._machine import cores
 from finger3d._types import Float
 from finger3d.analyses.sweep.run import sweep
+from finger3d.io import write_csv
 
 from ._press import block_tables
 from ._rows import GOAL, Result, Row, at_most, columns
@@ -75,8 +76,7 @@ class Swept(NamedTuple):
     def pressed(self, count: int, finer: float, folder: Path) -> Mapping[str, Sequence[Any]]:
         """Return the table of the first samples, pressed again on edges that are longer by a factor."""
         points, count = folder / "points.csv", min(count, self.samples)
-        lines = [",".join(repr(float(self.numbers[key][k])) for key in self.ranges) for k in range(count)]
-        points.write_text("\n".join([",".join(self.ranges), *lines]) + "\n", encoding="utf-8")
+        write_csv(points, {key: self.numbers[key][:count] for key in self.ranges})
         out = folder / f"{self.name} {self.large} {finer}"
         return sweep(scene(self.name, finer * self.size_mm, self.large), points, out).columns
 
