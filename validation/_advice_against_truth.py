@@ -128,7 +128,8 @@ def run(quick: bool) -> Result:
     for name, model in scenes(quick):
         found += by_large_deformation(name, model)
         pressed += 1
-    rows = [_estimated(found, pressed)]
+    share = len({j.scene for j in found}) / pressed
+    rows = [judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)]
     for kind in KINDS:
         rows += _rows([j for j in found if j.kind == kind], f"{KINDS[kind]} by {LARGE}")
     lines = [
@@ -137,11 +138,6 @@ def run(quick: bool) -> Result:
         for change in [j.estimate]
     ]
     return Result(tuple(rows), columns(COLUMNS, lines), lambda figure: _draw(figure, found))
-
-
-def _estimated(found: list[Judged], pressed: int) -> Row:
-    share = len({j.scene for j in found}) / pressed
-    return judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)
 
 
 def _rows(found: list[Judged], what: str) -> Iterator[Row]:

@@ -155,7 +155,8 @@ def run(quick: bool) -> Result:
             here = read(result)
             rows.append(_beside(scene, what, theirs, here))
             lines.append((scene.name, what, theirs, here, _bar(result, what), seconds, scene.seconds_there or np.nan))
-        rows.append(at_most(f"largest residual, {scene.name}", "Eqs. 1 to 4", 1e-8, _residual(result)))
+        residual = max(step.residual or 0.0 for step in result.steps)
+        rows.append(at_most(f"largest residual, {scene.name}", "Eqs. 1 to 4", 1e-8, residual))
     rows.append(_kratos_row(coarser))
     names = "scene number theirs here bar seconds_here seconds_there"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, times, curves))
@@ -164,10 +165,6 @@ def run(quick: bool) -> Result:
 def _beside(scene: Scene, what: str, theirs: float, here: float) -> Row:
     reason = "the authors' own bound, 9 %, and what is read off a figure"
     return Row(f"{what}: {scene.name}", scene.source, theirs, here, THEIRS, reason, "statement")
-
-
-def _residual(result: PressResult) -> float:
-    return max(step.residual or 0.0 for step in result.steps)
 
 
 def _bar(result: PressResult, what: str) -> float:

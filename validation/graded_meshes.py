@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import curve_fit
 
 import finger3d
 from finger3d.accuracy.estimate import discretisation, press_numbers
@@ -119,12 +119,12 @@ def _extrapolated(sizes: np.ndarray, values: np.ndarray) -> float:
     """Return the limit x of ``x + c h^p`` fitted to values, with an order between 1 and 4."""
     scale = abs(values[-1])
 
-    def misfit(unknowns: np.ndarray) -> np.ndarray:
-        limit, factor, order = unknowns
-        return np.asarray(limit + factor * (sizes / sizes[0]) ** order - values / scale)
+    def value(size: np.ndarray, limit: float, factor: float, order: float) -> np.ndarray:
+        return limit + factor * size**order
 
     start = [values[-1] / scale, (values[0] - values[-1]) / scale, 1.5]
-    return float(least_squares(misfit, start, bounds=([-np.inf, -np.inf, 1.0], [np.inf, np.inf, 4.0])).x[0] * scale)
+    bounds = [-np.inf, -np.inf, 1.0], [np.inf, np.inf, 4.0]
+    return float(curve_fit(value, sizes / sizes[0], values / scale, start, bounds=bounds)[0][0] * scale)
 
 
 def _rows(found: list[Mesh]) -> Iterator[Row]:

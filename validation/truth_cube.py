@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
 
 from finger3d._types import Float
@@ -64,9 +65,7 @@ class Compression:
 
     def at(self, travel: float) -> Float:
         """(3, 7) changes at a travel, mm."""
-        k = int(np.clip(np.searchsorted(self.travel, travel), 1, len(self.travel) - 1))
-        a = (travel - self.travel[k - 1]) / (self.travel[k] - self.travel[k - 1])
-        return (1.0 - a) * self.changes[k - 1] + a * self.changes[k]
+        return np.asarray(make_interp_spline(self.travel, self.changes, k=1)(travel))
 
     def fitted(self, measured: Float, which: slice = slice(None)) -> tuple[float, Float]:
         """Travel that fits changes (3, 7) best, by all or some kinds, and the differences, computed less measured."""

@@ -149,24 +149,21 @@ def lee_radok(t: float, relax: Any = modulus, until: float = 1.0) -> float:
 
 def ting(t: float) -> tuple[float, float]:
     """(P/k, a in mm) while the ball is drawn back; t1 lies on the ramp, since the hold moves nothing."""
-
-    def moved(low: float, high: float) -> float:
-        return float(quad(lambda s: modulus(t - s), low, high, epsabs=1e-13)[0])
-
-    back = moved(HELD, t)
-    if moved(0.0, 1.0) <= back:
+    back = _moved(t, HELD, t)
+    if _moved(t, 0.0, 1.0) <= back:
         return 0.0, 0.0
-    t1 = float(brentq(lambda x: moved(x, 1.0) - back, 0.0, 1.0, xtol=1e-12))
+    t1 = float(brentq(lambda x: _moved(t, x, 1.0) - back, 0.0, 1.0, xtol=1e-12))
     return lee_radok(t, until=t1), float(np.sqrt(t1))
+
+
+def _moved(t: float, low: float, high: float) -> float:
+    """Integral of the modulus at t over the times of a motion at unit speed."""
+    return float(quad(lambda s: modulus(t - s), low, high, epsabs=1e-13)[0])
 
 
 def time_of_parting() -> float:
     """When the ball that is drawn back leaves the body (s)."""
-
-    def ahead(t: float) -> float:
-        return float(quad(lambda s: modulus(t - s), 0.0, 1.0)[0] - quad(lambda s: modulus(t - s), HELD, t)[0])
-
-    return float(brentq(ahead, 1.51, 2.5))
+    return float(brentq(lambda t: _moved(t, 0.0, 1.0) - _moved(t, HELD, t), 1.51, 2.5))
 
 
 def contact_modulus(nu: float) -> Any:
