@@ -62,7 +62,7 @@ class Found:
     settled : whether all increments converged
     folds : whether it ended at a sharp edge of the finger, with a cell compressed there or folded over
     says : outcome of the increment that failed
-    increments, converged, factorizations, iterations : in all
+    increments, converged, factorizations : in all
     residual : the largest of the increments that converged, dimensionless
     penetration : deepest place of the surface inside the object, over the depth
     at_sharp_edge : whether it is beside a sharp edge of the finger, or under an object that has edges
@@ -77,7 +77,6 @@ class Found:
     converged: int
     residual: float
     factorizations: int
-    iterations: int
     penetration: float
     at_sharp_edge: bool
     outside: bool
@@ -210,7 +209,6 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
         converged=len(good),
         residual=max((step.residual for step in good), default=0.0),
         factorizations=factorizations,
-        iterations=sum(step.iterations for step in steps),
         penetration=deepest.penetration_mm / model.largest_depth_mm if deepest else 0.0,
         at_sharp_edge=isinstance(model.object, MeshObject) or bool(deepest and deepest.at_crease),
         outside=all(check.within_candidates for check in checks),

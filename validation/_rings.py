@@ -37,7 +37,6 @@ def _j1j1(r: Float, s: Float) -> Float:
 class Rings:
     """Rings of equal width that cover radii 0 to `edges[-1]` (mm), for E = 1 MPa; compliance (c, 2, c, 2) mm/N."""
 
-    nu: float
     edges: Float
     compliance: Float
 
@@ -79,7 +78,7 @@ def rings(nu: float, count: int, reach: float) -> Rings:
     whole[:, 1, :, 0] = cross
     whole[:, 0, :, 1] = cross.T  # Betti
     flat = whole.reshape(2 * count, 2 * count)
-    return Rings(nu, edges, (0.5 * (flat + flat.T)).reshape(whole.shape))  # symmetric but for the quadrature
+    return Rings(edges, (0.5 * (flat + flat.T)).reshape(whole.shape))  # symmetric but for the quadrature
 
 
 def _receivers(edges: Float) -> tuple[Float, Float]:
