@@ -43,6 +43,7 @@ from finger3d.objects import (
     Wedge,
     first_touch,
 )
+from finger3d.objects.rigid import rotation
 
 from ._common import Body, body, increment
 from ._press import converged
@@ -139,8 +140,7 @@ FINGER = 4.0
 
 def turn(degrees: float) -> Float:
     """Matrix (3, 3) that turns about y."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return rotation(0.0, math.radians(degrees), 0.0)
 
 
 def finger(size: float) -> Mesh:
