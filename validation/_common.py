@@ -303,10 +303,14 @@ def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Fl
     return np.concatenate([fine, fine[-1] + graded(length - fine[-1], step * growth, growth)[1:]])
 
 
-def quarter_block(x: Float, depths: Float) -> tuple[Mesh, NDArray[np.bool_]]:
-    """Quarter of a square block on a fixed base: coordinates along x and z, and depths from the top."""
+def quarter_block(x: Float, depths: Float, nu: float, reach: float) -> Body:
+    """Quarter of a square block on a fixed base, E = 1 MPa: coordinates along x and z, and depths from the top.
+
+    Contact points lie within `reach` mm of the middle.
+    """
     mesh = quadratic(box([x, depths[-1] - depths[::-1], x]))
-    return mesh, held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+    held = held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+    return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < reach)
 
 
 def free_motion(problem: Problem, target: ObjectPose) -> Float:

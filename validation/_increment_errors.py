@@ -56,9 +56,10 @@ def _size(quick: bool) -> Result:
         for count in (PATH, *counts):
             frame = under(problem, PlainCoulomb(0.25), count)[-1] if count else _exact(problem)
             profile = Profile.of(problem, frame)
-            friction = float(np.abs(profile.q) @ profile.area)
             shear = float(np.abs(strains(frame, len(x))[2]).max())
-            found[plane, nu, count] = np.array([profile.force, friction, profile.c, frame.dissipation_mJ, shear])
+            found[plane, nu, count] = np.array(
+                [profile.force, profile.friction, profile.c, frame.dissipation_mJ, shear]
+            )
             size_mm = 1.0 / count if count else 0.0
             lines.append((plane, nu, count, size_mm, *map(float, found[plane, nu, count])))
         rows += _statements(plane, nu, found, counts)

@@ -96,6 +96,11 @@ class Profile:
         return float(self.p @ self.area)
 
     @property
+    def friction(self) -> float:
+        """Sum of the friction forces (N), likewise."""
+        return float(np.abs(self.q) @ self.area)
+
+    @property
     def a(self) -> float:
         """Half-width of the contact at rest (mm): half way between the last point that touches and the next."""
         return self._edge(self.status != OPEN)

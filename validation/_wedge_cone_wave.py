@@ -53,7 +53,7 @@ Errors = Float  # (depths, 2): force over the closed form at equal a, less 1; L2
 
 
 TIP = Wedge(angle=math.atan(SLOPE))
-HEIGHT = 200.0
+HEIGHT, CONE = 200.0, 10.0
 WEDGE_DEPTHS = 0.72 * SLOPE * np.linspace(0.7, 1.0, 20) * np.log(2.0 * HEIGHT)  # half-widths near 0.7 to 1 mm
 
 
@@ -96,10 +96,9 @@ def own_path(count: int) -> float:
     return 1.0 + float(np.mean([wedge_errors(at, f[right] / area, f.sum())[0] for f in forces]))
 
 
-def cone(count: int, growth: float = 1.6, height: float = 10.0) -> Errors:
+def cone(count: int, growth: float) -> Errors:
     """A quarter of a block, radii near 0.7 to 1 mm."""
-    mesh, held = quarter_block(contact_axis(1.0, count, height, growth), graded(height, 1.0 / count, growth))
-    block = body(mesh, Elasticity.of(1.0, NU), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.3)
+    block = quarter_block(contact_axis(1.0, count, CONE, growth), graded(CONE, 1.0 / count, growth), NU, 1.3)
     radius = block.gap(lambda p: np.hypot(p[:, 0], p[:, 2]))
     square = block.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
     found = []

@@ -31,7 +31,6 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import (
-    body,
     box,
     contact_axis,
     convergence,
@@ -90,8 +89,7 @@ def line_errors(a: float, nu: float, count: int) -> Errors:
 
 def point_errors(a: float, nu: float, axes: tuple[Float, Float]) -> Errors:
     """The same under a ball, on a graded quarter of a square layer."""
-    mesh, held = quarter_block(*axes)
-    layer = body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.25 * a)
+    layer = quarter_block(*axes, nu, 1.25 * a)
     square = layer.gap(lambda p: (p[:, 0] ** 2 + p[:, 2] ** 2) / (2.0 * RADIUS))
     away = []
     for v in a * np.linspace(0.7, 1.0, 12):

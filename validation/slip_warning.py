@@ -150,9 +150,7 @@ def run(quick: bool) -> Result:
 
 
 def _lines(one: Slide) -> Iterator[tuple[Any, ...]]:
-    keys = (*NAMES, "normal_force_N", "tangential_force_N")
-    order = (*keys[:3], *keys[4:], "cone")
-    for slide, *values in zip(one.slide_mm.tolist(), *(one.numbers[key].tolist() for key in order), strict=True):
+    for slide, *values in zip(one.slide_mm.tolist(), *(v.tolist() for v in one.numbers.values()), strict=True):
         yield one.name, slide, one.gross_mm, *values
 
 
