@@ -16,7 +16,7 @@ from finger3d.fem.recovery import extrapolated, mean_traction_weights, nodal_pre
 from finger3d.fem.tensors import cofactor, determinant
 from tests.meshes import full, grid
 from validation import cook, manufactured, patch_test
-from validation._common import mapped, side_load
+from validation._common import cube, mapped, side_load
 
 
 def test_they_are_those_of_linear_algebra_singular_tensors_included() -> None:
@@ -64,7 +64,7 @@ def test_manufactured_solution_converges_at_the_rates_of_quadratic_elements(nu: 
 @pytest.mark.parametrize("panel", cook.PANELS, ids=lambda panel: panel.name)
 def test_cook_membrane(panel: cook.Panel) -> None:
     # validation/REFERENCES.md, 5.4.  The clamped corner governs: error ~ h^1.1 to h^1.3; extrapolated as seen
-    a, b, c = (cook.deflection(cook.square(n), panel) for n in (12, 24, 48))
+    a, b, c = (cook.deflection(cube(2, n), panel) for n in (12, 24, 48))
     ratio = (c - b) / (b - a)
     assert 0.35 < ratio < 0.5
     assert c + (c - b) * ratio / (1 - ratio) == pytest.approx(panel.wanted, rel=1.5e-3)
@@ -72,7 +72,7 @@ def test_cook_membrane(panel: cook.Panel) -> None:
 
 def test_linear_triangles_fail_cook_at_near_incompressibility() -> None:
     good, locked = (
-        abs(cook.deflection(cook.square(24), panel, Elasticity.of(250.0, panel.nu, mixed=False)) / panel.wanted - 1.0)
+        abs(cook.deflection(cube(2, 24), panel, Elasticity.of(250.0, panel.nu, mixed=False)) / panel.wanted - 1.0)
         for panel in (cook.PANELS[1], cook.PANELS[3])
     )
     assert good < 0.1 < 0.25 < locked
@@ -81,7 +81,7 @@ def test_linear_triangles_fail_cook_at_near_incompressibility() -> None:
 def test_compressibility_floor_moves_results_by_less_than_1e_6(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FINGER3D_SOLVER", "superlu")  # PARDISO's round-off grows with the ratio
     laws = [Elasticity(250.0 / 3, ratio * 250.0 / 3, True) for ratio in (1e7, 1e10)]
-    values = [cook.deflection(quadratic(cook.square(8)), cook.PANELS[4], law) for law in laws]
+    values = [cook.deflection(quadratic(cube(2, 8)), cook.PANELS[4], law) for law in laws]
     assert values[0] == pytest.approx(values[1], rel=1e-6)
 
 

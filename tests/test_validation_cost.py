@@ -16,7 +16,7 @@ from validation._cost_truth import Advice, Known, Truth
 from validation._rows import committed
 
 CASES = [Case(SECTION, size, 4.0 * size) for size in (4.0, 2.0, 1.0, 0.5)]
-TRUTH = Truth(1.0, 1e-3, 1.0, 0.0)
+TRUTH = Truth(1.0, 1e-3, 0.0)
 ERRORS = {case: {"force": 0.02 * case.size} for case in CASES}
 UNKNOWN = Advice("force", 0.001, None, 0, 0.0, 0.0, 0.0, 0, 1e-3)
 

@@ -19,20 +19,16 @@ import numpy as np
 
 from finger3d.accuracy.changes import Change, changing_numbers
 from finger3d.accuracy.model_error import Judgement, at_large_deformation, largest_principal_strain
-from finger3d.contact.friction import Coulomb
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Model
 from finger3d.objects import Cylinder, Plane, Sphere
 
-from ._drawn import FAR, NEAR, UNDER, drawn
+from ._drawn import FAR, NEAR, UNDER, Shape, drawn, scene
 from ._press import fig9_finger, in_edges
 from ._rows import Result, Row, columns, listed
 
@@ -88,18 +84,13 @@ def solids(count: int) -> Iterator[tuple[str, Model]]:
         fig9 = fig9_finger(12.0 + 28.0 * u[0])
         half = designs()["half_cylinder"](radius_mm=5.0, width_mm=3.0 + 5.0 * u[0])
         block = designs()["block"](half_length_mm=8.0, height_mm=8.0, width_mm=10.0 + 6.0 * u[0])
-        shapes: tuple[tuple[Any, Any, tuple[Gauge, ...], float, float], ...] = (
+        shapes: tuple[Shape, ...] = (
             (fig9, Plane(), FAR, 10.0, 3.0),
             (half, Cylinder(radius_mm=10.0), NEAR, 1.0, 0.35),
             (block, Sphere(radius_mm=10.0), UNDER, 1.2, 0.7),
         )
-        design, rigid, gauges, depth, size = shapes[number % 3]
-        nu, mu = 0.3 + 0.19 * u[1], 0.03 * 40.0 ** u[2]
-        model = Model(
-            design, Isotropic(1.0, nu), MeshOptions(size, 4.0 * size, "swept"), (Leg((0.5 + 0.5 * u[3]) * depth),),
-            object=rigid, friction=Coulomb(mu), gauges=gauges, domain="solid",
-        )  # fmt: skip
-        yield f"solid {number}: {type(rigid).__name__} on {design.name}, nu = {nu:.3g}, mu = {mu:.3g}", model
+        name, model = scene(shapes[number % 3], 0.3 + 0.19 * u[1], 0.03 * 40.0 ** u[2], 0.5 + 0.5 * u[3])
+        yield f"solid {number}: {name}", model
 
 
 def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
@@ -112,22 +103,17 @@ def scenes(quick: bool) -> Iterator[tuple[str, Model]]:
     yield from solids(SOLIDS)
 
 
-def last(problem: Problem) -> StepResult:
-    """Return the last increment of a press, converged or not."""
-    return list(march(problem))[-1]
-
-
 def by_large_deformation(name: str, model: Model) -> Iterator[Judged]:
     """Yield the changes by large deformation where a press estimates them."""
     problem = build(model)
-    step = last(problem)
+    *_, step = march(problem)
     strain = formulation_of(problem.model).fields(problem, step.meshed_state)[1]
     if largest_principal_strain(strain) < LEAST_STRAIN:
         return
     (found,) = Judgement(model, {LARGE_DEFORMATION: at_large_deformation}).found(shortcut=False).values()
     estimate = found.estimate.of_press(changing_numbers(problem, step))
     truth = build(LargeDeformation().apply(model))
-    end = last(truth)
+    *_, end = march(truth)
     if end.outcome.ok:
         numbers = changing_numbers(truth, end)
         for number, change in estimate.changes.items():
@@ -142,7 +128,8 @@ def run(quick: bool) -> Result:
     for name, model in scenes(quick):
         found += by_large_deformation(name, model)
         pressed += 1
-    rows = [_estimated(found, pressed)]
+    share = len({j.scene for j in found}) / pressed
+    rows = [judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)]
     for kind in KINDS:
         rows += _rows([j for j in found if j.kind == kind], f"{KINDS[kind]} by {LARGE}")
     lines = [
@@ -151,11 +138,6 @@ def run(quick: bool) -> Result:
         for change in [j.estimate]
     ]
     return Result(tuple(rows), columns(COLUMNS, lines), lambda figure: _draw(figure, found))
-
-
-def _estimated(found: list[Judged], pressed: int) -> Row:
-    share = len({j.scene for j in found}) / pressed
-    return judged("share-of-scenes-whose-change-by", share, SHARE, pressed=pressed)
 
 
 def _rows(found: list[Judged], what: str) -> Iterator[Row]:

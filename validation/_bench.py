@@ -25,20 +25,20 @@ from typing import Any
 
 import numpy as np
 
-from finger3d._machine import cores
+from finger3d._machine import child_environment, cores
 from finger3d.analyses.press import press
 from finger3d.analyses.pressed_body import presses
 from finger3d.analyses.sweep.run import sweep
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
-from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Model
 from finger3d.progress import Progress
 
-from ._press import changed, converged, fig9_finger
+from ._cost import factored, free_part
+from ._press import changed, converged, fig9_model
 from ._rows import Row, at_most
 from .beside_ansys import SCENES
 from .label_rate import DRAWN, OBJECTS
@@ -64,10 +64,9 @@ FIVE_AGAINST_ONE = {"in ten increments": 1.6, "in increments chosen by their err
 the time of the whole command with one press."""
 
 
-def fig9(size: float, domain: Domain = "solid", mesher: Any = "swept") -> Model:
+def fig9(size: float, domain: Domain = "solid") -> Model:
     """The finger at an edge length."""
-    options, legs = MeshOptions(size, GRADING.get(size, 4.0) * size, mesher), (Leg(10.0, steps=10),)
-    return Model(fig9_finger(), Isotropic(1.0, 0.49), options, legs, friction=Coulomb(0.25), domain=domain)
+    return fig9_model(0.49, size, GRADING.get(size, 4.0) * size, domain, friction=Coulomb(0.25))
 
 
 def _seconds(act: Callable[[], Any]) -> float:
@@ -89,10 +88,9 @@ def measured(size: float) -> dict[str, float]:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     del problem  # frees the memory of its factor
     problem, again = _pressed(size)
-    free = np.setdiff1d(np.arange(problem.body.stiffness.upper.shape[0]), problem.body.fixed_dofs)
-    upper = problem.body.stiffness.upper[free][:, free]
+    upper = free_part(problem)
     del problem
-    return _least([found, again]) | {"peak_MB": peak, "factorisation": _plain(upper)}
+    return _least([found, again]) | {"peak_MB": peak, "factorisation": factored(upper)[0]}
 
 
 def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
@@ -109,19 +107,6 @@ def _under_all(problem: Problem, mus: Sequence[float]) -> None:
         raise AssertionError("not every mu converged")
 
 
-def _plain(upper: Any) -> float:
-    """Seconds of one factorisation, analysis included, as anyone may call it."""
-    from pypardiso import PyPardisoSolver
-
-    solver = PyPardisoSolver(mtype=-2)
-    for number, value in ((1, 1), (2, 3), (10, 13), (21, 1)):
-        solver.set_iparm(number, value)
-    upper.sort_indices()
-    seconds = _seconds(lambda: solver.factorize(upper))
-    solver.free_memory(everything=True)
-    return seconds
-
-
 def _child(size: float) -> dict[str, float]:
     """`measured` in a process of its own, which starts with a clean memory; and the condensation by MUMPS in another.
 
@@ -133,10 +118,8 @@ def _child(size: float) -> dict[str, float]:
 
 
 def _run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    package = str(Path(__file__).resolve().parents[1])
-    paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
     # a user's Python keeps what it compiled; one that may not would compile all of finger3d in every run
-    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": ""}
+    environment = {**child_environment(), "PYTHONDONTWRITEBYTECODE": ""}
     return subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
 
 

@@ -8,18 +8,21 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.analyses.calculix import OBJECT, Contact, press_deck
+from finger3d.analyses.calculix import OBJECT, Contact, Deck, press_deck
 from finger3d.errors import MissingError
 from finger3d.mechanics.model import Model
 
 _NUMBER = r"\s*([-+]?\d\.\d+E[-+]\d+)"
 _TOTAL = re.compile(rf"total force \(fx,fy,fz\) for set {OBJECT} and time\s+(\S+)\s+{_NUMBER}{_NUMBER}{_NUMBER}")
+INSTALL = "apt install calculix-ccx"
 _SAID = 300  # last characters of what it said, in a message
 
 
@@ -28,8 +31,19 @@ def program() -> str | None:
     return shutil.which("ccx")
 
 
-def solve(deck: Path, seconds: float) -> None:
-    """Run ccx on a deck; its results lie beside it.
+# a small process between: the peak of its children is then that of ccx alone
+_LAUNCH = """
+import json, resource, subprocess, sys, time
+start = time.perf_counter()
+with open(sys.argv[2] + ".log", "w") as log:
+    status = subprocess.run(sys.argv[1:], stdout=log, stderr=subprocess.STDOUT).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([status, time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
+"""
+
+
+def solve(deck: Path, seconds: float) -> tuple[float, float, float]:
+    """Run ccx on a deck, beside which its results lie; return its wall and processor time (s) and its peak (MB).
 
     Raises
     ------
@@ -42,11 +56,14 @@ def solve(deck: Path, seconds: float) -> None:
     """
     ccx = program()
     if ccx is None:
-        raise MissingError("ccx, CalculiX's solver, is not installed; apt install calculix-ccx")
-    command = [ccx, deck.stem]
-    done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=seconds, check=False)
-    if done.returncode != 0 or "Job finished" not in done.stdout:
-        raise RuntimeError(f"ccx ended with {done.returncode}: {' '.join(done.stdout[-_SAID:].split())}")
+        raise MissingError(f"ccx, CalculiX's solver, is not installed; {INSTALL}")
+    command = [sys.executable, "-I", "-S", "-c", _LAUNCH, ccx, deck.stem]
+    done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=seconds, check=True)
+    status, wall, cpu, peak = json.loads(done.stdout)
+    log = deck.with_suffix(".log").read_text(encoding="utf-8", errors="replace")
+    if status != 0 or "Job finished" not in log:
+        raise RuntimeError(f"ccx ended with {status}: {' '.join(log[-_SAID:].split())}")
+    return wall, cpu, peak
 
 
 def printed_forces(path: Path) -> tuple[Float, Float]:
@@ -86,42 +103,38 @@ class Answer:
         return float(self.forces[-1, 1])
 
 
-# a small process between: the peak of its children is then that of ccx alone
-_LAUNCH = """
-import json, resource, subprocess, sys, time
-start = time.perf_counter()
-with open("press.log", "w") as log:
-    status = subprocess.run(sys.argv[1:], stdout=log, stderr=subprocess.STDOUT).returncode
-used = resource.getrusage(resource.RUSAGE_CHILDREN)
-print(json.dumps([status, time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
-"""
-
-
-def run(model: Model, contact: Contact, limit_s: float) -> Answer:
-    """Press a model by ccx, with a penalty contact of its own, and read what it printed.
+def run(model: Model, limit_s: float, contact: Contact | None = None) -> Answer:
+    """Press a model by ccx, with a penalty contact of its own if one is given, and read what it printed.
 
     Raises
     ------
-    ArithmeticError
-        It did not reach the end.
-    subprocess.TimeoutExpired
-        Not within the limit.
+    RuntimeError, subprocess.TimeoutExpired
+        See `solve`.
     """
     made = press_deck(model)
-    text = replace(made, contact=contact, fields=False).text()
-    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as name:
-        folder = Path(name)
-        (folder / "press.inp").write_text(text, encoding="ascii")
-        done = subprocess.run(
-            [sys.executable, "-I", "-S", "-c", _LAUNCH, str(program()), "press"], cwd=folder, capture_output=True,
-            text=True, timeout=limit_s, check=True,
-        )  # fmt: skip
-        status, wall, cpu, peak = json.loads(done.stdout)
-        log = (folder / "press.log").read_text(encoding="utf-8", errors="replace")
-        if status != 0 or "Job finished" not in log:
-            raise ArithmeticError(f"ccx ended with {status}: {' '.join(log.split()[-20:])}")
-        history = [line.split() for line in (folder / "press.sta").read_text(encoding="ascii").splitlines()[2:]]
-        times, forces = printed_forces(folder / "press.dat")
+    with _written(made, contact) as path:
+        spent = solve(path, limit_s)
+        history = [line.split() for line in path.with_suffix(".sta").read_text(encoding="ascii").splitlines()[2:]]
+        times, forces = printed_forces(path.with_suffix(".dat"))
     ends = [int((times <= k + 1e-6).sum()) - 1 for k in range(1, len(made.steps) + 1)]
     whole = made.multiple * forces[ends] * [1.0, -1.0, 1.0]
-    return Answer(whole, wall, cpu, peak, sum(int(h[3]) for h in history), len(history))
+    return Answer(whole, *spent, sum(int(h[3]) for h in history), len(history))
+
+
+def share_done(model: Model, limit_s: float, stiffer: float) -> float:
+    """Share of a press of one step that ccx has done at its end, with a stick slope so many times that of the deck."""
+    deck = press_deck(model)
+    with _written(deck, replace(deck.contact, stick=stiffer * deck.contact.stick)) as path:
+        with suppress(RuntimeError):  # it gave up, which is what is measured: the forces printed say how far it came
+            solve(path, limit_s)
+        times, _ = printed_forces(path.with_suffix(".dat"))
+    return float(times[-1]) if len(times) else 0.0
+
+
+@contextmanager
+def _written(deck: Deck, contact: Contact | None) -> Iterator[Path]:
+    """Write a deck without fields, with another contact if one is given, into a folder of its own for a while."""
+    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
+        path = Path(folder, "press.inp")
+        path.write_text(replace(deck, contact=contact or deck.contact, fields=False).text(), encoding="ascii")
+        yield path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,7 +15,7 @@ from scipy.special import roots_jacobi
 
 from finger3d._types import Float
 from finger3d.contact.conditions import ContactProblem
-from finger3d.contact.friction import Coulomb
+from finger3d.contact.friction import SLIP, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.fem.assembly import stiffness
@@ -24,7 +24,7 @@ from finger3d.fem.mesh import Mesh, boundary, quadratic, signed_volumes
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.contact_points import contact_geometry
-from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
 from finger3d.objects import ObjectPose, vertical_frame
 
 Field = Callable[[Float], Float]
@@ -201,6 +201,28 @@ def increment(start: ContactState, free: Float, compliance: Float, mu: float, sc
     return solve_increment(ContactProblem.of(start, free, compliance, Coulomb(mu), scale))
 
 
+def marched(
+    gap: Float, compliance: Float, mu: float, path: Iterable[tuple[float, float]], least: float = 0.0
+) -> Iterator[tuple[ContactSolution, float]]:
+    """Solutions, and energy lost so far (mJ), through (depth, slide along the first tangent), mm, from a gap (c,).
+
+    Parameters
+    ----------
+    least : smallest length of the criterion of convergence, which else is the depth, mm
+    """
+    d, lost = compliance.shape[1], 0.0
+    state = ContactState.at_rest(gap, d)
+    for depth, slide in path:
+        free = np.zeros((len(gap), d))
+        free[:, 0], free[:, 1] = gap - depth, -slide
+        found = increment(state, free, compliance, mu, max(depth, least))
+        if not found.outcome.ok:
+            raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
+        slips, before, state = found.state.status == SLIP, state, found.state
+        lost -= float((state.force[:, 1:] * (state.accumulated_slip - before.accumulated_slip))[slips].sum())
+        yield found, lost
+
+
 @dataclass(frozen=True)
 class Body:
     """A body condensed to the contact points of one side: compliance (c, d, c, d) mm/N in the vertical frame."""
@@ -208,19 +230,13 @@ class Body:
     surface: BoundarySurface
     compliance: Float
 
-    def press(
-        self, gap: Float, mu: float = 0.0, previous: ContactState | None = None, scale: float | None = None
-    ) -> ContactSolution:
-        """Forces under a rigid gap (c,) mm at rest, negative where the object would overlap."""
-        d = self.compliance.shape[1]
-        free = np.zeros((len(gap), d))
-        free[:, 0] = gap
-        start = previous or ContactState.at_rest(np.maximum(gap, 0.0), d)
-        return increment(start, free, self.compliance, mu, scale or float(-gap.min()))
-
     def normal_force(self, gap: Float) -> Float:
-        """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction; NaN if that does not settle."""
-        found = self.press(gap)
+        """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction, negative where the object would
+        overlap; NaN if that does not settle."""
+        d = self.compliance.shape[1]
+        start, free = ContactState.at_rest(np.maximum(gap, 0.0), d), np.zeros((len(gap), d))
+        free[:, 0] = gap
+        found = increment(start, free, self.compliance, 0.0, float(-gap.min()))
         return found.state.force[:, 0] if found.outcome.ok else np.full(len(gap), np.nan)
 
     def gap(self, height: Field) -> Float:
@@ -246,9 +262,7 @@ def body(
     locked = held[face.nodes][:, [1, 0, 2][:d]].ravel()
     free = np.flatnonzero(~locked)
     small = condense(matrix, np.flatnonzero(held.ravel()), rows[free], solver).compliance
-    whole = np.diag(np.full(c * d, np.diagonal(small).max()))
-    whole[np.ix_(free, free)] = small
-    return Body(face, whole.reshape(c, d, c, d))
+    return Body(face, scatter_to_points(small, free, c, d))
 
 
 def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
@@ -256,6 +270,12 @@ def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
     inner = np.abs(x) < reach
     slope, top = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
     return float(np.sqrt(-top / slope)), float(np.sqrt(top))
+
+
+def ellipse_error(x: Float, p: Float, a: float, peak: float) -> float:
+    """L2 norm of the error of nodal pressures p (n,) at ascending x (n,) over that of the ellipse of half-width a."""
+    fine = np.linspace(0.0, 1.3 * a, 8001)
+    return distance(np.interp(fine, x, p), peak * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2)))
 
 
 def distance(got: Float, wanted: Float) -> float:
@@ -305,10 +325,14 @@ def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Fl
     return np.concatenate([fine, fine[-1] + graded(length - fine[-1], step * growth, growth)[1:]])
 
 
-def quarter_block(x: Float, depths: Float) -> tuple[Mesh, NDArray[np.bool_]]:
-    """Quarter of a square block on a fixed base: coordinates along x and z, and depths from the top."""
+def quarter_block(x: Float, depths: Float, nu: float, reach: float) -> Body:
+    """Quarter of a square block on a fixed base, E = 1 MPa: coordinates along x and z, and depths from the top.
+
+    Contact points lie within `reach` mm of the middle.
+    """
     mesh = quadratic(box([x, depths[-1] - depths[::-1], x]))
-    return mesh, held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+    held = held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+    return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < reach)
 
 
 def free_motion(problem: Problem, target: ObjectPose) -> Float:

@@ -34,7 +34,7 @@ from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 from finger3d.objects import vertical_frame
 
 from ._increments import PlainCoulomb
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_finger, in_increments
 
 MU = 0.25
 QUANTITIES = ("force", "contact_length", "stick_length", "friction_sum", "gauge_strain")
@@ -160,10 +160,32 @@ def condensed(problem: Problem, solver: str | None = None) -> Problem:
     )  # fmt: skip
 
 
+def free_part(problem: Problem) -> sp.csr_matrix:
+    """Upper triangle of the stiffness of the unknowns that are not held."""
+    upper = problem.body.stiffness.upper
+    free = np.setdiff1d(np.arange(upper.shape[0]), problem.body.fixed_dofs)
+    return upper[free][:, free].tocsr()
+
+
+def factored(upper: sp.csr_matrix) -> tuple[float, float]:
+    """Wall and processor time (s) of one plain factorisation (PARDISO, symmetric indefinite), analysis included."""
+    from pypardiso import PyPardisoSolver
+
+    solver = PyPardisoSolver(mtype=-2)
+    for number, value in ((1, 1), (2, 3), (10, 13), (21, 1)):  # as in finger3d.fem.solvers.pardiso
+        solver.set_iparm(number, value)
+    solver.set_phase(12)
+    upper.sort_indices()
+    begin, spent = time.perf_counter(), processor_s()
+    solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+    seconds = time.perf_counter() - begin, processor_s() - spent
+    solver.free_memory(everything=True)
+    return seconds
+
+
 def in_steps(problem: Problem, count: int, workspace: Workspace | None = None) -> list[StepResult]:
     """Frames of a press in so many increments."""
-    legs = tuple(replace(leg, steps=count) for leg in problem.model.legs)
-    return converged(changed(problem, legs=legs), workspace)
+    return converged(changed(problem, legs=in_increments(problem.model.legs, count)), workspace)
 
 
 def numbers(points: ContactPoints, frame: StepResult) -> dict[str, float]:

@@ -28,7 +28,7 @@ def draw(figure: Any, lines: Sequence[Line]) -> None:
         panel(axes, runs)
 
 
-def _series(
+def series(
     runs: Sequence[Line], body: str, element: str = "mixed", mesher: str = "swept", solver: str = "pardiso",
     way: str = "condensed",
 ) -> list[Line]:  # fmt: skip
@@ -36,24 +36,22 @@ def _series(
     found = {}
     for line in runs:
         given = (line["body"], line["element"], line["mesher"], line["solver"], line["way"])
-        ratio = float(line["base_size_mm"]) / float(line["size_mm"])
-        if given == (body, element, mesher, solver, way) and abs(ratio - 4.0) < 1e-9:
-            found.setdefault(float(line["size_mm"]), line)
+        even = abs(line["base_size_mm"] / line["size_mm"] - 4.0) < 1e-9
+        if given == (body, element, mesher, solver, way) and even:
+            found.setdefault(line["size_mm"], line)
     return [found[size] for size in sorted(found, reverse=True)]
 
 
 def _plot(axes: Any, some: Sequence[Line], x: str, y: str, label: str, mark: str, **style: Any) -> None:
-    known = [line for line in some if not y.startswith("error") or float(line[y] or 0.0) > _FLOOR]
+    known = [line for line in some if not y.startswith("error") or (line[y] or 0.0) > _FLOOR]
     scale = 100.0 if y.startswith("error") else 1.0
-    axes.loglog(
-        [float(line[x]) for line in known], [scale * float(line[y]) for line in known], mark, label=label, ms=5, **style
-    )
+    axes.loglog([line[x] for line in known], [scale * line[y] for line in known], mark, label=label, ms=5, **style)
 
 
 def _elements(axes: Any, runs: Sequence[Line]) -> None:
     for element, colour, mark in (("mixed", "C0", "o-"), ("quadratic", "C1", "s-"), ("linear", "C3", "^-")):
-        _plot(axes, _series(runs, SOLID, element), "seconds", "error_force", element, mark, color=colour)
-    wild = _series(runs, SOLID, mesher="ftetwild")
+        _plot(axes, series(runs, SOLID, element), "seconds", "error_force", element, mark, color=colour)
+    wild = series(runs, SOLID, mesher="ftetwild")
     _plot(axes, wild, "seconds", "error_force", "mixed, fTetWild, mesh made anew", "D:", color="C4")
     axes.set(title="Which element?  Solid, normal force", ylabel="error, %")
     axes.set(xlabel="processor time, mesh to last increment (s)")
@@ -61,7 +59,7 @@ def _elements(axes: Any, runs: Sequence[Line]) -> None:
 
 def _numbers(axes: Any, runs: Sequence[Line]) -> None:
     for (quantity, name), mark in zip(NAMES.items(), ("o-", "s-", "^-", "D-", "v-"), strict=True):
-        _plot(axes, _series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
+        _plot(axes, series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
     axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="processor time, mesh to last increment (s)")
     axes.set(ylabel="error, %", ylim=(None, 200.0))
 
@@ -71,17 +69,15 @@ def _grading(axes: Any, _: Sequence[Line]) -> None:
     for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
         for way, mark in (("equal grading", "o-"), ("graded", "s--")):
             some = [line for line in graded if (line["domain"], line["way"]) == (domain, way)]
-            known = [line for line in some if float(line["true_error"]) > _FLOOR]
-            axes.loglog(
-                [float(line["dofs"]) for line in known], [100.0 * float(line["true_error"]) for line in known],
-                mark, color=COLOURS[body], ms=5, label=f"{body}, {'towards it' if way == 'graded' else way}",
-            )  # fmt: skip
+            label = f"{body}, {'towards it' if way == 'graded' else way}"
+            _plot(axes, [{**line, "error": line["true_error"]} for line in some], "dofs", "error", label, mark,
+                  color=COLOURS[body])  # fmt: skip
     axes.set(title="What does grading towards the force save?", xlabel="unknowns", ylabel="error, %")
 
 
 def _memory(axes: Any, runs: Sequence[Line]) -> None:
     for body in (SECTION, SOLID):
-        _plot(axes, _series(runs, body), "peak_MB", "error_force", body, "o-", color=COLOURS[body])
+        _plot(axes, series(runs, body), "peak_MB", "error_force", body, "o-", color=COLOURS[body])
     axes.set(title="How much memory?  Normal force, mixed elements", xlabel="peak memory, MB", ylabel="error, %")
 
 
@@ -93,7 +89,7 @@ def _condensation(axes: Any, runs: Sequence[Line]) -> None:
             ("a factorisation an iteration", "pardiso", "each iteration", "*:"),
         )
         for name, solver, way, mark in ways:
-            some = _series(runs, body, solver=solver, way=way)
+            some = series(runs, body, solver=solver, way=way)
             _plot(axes, some, "dofs", "seconds", f"{body}, {name}", mark, color=COLOURS[body])
     axes.set(title="What does one condensation save?", xlabel="unknowns", ylim=(None, 1e4))
     axes.set(ylabel="processor time, mesh to last increment (s)")
@@ -101,8 +97,8 @@ def _condensation(axes: Any, runs: Sequence[Line]) -> None:
 
 def _large(axes: Any, runs: Sequence[Line]) -> None:
     for body in (SECTION, SOLID):
-        _plot(axes, _series(runs, body), "seconds", "error_force", f"{body}, small strain", "o-", color=COLOURS[body])
-        large = _series(runs, LARGE[body])
+        _plot(axes, series(runs, body), "seconds", "error_force", f"{body}, small strain", "o-", color=COLOURS[body])
+        large = series(runs, LARGE[body])
         _plot(axes, large, "seconds", "error_force", f"{body}, large deformation", "v--", color=COLOURS[body])
     axes.set(title="What does large deformation cost?  Normal force")
     axes.set(xlabel="processor time, mesh to last increment (s)", ylabel="error, %")

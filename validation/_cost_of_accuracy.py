@@ -105,7 +105,7 @@ def _others(bench: Bench, made: Mapping[str, Groups], quick: bool) -> tuple[Runs
         wanted = [c for c in made[SOLID]["mixed"] if c.size in (2.0, 1.0, 0.6)]
         single = [*made[SECTION]["steps"], *made[SOLID]["steps"]]
     single = [replace(c, counts=(10,)) for c in single]
-    once = {c: bench("factored", asdict(c)) for c in wanted}
+    once = {c: bench("plain", asdict(c)) for c in wanted}
     return once, {c: bench("single", asdict(c)) for c in single}
 
 

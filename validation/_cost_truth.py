@@ -24,14 +24,13 @@ Runs = Mapping[Case, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Truth:
-    """Value at zero size under ten increments, how far it may be off (relative), and the rate it was taken with.
+    """Value at zero size under ten increments, and how far it may be off, relative.
 
     `check` is how far the finest run is from what was extrapolated without it, relative.
     """
 
     value: float
     uncertainty: float
-    rate: float
     check: float
 
 
@@ -46,25 +45,21 @@ def truth(cases: Sequence[Case], runs: Runs, quantity: str) -> Truth:
     Extrapolated at the rate that the last three show, if that is one (between .6 and 4); else the finest stands.
     """
     sizes, found = [c.size for c in cases], [value(runs[c], quantity) for c in cases]
-    with_finest, rate = _limit(sizes, found)
-    without, _ = _limit(sizes[:-1], found[:-1])
+    with_finest, without = _limit(sizes, found), _limit(sizes[:-1], found[:-1])
     off = max(abs(with_finest - without), 0.25 * abs(found[-1] - with_finest), LENGTHS.get(quantity, 0.0) * sizes[-1])
-    return Truth(with_finest, off / abs(with_finest), rate, abs(found[-1] / without - 1.0))
+    return Truth(with_finest, off / abs(with_finest), abs(found[-1] / without - 1.0))
 
 
-def _limit(sizes: Sequence[float], found: Sequence[float]) -> tuple[float, float]:
-    if len(found) < 3:
-        return found[-1], float("nan")
-    first, second = found[-2] - found[-3], found[-1] - found[-2]
-    if first * second <= 0.0 or abs(second) >= abs(first):
-        return found[-1], float("nan")
+def _limit(sizes: Sequence[float], found: Sequence[float]) -> float:
+    """Return the limit of a series at the rate that its last three show, or the last of them."""
+    steps = np.diff(found[-3:])
+    if len(steps) < 2 or steps[0] * steps[1] <= 0.0 or abs(steps[1]) >= abs(steps[0]):
+        return found[-1]
     try:
         rate = observed(sizes, found)
     except ValueError:  # no rate between .05 and 12
-        return found[-1], float("nan")
-    if not 0.6 <= rate <= 4.0:
-        return found[-1], float("nan")
-    return extrapolated(found[-2], found[-1], rate, sizes[-2] / sizes[-1]), rate
+        return found[-1]
+    return extrapolated(found[-2], found[-1], rate, sizes[-2] / sizes[-1]) if 0.6 <= rate <= 4.0 else found[-1]
 
 
 def step_errors(run: Mapping[str, Any], quantity: str, counts: Sequence[int]) -> dict[int, float]:

@@ -19,9 +19,9 @@ from finger3d.analyses.press import press
 from finger3d.mechanics.history import table_row
 from finger3d.mechanics.readings import kinds_of
 
+from ._press import GEOMETRIES
 from ._rows import Result, Row, at_most, columns, words
 
-SCENES = Path(__file__).parents[1] / "geometries"
 COUNTS = {"plane-strain": 12, "plane-stress": 6, "solid": 12}
 SHARE, QUARTER = 0.05, 0.25
 FIG9 = {"stick_area_mm2": 0.12, "stick_half_length_mm": 0.12, "gauge_g36": 0.02}
@@ -88,7 +88,7 @@ def numbers(title: str, scene: Path | dict[str, Any]) -> Iterator[Number]:
 
 def run(quick: bool) -> Result:
     """Quick: two random sections."""
-    named: list[tuple[str, Any]] = [] if quick else [(path.stem, path) for path in sorted(SCENES.glob("*.toml"))]
+    named: list[tuple[str, Any]] = [] if quick else [(path.stem, path) for path in sorted(GEOMETRIES.glob("*.toml"))]
     found = [one for title, scene in (*named, *random_scenes(quick)) for one in numbers(title, scene)]
     rows = list(_rows(found, {title for title, _ in named}))
     table = columns(" ".join(Number._fields), found)

@@ -19,12 +19,10 @@ the interval of every effect that is left out.  Its time is compared with that w
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import CancelledError
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from threading import Event, Timer
 from typing import Any
 
@@ -37,7 +35,6 @@ from finger3d.accuracy.error_bars import ErrorBars
 from finger3d.analyses.result import PressResult
 from finger3d.effects import LARGE_DEFORMATION
 from finger3d.errors import Finger3dError
-from finger3d.io import atomic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Model
@@ -45,9 +42,7 @@ from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
 from ._rows import Result, Row, at_least, at_most, columns
-from ._runner import studies
 
-OUT = Path(__file__).resolve().parent.parent / "out"
 SEED = 20261128
 SECTIONS, SOLIDS = 81, 19
 FINER = {"solid": 0.75, "section": 0.7}
@@ -241,7 +236,7 @@ def _flat(step: Tree) -> dict[str, float]:
 
 def run(quick: bool) -> Result:
     """All scenes; quick: two sections."""
-    ended = _ended(2, 0, 3.0) if quick else _ended(SECTIONS, SOLIDS)
+    ended = list(_ended(2, 0, 3.0) if quick else _ended(SECTIONS, SOLIDS))
     found = [one for one in ended if one]
     failed = len(ended) - len(found)
     verdicts = [verdict for one in found for verdict in one.verdicts]
@@ -251,24 +246,13 @@ def run(quick: bool) -> Result:
     return Result(tuple(_rows(found, failed, quick)), columns(COLUMNS, lines), lambda figure: _draw(figure, verdicts))
 
 
-def _ended(sections: int, solids: int, *longer: float) -> list[Compared | None]:
-    """Compare scenes; None where a press fails.  Each is kept in out/, so that a run that is cut off can be resumed."""
-    stamp = studies()["effects_by_need"].stamp()
-    kept, found = OUT / f"effects_by_need_{stamp}_{sections}.json", dict[str, Tree | None]()
-    if kept.is_file():
-        found = json.loads(kept.read_text(encoding="utf-8"))
+def _ended(sections: int, solids: int, *longer: float) -> Iterator[Compared | None]:
+    """Compare scenes; None where a press fails."""
     for number, (name, scene) in enumerate(scenes(sections, solids, SEED, *longer)):
-        if name not in found:
-            try:
-                found[name] = asdict(compare(name, scene, number % 3 == 0))
-            except Finger3dError:
-                found[name] = None
-            with atomic(kept) as temporary:
-                temporary.write_text(json.dumps(found), encoding="utf-8")
-    return [
-        one and Compared(**{**one, "verdicts": tuple(Verdict(**verdict) for verdict in one["verdicts"])})
-        for one in found.values()
-    ]
+        try:
+            yield compare(name, scene, number % 3 == 0)
+        except Finger3dError:
+            yield None
 
 
 def _rows(found: list[Compared], failed: int, quick: bool) -> Iterable[Row]:

@@ -12,7 +12,6 @@ defaults.  Where ccx or FElupe is not installed its committed runs are shown.
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,10 +23,11 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.step_halving import march_automatic
 from finger3d.mechanics.model import Leg, Model
 
+from . import _ccx, _felupe
 from ._ccx import program
 from ._cost import SECTION, Case, model_of
 from ._felupe import felupe_press, is_felupe_installed
-from ._rows import Result, Row, at_least, columns, committed, zero
+from ._rows import Result, Row, at_least, columns, committed_instead, zero
 from .beside_calculix import calculix
 
 NU = 0.45
@@ -86,11 +86,13 @@ def _limit(found: list[float]) -> tuple[float, float]:
 
 def _of_peer(peer: str, edges: tuple[float, ...], truth: float) -> list[Line]:
     """Return the lines of a peer, or those that are committed."""
-    run, installed = {"CalculiX": (_calculix, program() is not None), "FElupe": (_felupe, is_felupe_installed())}[peer]
+    run, installed, install = {
+        "CalculiX": (_by_calculix, program() is not None, _ccx.INSTALL),
+        "FElupe": (_by_felupe, is_felupe_installed(), _felupe.INSTALL),
+    }[peer]
     if not installed:
-        print(f"error_against_time: {peer} is not installed; its committed runs stay", file=sys.stderr)
-        lines = [line for line in committed("error_against_time") if line["program"] == peer]
-        found = [(float(x["size_mm"]), int(x["dofs"]), float(x["seconds"]), float(x["value"])) for x in lines]
+        kept = committed_instead("error_against_time", peer, install)
+        found = [(x["size_mm"], x["dofs"], x["seconds"], x["value"]) for x in kept if x["program"] == peer]
     else:
         found = [(size, build(model_of(_case(size))).size.dofs, *run(size)) for size in edges]
     return [
@@ -99,13 +101,13 @@ def _of_peer(peer: str, edges: tuple[float, ...], truth: float) -> list[Line]:
     ]
 
 
-def _calculix(size: float) -> tuple[float, float]:
+def _by_calculix(size: float) -> tuple[float, float]:
     """Return the seconds and the force (N) of a press by CalculiX."""
     answer = calculix(_case(size))
     return answer.wall, answer.force
 
 
-def _felupe(size: float) -> tuple[float, float]:
+def _by_felupe(size: float) -> tuple[float, float]:
     """Return the seconds, with those of the mesh, and the force (N) of a press by FElupe."""
     model: Model = replace(model_of(_case(size)), legs=(Leg(10.0, steps=10),), gauges=())
     start = time.perf_counter()

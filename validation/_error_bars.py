@@ -19,7 +19,7 @@ import secrets
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from finger3d.mechanics.readings import AREAS, MAIN
 
 from ._bar_scenes import MUS, Case, cases, with_readings
 from ._drawn import drawn, drawn_solids
-from ._press import changed, in_edges
+from ._press import changed, in_edges, in_increments
 from ._rows import Result, Row, at_least, at_most, columns, words
 
 DEPTHS = (1.0, 0.6)
@@ -157,7 +157,7 @@ def _by_drawn_mesh(seed: int, counts: tuple[int, int, int, int]) -> dict[str, li
     for kind, scenes, factors, finest, steps in kinds:
         found[kind] = []
         for name, plain in scenes:
-            model = _in_increments(with_readings(plain), steps)
+            model = replace(with_readings(plain), legs=in_increments(plain.legs, steps))
             model = at_large_deformation(model) if kind.startswith(LARGE) else model
             truth, last = _pressed(build(in_edges(model, finest)))
             for factor in factors if last[-1].outcome.ok else ():
@@ -167,11 +167,6 @@ def _by_drawn_mesh(seed: int, counts: tuple[int, int, int, int]) -> dict[str, li
                     scene = f"seed {seed}, {kind}, {name}"
                     found[kind] += _judged(scene, press, frames, model.friction.mu, depth, right)
     return found
-
-
-def _in_increments(model: Model, count: int) -> Model:
-    """The model with a number of increments in every leg."""
-    return replace(model, legs=tuple(replace(leg, steps=count) for leg in model.legs))
 
 
 def _hertz(case: Case, exact: dict[str, float]) -> dict[str, float]:
@@ -189,8 +184,8 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
     problem = build(model, margin=math.inf)
     ends: dict[int, list[StepResult]] = {}
 
-    def in_steps(count: int) -> Problem:
-        return replace(problem, model=_in_increments(model, count))
+    def in_steps(count: int | Literal["auto"]) -> Problem:
+        return changed(problem, legs=in_increments(model.legs, count))
 
     for n in (*counts, true_count):
         ends[n] = list(march(in_steps(n)))
@@ -201,7 +196,7 @@ def _by_steps(name: str, model: Model, counts: tuple[int, ...], true_count: int)
         (f"{n} steps", press_numbers(problem, frames[-1]), estimate(in_steps(n), frames, numbers=press_numbers).steps)
         for n, frames in ends.items()
     ]
-    free = replace(problem, model=replace(model, legs=tuple(replace(leg, steps="auto") for leg in model.legs)))
+    free = in_steps("auto")
     found, chosen = march_automatic(free)
     if chosen:
         kind = "automatic, met" if chosen.met else "automatic, not met"

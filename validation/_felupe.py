@@ -10,6 +10,8 @@ import numpy as np
 from finger3d.fem.mesh import FREE_FACES, Mesh
 from finger3d.mechanics.model import Model
 
+INSTALL = "pip install felupe"
+
 
 def is_felupe_installed() -> bool:
     """Whether FElupe is there, with friction on its rigid plane."""

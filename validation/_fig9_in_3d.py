@@ -16,7 +16,7 @@ import numpy as np
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, line, said, strains
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, draw_by_mu, fig9, line, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns, listed
 from .fig9_strains import ANGLES, gauges, statements
@@ -86,26 +86,14 @@ def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict
 
 
 def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middle: dict) -> None:
-    from matplotlib import colormaps
-
     figure.set_size_inches(13.0, 8.6)
     panels = figure.subplots(3, 3, sharey="row")
     figure.suptitle(f"The Fig. 9 finger at 10 mm, nu = {nu:g}: as built (left), and as the two plane models see it")
     for column, plane in enumerate(PLANES):
-        for i, mu in enumerate(MUS):
-            colour, profile = colormaps["plasma"](0.85 * i / 4), middle[plane, nu][i]
-            on = profile.x >= 0.0
-            panels[0, column].plot(profile.x[on], profile.q[on], color=colour, lw=1.1, label=f"{mu:g}")
-            panels[1, column].plot(x, shear[plane, nu][i], color=colour, lw=1.1)
-        for i, angle in enumerate((15, 30, 45, 60)):
-            panels[2, column].plot(MUS, gauge[plane, nu][angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
-        panels[0, column].set(title="20 mm wide, z = 0" if plane == SOLID else plane, xlabel="x (mm)")
-        panels[1, column].set_xlabel("x (mm)")
-        panels[2, column].set_xlabel("mu")
-        for row in range(3):
-            panels[row, column].axhline(0.0, color="#999999", lw=0.7)
-    panels[0, 0].set_ylabel("friction along x (MPa)")
-    panels[1, 0].set_ylabel("gamma_xy under the surface")
-    panels[2, 0].set_ylabel("gauge strain at x = 36")
+        draw_by_mu(panels[:, column], x, middle[plane, nu], [shear[plane, nu]], gauge[plane, nu])
+        panels[0, column].set_title("20 mm wide, z = 0" if plane == SOLID else plane)
+    labels = "friction along x (MPa)", "gamma_xy under the surface", "gauge strain at x = 36"
+    for axes, label in zip(panels[:, 0], labels, strict=True):
+        axes.set_ylabel(label)
     panels[0, 0].legend(title="mu", frameon=False, ncols=2)
     panels[2, 0].legend(title="angle", frameon=False, ncols=2)

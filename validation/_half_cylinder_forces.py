@@ -87,7 +87,7 @@ def extrema(q: np.ndarray) -> int:
 def statements_depths(here: str, profiles: Sequence[Profile]) -> list[Row]:
     """What Sec. II-B says of the tractions, from small to full depth."""
     shown = "all depths" if len(profiles) > 1 else "full depth"
-    net = max(abs(p.q @ p.area) / (np.abs(p.q) @ p.area) for p in profiles)
+    net = max(abs(p.q @ p.area) / p.friction for p in profiles)
     return [
         said("semi-circular", max(map(roundness, profiles)), shown=shown, here=here),
         said("two-extrema", extrema(profiles[-1].q), here=here),
@@ -186,15 +186,14 @@ def _mus(quick: bool) -> Result:
         for mu in MUS:
             profile = Profile.of(problem, under(problem, mu)[-1])
             found[plane, nu, mu] = profile
-            friction = float(np.abs(profile.q) @ profile.area)
             outward = float((profile.q * np.sign(profile.x)) @ profile.area)
             zones = (profile.a, profile.c, profile.edge_error())
-            lines.append((plane, nu, mu, profile.force, float(profile.p.max()), friction, outward, *zones))
+            lines.append((plane, nu, mu, profile.force, float(profile.p.max()), profile.friction, outward, *zones))
     rows: list[Row] = []
     for plane, nu in SHOWN:
         profiles = [found[plane, nu, mu] for mu in MUS]
-        friction = [float(np.abs(p.q) @ p.area) for p in profiles]
-        rows += statements_mus(f"{plane}, nu = {nu:g}", profiles, [p.force for p in profiles], friction)
+        force, friction = ([getattr(p, key) for p in profiles] for key in ("force", "friction"))
+        rows += statements_mus(f"{plane}, nu = {nu:g}", profiles, force, friction)
     names = "plane nu mu force_N_per_mm peak_MPa friction_sum_N_per_mm outward_N_per_mm a_mm c_mm error_mm"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw_mus(figure, found))
 

@@ -5,7 +5,9 @@ Lengths are in units of the contact half-width a = 1 mm that the last increment 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +20,13 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
-from finger3d.objects import Cylinder
+from finger3d.objects import Cylinder, RigidObject
 
 from ._press import changed, converged
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
 DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_with_friction
-_CANDIDATES = -0.2  # share of the depth; keeps the points within 2.2 a, which `a` needs beyond the edge
+CANDIDATES = -0.2  # share of the depth; keeps the points within 2.2 a, which `a` needs beyond the edge
 
 
 def compliance(nu: float) -> float:
@@ -32,27 +34,36 @@ def compliance(nu: float) -> float:
     return 2.0 * (1.0 - nu**2)
 
 
-def hertz(nu: float, a: Float) -> Float:
-    """Force (N) of a frictionless cylinder, contact half-width a (mm), on a width of 1 mm (Johnson 1985, sec. 4.2)."""
-    return np.pi * a**2 / (2.0 * RADIUS * compliance(nu))
-
-
-def depth(a: Float, height: float) -> Float:
+def depth(a: Float, height: float, radius: float = RADIUS) -> Float:
     """Depth (mm) for about the half-width a: a^2/2R ln(2h/a), validation/REFERENCES.md, 1.7."""
-    return a**2 / (2.0 * RADIUS) * np.log(2.0 * height / a)
+    return a**2 / (2.0 * radius) * np.log(2.0 * height / a)
 
 
-def loading(steps: int, height: float = DEPTH_OF_BLOCK, a: float = 1.0) -> tuple[Leg, ...]:
-    """Legs of one increment each with equal steps of a^2, that is of the force."""
-    return tuple(Leg(float(depth(a * np.sqrt(k / steps), height)), steps=1) for k in range(1, steps + 1))
+def loading(steps: int, height: float = DEPTH_OF_BLOCK, radius: float = RADIUS) -> tuple[Leg, ...]:
+    """Legs of one increment each with equal steps of a^2, that is of the force, up to a = 1 mm."""
+    return tuple(Leg(float(depth(np.sqrt(k / steps), height, radius)), steps=1) for k in range(1, steps + 1))
+
+
+def on_block(
+    rigid: RigidObject, material: Isotropic, points: float, legs: tuple[Leg, ...], height: float, base: float = 0.25,
+    width: float = 1.0, **fields: Any,
+) -> Model:  # fmt: skip
+    """An object on a block twice as long as high, in plane strain unless `fields` say otherwise.
+
+    Parameters
+    ----------
+    points : contact points to a millimetre
+    base : longest edge, over the height
+    """
+    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)
+    mesh = MeshOptions(1.0 / points, base * height, "swept")
+    return Model(block, material, mesh, legs, object=rigid, **{"domain": "plane-strain", **fields})
 
 
 def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_OF_BLOCK) -> Problem:
     """Plane strain, `points` to the half-width; symmetric where the legs are."""
-    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=1.0)
-    mesh = MeshOptions(1.0 / points, height / 8.0, "swept")
-    model = Model(block, Isotropic(1.0, nu), mesh, legs, object=Cylinder(radius_mm=RADIUS), domain="plane-strain")
-    return build(model, margin=_CANDIDATES)
+    model = on_block(Cylinder(radius_mm=RADIUS), Isotropic(1.0, nu), points, legs, height, 0.125)
+    return build(model, margin=CANDIDATES)
 
 
 def under(problem: Problem, friction: FrictionLaw | float, legs: tuple[Leg, ...] | None = None) -> list[Profile]:
@@ -129,3 +140,19 @@ class Profile:
         if not len(stick):
             return 0.0
         return float(0.5 * (stick.max() + slip.min())) if len(slip) else self.a
+
+
+def numbers(profiles: Sequence[Profile], compliance: float, radius: float = RADIUS, by_reach: bool = False) -> Float:
+    """P/P_Hertz(a), int_0^a q/P and c/a of a self-similar loading, means over its second half, and its D/(A P^2).
+
+    Parameters
+    ----------
+    compliance : A of both bodies, 1/MPa
+    by_reach : whether a is the half-width by the points in contact
+    """
+    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
+    force, last = sum(p.force for p in half), profiles[-1]
+    # Johnson 1985, sec. 4.2, on a width of 1 mm
+    hertz = sum(np.pi * (p.reach if by_reach else p.a) ** 2 / (2.0 * radius * compliance) for p in half)
+    lost = last.frame.dissipation_mJ / (compliance * last.force**2)
+    return np.array([force / hertz, sum(p.outward for p in half) / force, np.mean([p.c / p.a for p in half]), lost])

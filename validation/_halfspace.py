@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.state import ContactState
+from finger3d.contact.friction import OPEN, STICK
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh import Mesh, quadratic
 from finger3d.objects import Sphere
 
-from ._common import Body, body, box, graded, held_at, increment
+from ._common import Body, body, box, graded, held_at, marched
 
 RADIUS = 100.0  # a/R = 0.01
 _ZONE = 1.15  # half-width of the evenly spaced part, in a
@@ -52,7 +51,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class Step:
-    """One increment: depth and slide (mm), forces P, Q, T (N), dissipation (mJ), areas (mm2), and the state."""
+    """One increment: depth and slide (mm), forces P, Q, T (N), dissipation (mJ), and areas (mm2)."""
 
     depth: float
     slide: float
@@ -62,7 +61,6 @@ class Step:
     D: float
     area: float
     stick_area: float
-    state: ContactState
     iterations: int
 
 
@@ -111,20 +109,12 @@ def _gap(half_space: Body) -> Float:
 
 def press(ball: Ball, mu: float, path: Sequence[tuple[float, float]]) -> list[Step]:
     """March through (depth, slide along x) mm, the start at first touch not among them."""
-    state = ContactState.at_rest(ball.gap, 3)
-    lost, steps = 0.0, []
-    for depth, slide in path:
-        free = np.zeros((len(ball.gap), 3))
-        free[:, 0], free[:, 1] = ball.gap - depth, -slide
-        found = increment(state, free, ball.compliance, mu, max(depth, 1e-3))
-        if not found.outcome.ok:
-            raise AssertionError(f"mu = {mu:g}, depth {depth:g}, slide {slide:g}: {found.outcome}")
-        friction, slips = found.state.force[:, 1:], found.state.status == SLIP
-        lost -= float((friction * (found.state.accumulated_slip - state.accumulated_slip))[slips].sum())
-        state = found.state
+    steps = []
+    for (depth, slide), (found, lost) in zip(path, marched(ball.gap, ball.compliance, mu, path, 1e-3), strict=True):
+        state, friction = found.state, found.state.force[:, 1:]
         # points on a plane of symmetry carry the part's share of their force
         normal, along, _ = (ball.parts * state.force.sum(axis=0)).tolist()
         rubbed = ball.parts * float(np.linalg.norm(friction, axis=1).sum())
         on, stuck = (ball.parts * float(ball.area[k].sum()) for k in (state.status != OPEN, state.status == STICK))
-        steps.append(Step(depth, slide, normal, along, rubbed, ball.parts * lost, on, stuck, state, found.iterations))
+        steps.append(Step(depth, slide, normal, along, rubbed, ball.parts * lost, on, stuck, found.iterations))
     return steps

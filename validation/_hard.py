@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from finger3d._types import Tree
 from finger3d.analyses.press import press
@@ -29,19 +30,14 @@ from finger3d.objects import Plane
 from finger3d.scene import scene_of
 
 from ._common import free_motion, increment
-from ._press import changed
-from ._rows import Row, at_least, at_most
+from ._press import block_tables, changed
+from ._rows import ROBUST, Row, at_least, at_most
 
 POINT = "Klarbring 1990; REFERENCES.md, 8.1"
-ROBUST = "what a robust method does; REFERENCES.md, 8.2"
-SCENE: Tree = {
-    "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 10.0, "width_mm": 10.0},
-    "material": {"E_MPa": 1.0, "nu": 0.3},
-    "friction": {"mu": 0.25},
-    "model": {"domain": "plane-strain"},
-    "mesh": {"size_mm": 1.0, "base_size_mm": 3.0, "mesher": "swept"},
-    "press": {"depth_mm": 0.5, "steps": 2},
-}
+SCENE = block_tables(
+    (10.0, 10.0, 10.0), 1.0, 0.3, (1.0, 3.0), friction={"mu": 0.25}, model={"domain": "plane-strain"},
+    press={"depth_mm": 0.5, "steps": 2},
+)  # fmt: skip
 
 
 def rows(quick: bool) -> list[Row]:
@@ -215,22 +211,14 @@ def surfaces(quick: bool) -> Iterator[Row]:
             ("a flipped face", [_FACES[0][::-1], *_FACES[1:]], "flipped"),
             ("a missing face", _FACES[1:], "not closed"),
         ):
-            _write_stl(file, faces)
+            trimesh.Trimesh(_PRISM, faces, process=False).export(file)
             yield _is(f"STL with {name}: refused in one line that says so", 1, word in _refused(object=prism))
-        _write_stl(file, _FACES)
+        trimesh.Trimesh(_PRISM, _FACES, process=False).export(file)
         # the edge is averaged over a hat, which must be low beside the depth of 0.5 mm
         both = [_pressed("mesh.size_mm=0.25", object=o) for o in ({"shape": "wedge", "angle_deg": 45.0}, prism)]
     forces = [found.last.normal_force_N if found.outcome.ok else np.nan for found in both]
     yield Row("STL prism touching at its edge: force over that of the wedge", ROBUST, 1, forces[1] / forces[0], 1e-9,
               "the same surface")  # fmt: skip
-
-
-def _write_stl(path: Path, faces: list[Any]) -> None:
-    lines = ["solid prism"]
-    for face in faces:
-        corners = ["vertex {} {} {}".format(*_PRISM[i]) for i in face]
-        lines += ["facet normal 0 0 0", "outer loop", *corners, "endloop", "endfacet"]
-    path.write_text("\n".join([*lines, "endsolid prism", ""]), encoding="ascii")
 
 
 def turned(quick: bool) -> Iterator[Row]:

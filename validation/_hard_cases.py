@@ -24,18 +24,17 @@ import numpy as np
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb
 from finger3d.contact.state import ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.laws.material import Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import ObjectPose
 
 from . import _hard
 from ._common import free_motion
-from ._rows import Result, Row, Settled, at_least, at_most, grouped, zero
+from ._press import fig9_finger, fig9_model
+from ._rows import ROBUST, Result, Row, Settled, at_least, at_most, grouped, zero
 
 DEPTH = 10.0
 NU = (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5)
@@ -47,7 +46,6 @@ COLUMNS = (
     "dim nu mu increments contact_points leg settled parts residual violation iterations_median iterations_max "
     "fallback cut_back slipping paper_settled paper_wrong_way paper_cycled"
 ).split()
-ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 
 
@@ -82,12 +80,9 @@ def path(dim: int, mu: float, steps: int) -> tuple[Leg, ...]:
 
 def finger(dim: int, nu: float, size: float) -> Problem:
     """The Fig. 9 finger; candidate points for the longest slide of the grid."""
-    shape = {"radius_mm": 100.0, "half_length_mm": 50.0, "edge_height_mm": 36.6, "width_mm": 1.0 if dim == 2 else 20.0}
-    domain = "plane-strain" if dim == 2 else "solid"
-    mesh = MeshOptions(size, max(size, 6.0 if dim == 2 else 12.0), "swept")
-    return build(
-        Model(designs()["clipped_cylinder"](**shape), Isotropic(1.0, nu), mesh, path(dim, 1.0, 1), domain=domain)
-    )
+    domain, width, base = ("plane-strain", 1.0, 6.0) if dim == 2 else ("solid", 20.0, 12.0)
+    legs, design = path(dim, 1.0, 1), fig9_finger(width)
+    return build(fig9_model(nu, size, max(size, base), domain, legs=legs, design=design))
 
 
 def relative(problem: Problem, pose: ObjectPose, state: ContactState) -> np.ndarray:

@@ -21,15 +21,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.mesh import quadrature
-from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import Design, designs
-from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.contact_points import MARGIN
 from finger3d.mechanics.discretise.problem import Problem
@@ -42,7 +39,9 @@ from finger3d.objects import Cylinder, MeshObject, Plane, RigidObject, Sphere, W
 from finger3d.scene.mesh_sizes import mesh_options
 from finger3d.scene.tables import MeshTable
 
-from ._rows import Result, Row, Settled, at_least, at_most, grouped, of_records, settled
+from ._paper import moved
+from ._rows import GOAL, ROBUST, Result, Row, Settled, at_least, at_most, grouped, of_records, settled
+from .triangulated_objects import of_trimesh
 
 HEIGHT = 10.0
 SCENES, SCENES_QUICK = 320, 8
@@ -50,8 +49,6 @@ RESOLVED, RESOLVED_QUICK = {2: 49, 3: 11}, {2: 2, 3: 0}
 BALLS = ((5.0, 0.8), (8.0, 0.8), (15.0, 1.0))
 """Radius and depth, mm, of balls that touch nothing but the middle of a block."""
 
-GOAL = "goal of this project"
-ROBUST = "what a robust method does; REFERENCES.md, 8.2"
 RESOLVED_WIDTH = 5.0
 _NU, _MU = (0.3, 0.4, 0.45, 0.49, 0.5), (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0, 100.0)
 
@@ -65,7 +62,7 @@ class Found:
     settled : whether all increments converged
     folds : whether it ended at a sharp edge of the finger, with a cell compressed there or folded over
     says : outcome of the increment that failed
-    increments, converged, factorizations, iterations : in all
+    increments, converged, factorizations : in all
     residual : the largest of the increments that converged, dimensionless
     penetration : deepest place of the surface inside the object, over the depth
     at_sharp_edge : whether it is beside a sharp edge of the finger, or under an object that has edges
@@ -80,7 +77,6 @@ class Found:
     converged: int
     residual: float
     factorizations: int
-    iterations: int
     penetration: float
     at_sharp_edge: bool
     outside: bool
@@ -162,7 +158,7 @@ def _object(rng: np.random.Generator, solid: bool) -> RigidObject:
             return Wave(x_mm=x, wavelength_mm=float(length), amplitude_mm=float(amplitude))
         case "mesh" if solid:
             ball = trimesh.creation.icosphere(subdivisions=3, radius=float(rng.uniform(6.0, 15.0)))
-            return MeshObject(x_mm=x, surface=Triangles(np.array(ball.vertices), np.array(ball.faces)))
+            return MeshObject(x_mm=x, surface=of_trimesh(ball))
     return Plane(tilt=float(np.radians(rng.uniform(-10.0, 10.0))) if rng.uniform() < 0.5 else 0.0)
 
 
@@ -213,7 +209,6 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
         converged=len(good),
         residual=max((step.residual for step in good), default=0.0),
         factorizations=factorizations,
-        iterations=sum(step.iterations for step in steps),
         penetration=deepest.penetration_mm / model.largest_depth_mm if deepest else 0.0,
         at_sharp_edge=isinstance(model.object, MeshObject) or bool(deepest and deepest.at_crease),
         outside=all(check.within_candidates for check in checks),
@@ -224,7 +219,7 @@ def _found(problem: Problem, steps: list[StepResult], checks: list[SurfaceCheck]
 def _least_volume(problem: Problem, step: StepResult) -> float:
     """Smallest determinant of the deformation gradient at the quadrature points, in the plane of a section."""
     mesh = problem.mesh
-    u: Float = displacement(mesh, next(formulation_of(problem.model).unknowns(problem, [step.meshed_state])))
+    u = moved(problem, step)
     gradients, _ = mesh.element.physical_gradients(mesh.points[mesh.cells], quadrature(mesh.dim, 2)[0])
     slope = np.einsum("eki,eqkj->eqij", u[mesh.cells], gradients, optimize=True)
     return float(np.linalg.det(slope + np.eye(mesh.dim)).min())

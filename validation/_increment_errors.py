@@ -26,7 +26,7 @@ from ._common import ticks_at
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, Profile, fig9, half_cylinder, line_r5, said, strains
-from ._press import changed, under
+from ._press import changed, in_increments, under
 from ._rows import Result, Row, at_least, at_most, columns, together
 
 CASES = ((STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
@@ -56,9 +56,10 @@ def _size(quick: bool) -> Result:
         for count in (PATH, *counts):
             frame = under(problem, PlainCoulomb(0.25), count)[-1] if count else _exact(problem)
             profile = Profile.of(problem, frame)
-            friction = float(np.abs(profile.q) @ profile.area)
             shear = float(np.abs(strains(frame, len(x))[2]).max())
-            found[plane, nu, count] = np.array([profile.force, friction, profile.c, frame.dissipation_mJ, shear])
+            found[plane, nu, count] = np.array(
+                [profile.force, profile.friction, profile.c, frame.dissipation_mJ, shear]
+            )
             size_mm = 1.0 / count if count else 0.0
             lines.append((plane, nu, count, size_mm, *map(float, found[plane, nu, count])))
         rows += _statements(plane, nu, found, counts)
@@ -68,8 +69,7 @@ def _size(quick: bool) -> Result:
 
 def _exact(problem: Problem) -> StepResult:
     """The end of the exact path."""
-    legs = tuple(replace(leg, steps=1) for leg in problem.model.legs)
-    return exact_press(changed(problem, friction=Coulomb(0.25), legs=legs))[-1]
+    return exact_press(changed(problem, friction=Coulomb(0.25), legs=in_increments(problem.model.legs, 1)))[-1]
 
 
 def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], counts: list[int]) -> list[Row]:

@@ -23,8 +23,8 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh import Mesh
 
-from ._common import Body, body, box, contact_axis, convergence, distance, ellipse, graded, held_at, mapped, rate
-from ._rows import Result, Row, exact_columns
+from ._common import Body, body, box, contact_axis, convergence, ellipse, ellipse_error, graded, held_at, mapped, rate
+from ._rows import Result, Row, exact_columns, rms
 
 R, SIDE, FORCE = 50.0, 200.0, 35e3
 NU = 0.3
@@ -90,9 +90,7 @@ def run(quick: bool) -> Result:
         found = {"parabola": ellipse(x, levels[-1][1][-1], 0.9 * a), "circle": ellipse(x, circle, 0.9 * a)}
         table += [(name, n, *values) for name, values in found.items()]
     limits = [ellipse(levels[-1][0], p, 0.9 * v) for p, v in zip(levels[-1][1], hertz, strict=True)]
-    errors = [
-        float(np.sqrt(np.mean([_away(x, p, e) ** 2 for p, e in zip(ps, limits, strict=True)]))) for x, ps in levels
-    ]
+    errors = [rms(ellipse_error(x, p, *e) for p, e in zip(ps, limits, strict=True)) for x, ps in levels]
     rows = [
         Row("Hertz's own half-width (mm)", _NAFEMS, 6.21, a, 1e-3, "three digits published"),
         Row("Hertz's own peak (MPa)", _NAFEMS, 3585.37, p0, 1e-5, "six digits published"),
@@ -107,13 +105,6 @@ def run(quick: bool) -> Result:
     return Result(
         tuple(rows), exact_columns(names, table), lambda figure: draw(figure, counts, errors, (x, circle), (a, p0))
     )
-
-
-def _away(x: Float, p: Float, limit: tuple[float, float]) -> float:
-    """Relative L2 error of nodal pressures p (n,) at x (n,) against an ellipse."""
-    fine = np.linspace(0.0, 1.3 * limit[0], 8001)
-    wanted = limit[1] * np.sqrt(np.maximum(0.0, 1.0 - (fine / limit[0]) ** 2))
-    return distance(np.interp(fine, x, p), wanted)
 
 
 def draw(

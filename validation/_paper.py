@@ -22,6 +22,7 @@ from finger3d.fem.recovery import displacement
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
+from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult, contact_table
 from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
 
@@ -95,6 +96,11 @@ class Profile:
         return float(self.p @ self.area)
 
     @property
+    def friction(self) -> float:
+        """Sum of the friction forces (N), likewise."""
+        return float(np.abs(self.q) @ self.area)
+
+    @property
     def a(self) -> float:
         """Half-width of the contact at rest (mm): half way between the last point that touches and the next."""
         return self._edge(self.status != OPEN)
@@ -163,10 +169,7 @@ def strains(frame: StepResult, count: int, line: str = "", finite: bool = False)
 
 def moved(problem: Problem, frame: StepResult) -> Float:
     """Displacement (n, d) mm of the meshed part, recovered from the contact forces of a frame."""
-    own = np.flatnonzero(np.all(problem.symmetry.mirror_sign == 1.0, axis=1))
-    first = own[np.argsort(problem.symmetry.image_of[own])]
-    force = frame.state.force[first] / problem.symmetry.multiplicity[first][:, None]
-    return displacement(problem.mesh, problem.unknowns(force))
+    return displacement(problem.mesh, next(formulation_of(problem.model).unknowns(problem, [frame.meshed_state])))
 
 
 said = listed(__file__)
@@ -202,3 +205,22 @@ def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: dict
     for axes, quantity in zip(panels[:, 0], quantities, strict=True):
         axes.set_ylabel(quantity)
     panels[0, 0].legend(title=legend, frameon=False)
+
+
+def draw_by_mu(
+    panels: Sequence[Any], x: Float, profiles: Sequence[Profile], strains: Sequence[Float], gauges: dict[int, Float]
+) -> None:
+    """Draw friction along x at x > 0, strains (mus, n) at x (n,), and gauges (mus,) by angle, a panel each."""
+    from matplotlib import colormaps
+
+    first, *inner, last = panels
+    for i, (mu, profile) in enumerate(zip(MUS, profiles, strict=True)):
+        colour, on = colormaps["plasma"](0.85 * i / 4), profile.x >= 0.0
+        first.plot(profile.x[on], profile.q[on], color=colour, lw=1.1, label=f"{mu:g}")
+        for axes, strain in zip(inner, strains, strict=True):
+            axes.plot(x, strain[i], color=colour, lw=1.1)
+    for i, angle in enumerate((15, 30, 45, 60)):
+        last.plot(MUS, gauges[angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
+    for axes in panels:
+        axes.axhline(0.0, color="#999999", lw=0.7)
+        axes.set_xlabel("mu" if axes is last else "x (mm)")

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from finger3d.mechanics.model import Gauge, Leg
 from ._exact_path import exact_press
 from ._increments import PlainCoulomb, imbalance
 from ._paper import STRAIN, STRESS, fig9, half_cylinder
-from ._press import changed, under
+from ._press import changed, in_increments, under
 from ._rows import Result, Row, at_least, columns, words, zero
 
 MUS = (0.06, 0.25, 0.5, 1.0)
@@ -75,9 +75,8 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns(titles, table), lambda figure: _draw(figure, errors, automatic))
 
 
-def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | str) -> Problem:
-    counted: Any = tuple(replace(leg, steps=steps) for leg in legs)  # type: ignore[arg-type]
-    return changed(section, friction=Coulomb(mu), legs=counted)
+def _under(section: Problem, mu: float, legs: Sequence[Leg], steps: int | Literal["auto"]) -> Problem:
+    return changed(section, friction=Coulomb(mu), legs=in_increments(legs, steps))
 
 
 def _numbers(problem: Problem, step: StepResult) -> dict[str, float]:

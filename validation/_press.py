@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal
 
+from finger3d._types import Tree
 from finger3d.contact.friction import Coulomb, FrictionLaw
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import Design, designs
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Workspace
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Gauge, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+
+GEOMETRIES = Path(__file__).resolve().parents[1] / "geometries"
+"""Scenes and designs that come with the program."""
 
 
 def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm: float = 36.6) -> Design:
@@ -24,6 +30,29 @@ def fig9_finger(width_mm: float = 20.0, radius_mm: float = 100.0, edge_height_mm
     return designs()["clipped_cylinder"](
         radius_mm=radius_mm, half_length_mm=50.0, edge_height_mm=edge_height_mm, width_mm=width_mm
     )
+
+
+def fig9_model(nu: float, size: float, base: float, domain: Domain = "solid", **fields: Any) -> Model:
+    """Return the finger of Fig. 9 on a structured mesh, pressed 10 mm unless `fields` say otherwise."""
+    mesh = MeshOptions(size, base, "swept")
+    own = {"design": fig9_finger(), "legs": (Leg(10.0),)}
+    return Model(material=Isotropic(1.0, nu), mesh=mesh, domain=domain, **own | fields)
+
+
+def block_tables(size_mm: Sequence[float], E_MPa: float, nu: float, edges: Sequence[float], **tables: Any) -> Tree:
+    """Return the tables of a block on a structured mesh, and others.
+
+    Parameters
+    ----------
+    size_mm : half its length, height and width
+    edges : lengths at the contact and far from it, mm
+    """
+    return {
+        "finger": {"geometry": "block", **dict(zip(("half_length_mm", "height_mm", "width_mm"), size_mm, strict=True))},
+        "material": {"E_MPa": E_MPa, "nu": nu},
+        "mesh": {"mesher": "swept", "size_mm": edges[0], "base_size_mm": edges[1]},
+        **tables,
+    }
 
 
 def paper_gauges(length_mm: float, y_mm: float = 40.0) -> tuple[Gauge, Gauge]:
@@ -51,11 +80,16 @@ def converged(problem: Problem, workspace: Workspace | None = None) -> list[Step
     return steps
 
 
+def in_increments(legs: Sequence[Leg], count: int | Literal["auto"]) -> tuple[Leg, ...]:
+    """Return legs with a number of increments each."""
+    return tuple(replace(leg, steps=count) for leg in legs)
+
+
 def under(problem: Problem, friction: FrictionLaw | float, steps: int | None = None) -> list[StepResult]:
     """Return the increments of a press under another friction, and in that many increments a leg."""
     law = Coulomb(friction) if isinstance(friction, int | float) else friction
-    legs = problem.model.legs if steps is None else tuple(replace(leg, steps=steps) for leg in problem.model.legs)
-    return converged(changed(problem, friction=law, legs=legs))
+    legs = problem.model.legs
+    return converged(changed(problem, friction=law, legs=in_increments(legs, steps) if steps else legs))
 
 
 def in_edges(model: Model, factor: float) -> Model:

@@ -14,10 +14,9 @@ import numpy as np
 from scipy.special import ellipe, ellipkm1
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK
-from finger3d.contact.state import ContactState
+from finger3d.contact.friction import OPEN, STICK
 
-from ._common import increment
+from ._common import marched
 
 _ORDER = 24
 
@@ -38,14 +37,17 @@ def _j1j1(r: Float, s: Float) -> Float:
 class Rings:
     """Rings of equal width that cover radii 0 to `edges[-1]` (mm), for E = 1 MPa; compliance (c, 2, c, 2) mm/N."""
 
-    nu: float
     edges: Float
     compliance: Float
 
     @property
-    def radius(self) -> Float:
-        """Middle radii (c,)."""
-        return 0.5 * (self.edges[1:] + self.edges[:-1])
+    def area(self) -> Float:
+        """Areas (c,), mm2."""
+        return np.pi * np.diff(self.edges**2)
+
+    def gap(self, radius: float) -> Float:
+        """Mean gap (c,) under a ball of a radius that touches, mm."""
+        return (self.edges[1:] ** 2 + self.edges[:-1] ** 2) / (4.0 * radius)
 
 
 def rings(nu: float, count: int, reach: float) -> Rings:
@@ -76,7 +78,7 @@ def rings(nu: float, count: int, reach: float) -> Rings:
     whole[:, 1, :, 0] = cross
     whole[:, 0, :, 1] = cross.T  # Betti
     flat = whole.reshape(2 * count, 2 * count)
-    return Rings(nu, edges, (0.5 * (flat + flat.T)).reshape(whole.shape))  # symmetric but for the quadrature
+    return Rings(edges, (0.5 * (flat + flat.T)).reshape(whole.shape))  # symmetric but for the quadrature
 
 
 def _receivers(edges: Float) -> tuple[Float, Float]:
@@ -90,38 +92,21 @@ def _receivers(edges: Float) -> tuple[Float, Float]:
 
 @dataclass(frozen=True)
 class Press:
-    """End of a press: P, T (N), dissipation D (mJ), a and c (mm), and traction along r."""
+    """End of a press: P, T (N), dissipation D (mJ), a and c (mm), and the most iterations of an increment."""
 
     P: float
     T: float
     D: float
     a: float
     c: float
-    r: Float
-    p: Float
-    q: Float
     iterations: int
 
 
 def press(body: Rings, radius: float, mu: float, depths: Sequence[float]) -> Press:
     """Press a ball of a radius (mm) to each of the depths (mm) in turn."""
-    gap = (body.edges[1:] ** 2 + body.edges[:-1] ** 2) / (4.0 * radius)
-    state = ContactState.at_rest(gap, 2)
-    lost, most = 0.0, 0
-    for depth in depths:
-        free = np.stack([gap - depth, np.zeros_like(gap)], axis=1)
-        found = increment(state, free, body.compliance, mu, depth)
-        if not found.outcome.ok:
-            raise AssertionError(f"rings, mu = {mu:g}, depth {depth:g}: {found.outcome}")
-        slips = found.state.status == SLIP
-        lost -= float(
-            np.sum(found.state.force[slips, 1] * (found.state.accumulated_slip - state.accumulated_slip)[slips, 0])
-        )
-        state, most = found.state, max(most, found.iterations)
-    area = np.pi * np.diff(body.edges**2)
-    touching, sticking = (body.edges[1:][s].max(initial=0.0) for s in (state.status != OPEN, state.status == STICK))
-    p, q = state.force[:, 0] / area, state.force[:, 1] / area
-    return Press(
-        float(state.force[:, 0].sum()), float(np.abs(state.force[:, 1]).sum()), lost, touching, sticking, body.radius,
-        p, q, most,
-    )  # fmt: skip
+    steps = list(marched(body.gap(radius), body.compliance, mu, [(depth, 0.0) for depth in depths]))
+    last, lost = steps[-1]
+    force, status = last.state.force, last.state.status
+    touching, sticking = (body.edges[1:][s].max(initial=0.0) for s in (status != OPEN, status == STICK))
+    most = max(found.iterations for found, _ in steps)
+    return Press(float(force[:, 0].sum()), float(np.abs(force[:, 1]).sum()), lost, touching, sticking, most)

@@ -8,6 +8,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -23,6 +24,10 @@ Measure = Literal["relative", "absolute", "at most", "at least"]
 
 PAPER = "Maeno 2004"
 """Beginning of the reference of a statement of the paper."""
+
+GOAL = "goal of this project"
+ROBUST = "what a robust method does; REFERENCES.md, 8.2"
+"""References of many rows."""
 
 COLUMNS = ("what", "kind", "reference", "wanted", "got", "measure", "error", "tolerance", "reason", "verdict")
 """Columns of a results file."""
@@ -267,16 +272,25 @@ def grouped(table: Mapping[str, ArrayLike], *by: str, **where: Any) -> Iterator[
         yield values if len(by) > 1 else values[0], {name: array[which] for name, array in arrays.items()}
 
 
-def committed(name: str) -> list[dict[str, str]]:
-    """Return the lines of the committed table of a study."""
+def committed(name: str) -> list[dict[str, Any]]:
+    """Return the lines of the committed table of a study, with numbers as such."""
     path = Path(__file__).resolve().parent / "results" / f"{name}_table.csv"
     if not path.is_file():
         raise MissingError(f"there are no results of {name}; run python -m validation {name}")
     with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+        return [{key: _value(text) for key, text in line.items()} for line in csv.DictReader(stream)]
 
 
-def committed_instead(name: str, program: str, install: str) -> list[dict[str, str]]:
+def _value(text: str) -> Any:
+    """Return the number that is written so, else the text."""
+    for kind in (int, float):
+        with suppress(ValueError):
+            if str(kind(text)) == text:
+                return kind(text)
+    return text
+
+
+def committed_instead(name: str, program: str, install: str) -> list[dict[str, Any]]:
     """Return the lines of the committed table of a study whose other `program` is missing, and say so."""
     print(f"{name}: {program} is not installed ({install}); the committed results stay", file=sys.stderr)
     return committed(name)

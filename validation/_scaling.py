@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -12,11 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from finger3d._machine import child_environment
 from finger3d.analyses.press import press
 from finger3d.progress import Progress
-from finger3d.scene import Scene, parse
+from finger3d.scene import Scene, load
 
-from ._child import HOME, peak_mb, reset_peak
+from ._child import peak_mb, reset_peak
+from ._press import GEOMETRIES
 
 BODIES = 16
 STAGES = ("mesh", "assembly", "condensation", "contact", "output", "error bars and page")
@@ -78,27 +79,22 @@ def prepare() -> None:
 
 
 def _scene(size: float, base: float) -> Scene:
-    return parse(
-        {
-            "finger": {"geometry": "clipped_cylinder", "radius_mm": 100.0, "half_length_mm": 50.0,
-                       "edge_height_mm": 36.6, "width_mm": 20.0},
-            "material": {"E_MPa": 1.0, "nu": 0.49}, "friction": {"mu": 0.25}, "press": {"depth_mm": 10.0, "steps": 10},
-            "mesh": {"size_mm": size, "base_size_mm": base, "mesher": "swept"}, "effects": {"auto": False},
-        }
-    )  # fmt: skip
+    mesh = f"mesh={{size_mm={size}, base_size_mm={base}, mesher='swept'}}"
+    return load(
+        GEOMETRIES / "fig9.toml", ["gauge=[]", "material.nu=0.49", "press.steps=10", "effects.auto=false", mesh]
+    )
 
 
 def sweep_seconds(size: Size, workers: int) -> float:
     """Wall time (s) of the command ``finger3d sweep`` over `BODIES` values of nu, its start included."""
     nus = ",".join(f"{0.30 + 0.01 * i:.2f}" for i in range(BODIES))
-    path = os.pathsep.join([str(HOME.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
     with tempfile.TemporaryDirectory(prefix="finger3d_scaling_") as folder:
         scene = Path(folder, "body.toml")
         scene.write_text(_scene(size.size, size.base).to_toml(), encoding="utf-8")
         command = [sys.executable, "-m", "finger3d", "sweep", str(scene), "--vary", f"material.nu={nus}"]
         command += ["--out", str(Path(folder, "out")), "--workers", str(workers)]
         start = time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": path})
+        subprocess.run(command, check=True, capture_output=True, env=child_environment())
         return time.perf_counter() - start
 
 

@@ -13,10 +13,12 @@ c.  Results converge with the first order in the number of nodes and are extrapo
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
 from finger3d._types import Float
@@ -53,16 +55,10 @@ def line(nu: float, mu: float) -> Pressed:
     """Solve in plane strain; c/a must lie between 0.05 and 0.995."""
     count = _NODES[0] // 2
     # c is taken at grid angles, which all numbers of nodes share; mu falls as c does
-    low, high = 1, count - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if _extrapolated(nu, middle)[0] < mu else (low, middle)
-    first = min(max(low - 1, 1), count - 4)
+    next_ = bisect_left(range(count - 1), mu, lo=2, key=lambda number: _extrapolated(nu, number)[0])
+    first = min(max(next_ - 2, 1), count - 4)
     table = np.array([_extrapolated(nu, j) for j in range(first, first + 4)])
-    weights = [
-        np.prod([(mu - table[k, 0]) / (table[j, 0] - table[k, 0]) for k in range(4) if k != j]) for j in range(4)
-    ]
-    values = np.asarray(weights) @ table[:, 1:]
+    values = KroghInterpolator(table[:, 0], table[:, 1:])(mu)
     return Pressed(*map(float, values[:4]), shear=values[4:])
 
 

@@ -33,6 +33,7 @@ from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.objects.rigid import rotation
 
 from ._common import cube, increment, side_load
 from ._press import converged
@@ -52,10 +53,7 @@ COLUMNS = "dim nu shear_over_muN sticking slipping friction_over_muN mean_slip l
 
 def turned(dim: int) -> np.ndarray:
     """Rotation (d, d) by 30 degrees about z; in 3D then by 30 degrees about the block's own normal."""
-    c, s = np.cos(TURN), np.sin(TURN)
-    about_z = np.eye(dim)
-    about_z[:2, :2] = [[c, -s], [s, c]]
-    return about_z
+    return rotation(0.0, 0.0, TURN)[:dim, :dim]
 
 
 def block(dim: int, nu: float, cells: int) -> list[tuple[Any, ...]]:

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.recovery import StrainReader, displacement
+from finger3d.analyses.gauge_places import StrainField
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.history import StepResult
 
 if TYPE_CHECKING:
@@ -36,65 +35,56 @@ _QUANTILE = 0.99  # share of the squares within the colour scale of the slope
 
 @dataclass(frozen=True)
 class StrainMap:
-    """Strain over a plane z = const for ascending mu (m,).
+    """Strain over the plane z = 0 for ascending mu (m,).
 
     Attributes
     ----------
     x, y : (nx,), (ny,) mm, the middles of the squares
-    strain : (m, ny, nx, 3) xx, yy, xy (tensor component); nan outside the body
+    field : of the presses; nan outside the body
     """
 
     mu: Float
     x: Float
     y: Float
-    z_mm: float
-    strain: Float
+    field: StrainField
 
     @classmethod
-    def of(
-        cls, problem: Problem, steps: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM, z_mm: float = 0.0
-    ) -> StrainMap:
-        """Recover the field of every step with the factor at hand, and read it at every square of the plane z_mm."""
-        design = problem.model.design
-        half, top = design.half_length_mm, design.height_mm
-        nx, ny = math.ceil(half / pixel_mm), math.ceil(top / pixel_mm)
+    def of(cls, problem: Problem, steps: Mapping[float, StepResult], pixel_mm: float = PIXEL_MM) -> StrainMap:
+        """Recover the field of every step with the factor at hand."""
+        design, mus = problem.model.design, sorted(steps)
+        nx, ny = math.ceil(design.half_length_mm / pixel_mm), math.ceil(design.height_mm / pixel_mm)
         x = np.arange(-nx + 0.5, nx, dtype=np.float64) * pixel_mm
         y = np.arange(0.5, ny, dtype=np.float64) * pixel_mm
-        grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        points = np.insert(grid, 2, z_mm, axis=1)[:, : problem.dim]
-        reader = StrainReader.at(problem.mesh, points, problem.axes)
-        mus = np.array(sorted(steps))
-        fields = []
-        for unknowns in formulation_of(problem.model).unknowns(problem, [steps[float(mu)].meshed_state for mu in mus]):
-            fields.append(reader.strain(displacement(problem.mesh, unknowns)).reshape(len(y), len(x), 3))
-        return cls(mus, x, y, z_mm, np.array(fields))
+        return cls(np.array(mus), x, y, StrainField.of_frames(problem, [steps[mu] for mu in mus], mus))
 
     def along(self, angle: float) -> Float:
         """Return the normal strain (m, ny, nx) along a direction (radians)."""
-        c, s = math.cos(angle), math.sin(angle)
-        return np.asarray(self.strain @ np.array([c * c, s * s, 2.0 * s * c]))
+        return self._along(np.array([angle]))[0]
 
-    def slope(self, angle: float) -> Float:
-        """d strain / d mu (m - 1, ny, nx) along a direction, between neighbouring mu."""
-        return np.diff(self.along(angle), axis=0) / np.diff(self.mu)[:, None, None]
+    def _along(self, angles: Float) -> Float:
+        """Return the normal strain (a, m, ny, nx) along directions (a,)."""
+        points = np.stack([*np.meshgrid(self.x, self.y), np.zeros((len(self.y), len(self.x)))], axis=-1)
+        strain = self.field.strain(points.reshape(-1, 3), angles).T
+        return strain.swapaxes(0, 1).reshape(len(angles), len(self.mu), len(self.y), len(self.x))
 
     def slope_at(self, angle: float, mu: float) -> Float:
         """d strain / d mu (ny, nx) along a direction in the interval that holds mu."""
         interval = np.clip(np.searchsorted(self.mu, mu, side="right") - 1, 0, len(self.mu) - 2)
-        return np.asarray(self.slope(angle)[interval])
+        change = np.diff(self.along(angle)[interval : interval + 2], axis=0)[0]
+        return np.asarray(change / np.diff(self.mu)[interval])
 
-    def worst_slope(self, angle: float, low: float = -math.inf, high: float = math.inf) -> Float:
-        """Return the smallest |d strain / d mu| (ny, nx) over mu from `low` to `high`; 0 where it changes its sign."""
+    def worst_slope(self, angles: Float, low: float = -math.inf, high: float = math.inf) -> Float:
+        """Return the smallest |d strain / d mu| (a, ny, nx) over mu from `low` to `high`; 0 where it changes sign."""
         middle = 0.5 * (self.mu[1:] + self.mu[:-1])
-        part = self.slope(angle)[(middle >= low) & (middle <= high)]
-        least, most = part.min(axis=0), part.max(axis=0)
-        return np.where(
-            least * most > 0.0, np.minimum(np.abs(least), np.abs(most)), np.where(np.isnan(least), least, 0.0)
-        )
+        slope = np.diff(self._along(angles), axis=1) / np.diff(self.mu)[:, None, None]
+        part = slope[:, (middle >= low) & (middle <= high)]
+        least, most = part.min(axis=1), part.max(axis=1)
+        turns = np.where(np.isnan(least), least, 0.0)
+        return np.where(least * most > 0.0, np.minimum(np.abs(least), np.abs(most)), turns)
 
     def best(self, low: float = -math.inf, high: float = math.inf) -> tuple[Float, Float]:
         """Return the largest worst slope (ny, nx) over mu from `low` to `high`, and its direction (radians)."""
-        every = np.array([self.worst_slope(float(a), low, high) for a in ANGLES])
+        every = self.worst_slope(ANGLES, low, high)
         pick = np.nan_to_num(every, nan=-1.0).argmax(axis=0)
         value = np.take_along_axis(every, pick[None], axis=0)[0]
         return value, np.where(np.isnan(value), np.nan, ANGLES[pick])

@@ -20,10 +20,9 @@ from scipy.optimize import brentq
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity, Isotropic
-from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 from finger3d.objects import Wave, Wedge
 
 from ._common import (
@@ -40,6 +39,7 @@ from ._common import (
     quarter_block,
     rate,
 )
+from ._halfplane import CANDIDATES, on_block
 from ._rows import Result, Row, exact_columns
 
 NU, SLOPE, AMPLITUDE = 0.3, 0.01, 1e-3
@@ -53,7 +53,7 @@ Errors = Float  # (depths, 2): force over the closed form at equal a, less 1; L2
 
 
 TIP = Wedge(angle=math.atan(SLOPE))
-HEIGHT = 200.0
+HEIGHT, CONE = 200.0, 10.0
 WEDGE_DEPTHS = 0.72 * SLOPE * np.linspace(0.7, 1.0, 20) * np.log(2.0 * HEIGHT)  # half-widths near 0.7 to 1 mm
 
 
@@ -87,10 +87,8 @@ def wedge_errors(at: Float, p: Float, force: float) -> tuple[float, float]:
 
 def own_path(count: int) -> float:
     """Force over the closed form at equal a, mean of depths, by the product's own mesher and symmetry."""
-    block = designs()["block"](half_length_mm=HEIGHT, height_mm=HEIGHT, width_mm=1.0)
-    mesh = MeshOptions(1.0 / count, 0.25 * HEIGHT, "swept")
     legs = tuple(Leg(d, steps=1) for d in WEDGE_DEPTHS)
-    problem = build(Model(block, Isotropic(1.0, NU), mesh, legs, TIP, domain="plane-strain"), margin=-0.2)
+    problem = build(on_block(TIP, Isotropic(1.0, NU), count, legs, HEIGHT), margin=CANDIDATES)
     right = np.flatnonzero(problem.points.points[:, 0] >= 0.0)
     right = right[np.argsort(problem.points.points[right, 0])]
     at, area = problem.points.points[right, 0], problem.points.area[right]
@@ -98,10 +96,9 @@ def own_path(count: int) -> float:
     return 1.0 + float(np.mean([wedge_errors(at, f[right] / area, f.sum())[0] for f in forces]))
 
 
-def cone(count: int, growth: float = 1.6, height: float = 10.0) -> Errors:
+def cone(count: int, growth: float) -> Errors:
     """A quarter of a block, radii near 0.7 to 1 mm."""
-    mesh, held = quarter_block(contact_axis(1.0, count, height, growth), graded(height, 1.0 / count, growth))
-    block = body(mesh, Elasticity.of(1.0, NU), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.3)
+    block = quarter_block(contact_axis(1.0, count, CONE, growth), graded(CONE, 1.0 / count, growth), NU, 1.3)
     radius = block.gap(lambda p: np.hypot(p[:, 0], p[:, 2]))
     square = block.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
     found = []

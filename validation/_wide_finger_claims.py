@@ -25,7 +25,7 @@ from finger3d.mechanics.model import MeshOptions
 from . import _half_cylinder_forces as forces
 from . import _half_cylinder_strains as inner
 from . import fig9_strains
-from ._paper import BELOW_FIG9, MUS, Profile, fig9, line, said, strains
+from ._paper import BELOW_FIG9, MUS, Profile, draw_by_mu, fig9, line, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 
@@ -67,6 +67,11 @@ class Pressed:
         early = strains(frames[0], COUNT, finite=finite)
         return cls(problem, last, strain, frames, early, strains(kinetic, COUNT, finite=finite)[2], ten, soft)
 
+    @property
+    def read(self) -> dict[int, Float]:
+        """Strain (m,) of the gauges by angle."""
+        return {t: np.array([f.gauges[f"{BELOW_FIG9}:{t}"] for f in self.last]) for t in ANGLES}
+
     def profiles(self, frames: tuple[StepResult, ...]) -> list[Profile]:
         """Tractions at z = 0."""
         return [Profile.of(self.problem, frame) for frame in frames]
@@ -100,7 +105,6 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
     depths, mus = found.profiles(found.frames), found.profiles(found.last)
     middle = mus[MUS.index(0.25)]
     shear = found.strain[:, 2]
-    read = {t: np.array([f.gauges[f"{BELOW_FIG9}:{t}"] for f in found.last]) for t in ANGLES}
     at_36 = shear[:, np.argmin(np.abs(x - 36.0))]
     signal = float(np.ptp(shear, axis=0).max())
     kinetic = float(np.abs(found.halved - shear[MUS.index(0.25)]).max())
@@ -121,34 +125,19 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
         said("width-79", 2.0 * middle.deformed, tolerance=1.0 + 2.0 * middle.edge_error(), here=here),
         said("shear-at-36", abs(at_36[-1] - at_36[-2]) / np.ptp(at_36), here=here),
         said("edge-slips", (mus[-1].a - mus[-1].c) / mus[-1].a, here=here),
-        *fig9_strains.statements(here, NU, np.array(MUS), read),
+        *fig9_strains.statements(here, NU, np.array(MUS), found.read),
     ]
 
 
 def _draw(figure: Any, x: Float, found: dict[str, Pressed]) -> None:
-    from matplotlib import colormaps
-
     figure.set_size_inches(13.5, 7.4)
     panels = figure.subplots(2, 4)
     figure.suptitle(f"The finger 20 mm wide at 10 mm, at z = 0, nu = {NU:g}")
     for axes, (name, own) in zip(panels, found.items(), strict=True):
-        for i, (mu, profile) in enumerate(zip(MUS, own.profiles(own.last), strict=True)):
-            colour, on = colormaps["plasma"](0.85 * i / 4), profile.x >= 0.0
-            axes[0].plot(profile.x[on], profile.q[on], color=colour, lw=1.1, label=f"{mu:g}")
-            for panel, k in ((axes[1], 0), (axes[2], 2)):
-                panel.plot(x, own.strain[i, k], color=colour, lw=1.1)
-        for i, angle in enumerate(ANGLES):
-            read = [f.gauges[f"{BELOW_FIG9}:{angle}"] for f in own.last]
-            axes[3].plot(MUS, read, "o-", ms=3, color=f"C{i}", label=f"{angle}°")
-        titles = (
-            "friction along x (MPa)",
-            "eps_x under the surface",
-            "gamma_xy under the surface",
-            "gauge at x = 36 mm",
-        )
-        for panel, title in zip(axes, titles, strict=True):
-            panel.set(xlabel="mu" if panel is axes[3] else "x (mm)", title=title)
-            panel.axhline(0.0, color="#999999", lw=0.7)
+        draw_by_mu(axes, x, own.profiles(own.last), [own.strain[:, 0], own.strain[:, 2]], own.read)
+        names = "friction along x (MPa)", "eps_x under the surface", "gamma_xy under the surface", "gauge at x = 36 mm"
+        for panel, title in zip(axes, names, strict=True):
+            panel.set_title(title)
         axes[0].set_ylabel("large deformation" if "large" in name else "small strain")
     panels[0, 0].legend(title="mu", frameon=False)
     panels[0, 3].legend(title="angle", frameon=False)

@@ -21,15 +21,14 @@ from scipy import sparse
 
 from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg
 
 from ._common import rate
-from ._press import changed, fig9_finger
+from ._press import changed, fig9_model
 from ._rows import Result, Row, exact_columns, zero
 
 _ALWAYS = "balance of the whole body; REFERENCES.md, 7.1"
@@ -39,8 +38,7 @@ SIZES = {"plane-strain": 2.0, "solid": 8.0}
 
 def finger(domain: Any, nu: float) -> Problem:
     """The whole finger, ready for any path that presses 10 mm at first."""
-    mesh = MeshOptions(SIZES[domain], 2.0 * SIZES[domain], "swept")
-    return build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, (Leg(10.0),), domain=domain, symmetry=()))
+    return build(fig9_model(nu, SIZES[domain], 2.0 * SIZES[domain], domain, symmetry=()))
 
 
 def along(problem: Problem, steps: int, mu: float, slide: float) -> list[StepResult]:

@@ -26,13 +26,13 @@ import numpy as np
 from finger3d.analyses.press import press
 from finger3d.analyses.result import PressResult
 
+from ._press import block_tables
 from ._rows import Result, Row, at_most, columns
 
 SOURCE = "ANSYS 2025 R2, irisxu02/gelsight_ansys_sim; REFERENCES.md, 6.6"
 KRATOS = "Kratos, dokkev/fingertip-design-framework; REFERENCES.md, 6.6"
 THEIRS = 0.09
 """Largest error of a force that the authors of the ANSYS scenes give."""
-GEL = {"geometry": "block", "half_length_mm": 12.625, "height_mm": 4.0, "width_mm": 20.75}
 HOUR = 3600.0
 PRESS = 4
 """Increments of a press before a slide."""
@@ -61,14 +61,8 @@ class Scene:
     def tables(self, coarser: float) -> dict[str, Any]:
         """Return the tables of the scene, with edges longer by a factor."""
         size = coarser * self.size_mm
-        return {
-            "finger": GEL,
-            "material": {"E_MPa": 0.1, "nu": 0.49},
-            "object": self.object,
-            "friction": {"mu": self.mu},
-            "press": {"leg": self.legs},
-            "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": min(4.0 * size, 2.5)},
-        }
+        more = {"object": self.object, "friction": {"mu": self.mu}, "press": {"leg": self.legs}}
+        return block_tables((12.625, 4.0, 20.75), 0.1, 0.49, (size, min(4.0 * size, 2.5)), **more)
 
 
 def _force(result: PressResult) -> float:
@@ -161,7 +155,8 @@ def run(quick: bool) -> Result:
             here = read(result)
             rows.append(_beside(scene, what, theirs, here))
             lines.append((scene.name, what, theirs, here, _bar(result, what), seconds, scene.seconds_there or np.nan))
-        rows.append(at_most(f"largest residual, {scene.name}", "Eqs. 1 to 4", 1e-8, _residual(result)))
+        residual = max(step.residual or 0.0 for step in result.steps)
+        rows.append(at_most(f"largest residual, {scene.name}", "Eqs. 1 to 4", 1e-8, residual))
     rows.append(_kratos_row(coarser))
     names = "scene number theirs here bar seconds_here seconds_there"
     return Result(tuple(rows), columns(names, lines), lambda figure: _draw(figure, times, curves))
@@ -170,10 +165,6 @@ def run(quick: bool) -> Result:
 def _beside(scene: Scene, what: str, theirs: float, here: float) -> Row:
     reason = "the authors' own bound, 9 %, and what is read off a figure"
     return Row(f"{what}: {scene.name}", scene.source, theirs, here, THEIRS, reason, "statement")
-
-
-def _residual(result: PressResult) -> float:
-    return max(step.residual or 0.0 for step in result.steps)
 
 
 def _bar(result: PressResult, what: str) -> float:

@@ -22,7 +22,7 @@ from finger3d._machine import versions
 from finger3d.analyses.calculix import Contact
 from finger3d.mechanics.model import Leg
 
-from ._ccx import Answer, program, version
+from ._ccx import INSTALL, Answer, program, version
 from ._ccx import run as run_calculix
 from ._child import Bench, best_of
 from ._cost import SECTION, SOLID, Case, model_of
@@ -37,7 +37,6 @@ NU = 0.45
 # with the force nearest to ours.  At 2000 it diverged.
 PENALTY, STICK_SLOPE = 20.0, 5.0
 LIMIT_S = 900.0
-TEXT = ("body", "program", "version", "settings")
 COLUMNS = (
     "body program size_mm base_size_mm dofs increments iterations factorizations force_N outward_friction_x_N "
     "outward_friction_z_N wall_s cpu_s peak_MB threads load version settings"
@@ -53,7 +52,7 @@ def cases(quick: bool) -> list[Case]:
 def run(quick: bool) -> Result:
     """Each mesh once by CalculiX, and by finger3d as the best of three runs spread around it."""
     if program() is None:
-        return _committed(quick)
+        return _judged(committed_instead("beside_calculix", "ccx", INSTALL), timed=not quick)
     return _judged(measured(cases(quick)), timed=not quick)
 
 
@@ -83,20 +82,10 @@ def _judged(table: Sequence[Mapping[str, Any]], timed: bool) -> Result:
     return Result(tuple(rows), columns, lambda figure: _draw(figure, columns))
 
 
-def _committed(quick: bool) -> Result:
-    """What the committed table says."""
-    lines = committed_instead("beside_calculix", "ccx", "apt install calculix-ccx")
-
-    def read(key: str, text: str) -> Any:
-        return text if key in TEXT else int(text) if text.isdigit() else float(text)
-
-    return _judged([{k: read(k, v) for k, v in line.items()} for line in lines], timed=not quick)
-
-
 def calculix(case: Case) -> Answer:
     """A press by CalculiX."""
     model = replace(model_of(case), legs=(Leg(10.0, steps=case.counts[0]),), gauges=())
-    return run_calculix(model, Contact(PENALTY, STICK_SLOPE, model.friction.mu), LIMIT_S)
+    return run_calculix(model, LIMIT_S, Contact(PENALTY, STICK_SLOPE, model.friction.mu))
 
 
 def _line_ours(case: Case, ours: dict[str, Any], load: float) -> dict[str, Any]:

@@ -27,12 +27,10 @@ from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.mesh import Mesh
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
 from ._common import (
-    body,
     box,
     contact_axis,
     convergence,
@@ -47,6 +45,7 @@ from ._common import (
 )
 from ._corner import clamped_free, extrapolated, observed
 from ._layer import line, point
+from ._press import converged
 from ._rows import Result, Row, exact_columns, together, zero
 
 RADIUS = 1e5  # of the indenter, in thicknesses: the theory neglects slopes, which add some a / R to the force
@@ -75,8 +74,7 @@ def _model(a: float, nu: float, sizes: tuple[float, float], indenter: Any, meshe
 
 def forces(model: Model) -> Float:
     """Forces (N) at the ends of the legs by the product's own path."""
-    frames = list(march(build(model, margin=1.0)))
-    return np.array([f.state.force[:, 0].sum() if f.outcome.ok else np.nan for f in frames])
+    return np.array([frame.state.force[:, 0].sum() for frame in converged(build(model, margin=1.0))])
 
 
 def line_errors(a: float, nu: float, count: int) -> Errors:
@@ -91,8 +89,7 @@ def line_errors(a: float, nu: float, count: int) -> Errors:
 
 def point_errors(a: float, nu: float, axes: tuple[Float, Float]) -> Errors:
     """The same under a ball, on a graded quarter of a square layer."""
-    mesh, held = quarter_block(*axes)
-    layer = body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.25 * a)
+    layer = quarter_block(*axes, nu, 1.25 * a)
     square = layer.gap(lambda p: (p[:, 0] ** 2 + p[:, 2] ** 2) / (2.0 * RADIUS))
     away = []
     for v in a * np.linspace(0.7, 1.0, 12):

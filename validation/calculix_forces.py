@@ -7,7 +7,6 @@ presses at large deformation with all free faces in contact, then the finger of 
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 import tomllib
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ import numpy as np
 
 import finger3d
 from finger3d._types import Tree
-from finger3d.analyses.calculix import Contact, press_deck
+from finger3d.analyses.calculix import Contact
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect
 from finger3d.fem.laws.material import Isotropic
@@ -30,7 +29,7 @@ from finger3d.mechanics.history import measure
 from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
 from finger3d.scene import Scene, scene_of
 
-from ._ccx import printed_forces, program, solve
+from ._ccx import INSTALL, program
 from ._ccx import run as run_calculix
 from ._press import converged, fig9_finger
 from ._rows import Result, Row, at_least, exact_columns, grouped, together
@@ -61,31 +60,20 @@ def _decks(quick: bool) -> Result:
     """
     runs = not quick and program() is not None
     if not quick and not runs:
-        print(
-            "calculix_forces: ccx is not installed (apt install calculix-ccx); the numbers kept stay", file=sys.stderr
-        )
+        print(f"calculix_forces: ccx is not installed ({INSTALL}); the numbers kept stay", file=sys.stderr)
     source = f"CalculiX, deck of the scene, {'run for this' if runs else '2.20, number kept'}"
     lines = []
     for case in DECKS["case"][:3] if quick else DECKS["case"]:
         scene = deck_scene(case)
         ours = finger3d.press(scene.with_effects(scene.fixed_effects), error=False).last.normal_force_N
-        lines.append((case["name"], calculix(scene) if runs else case["kept_N"], ours))
+        theirs = run_calculix(scene.model(), LIMIT_S_DECKS).force if runs else case["kept_N"]
+        lines.append((case["name"], theirs, ours))
     rows = [
         Row(f"force (N): {name}", source, theirs, ours, TOLERANCE, REASON_DECKS, "validation")
         for name, theirs, ours in lines
     ]
     table = exact_columns("case calculix_N finger3d_N", lines)
     return Result(tuple(rows), table, lambda figure: _draw_decks(figure, table))
-
-
-def calculix(scene: Scene) -> float:
-    """Force (N) along -y on the whole finger at the end, by CalculiX."""
-    made = press_deck(scene.model(), scene.title)
-    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
-        path = Path(folder, "press.inp")
-        path.write_text(made.text(), encoding="ascii")
-        solve(path, LIMIT_S_DECKS)
-        return -made.multiple * float(printed_forces(path.with_suffix(".dat"))[1][-1, 1])
 
 
 def _draw_decks(figure: Any, table: dict[str, list[Any]]) -> None:
@@ -188,7 +176,7 @@ def _compared(case: Press, quick: bool, lines: list[tuple[Any, ...]]) -> Iterato
     theirs, source = None, "CalculiX 2.20, same mesh and law, number kept"
     if not quick and program():
         contact = Contact(PENALTY_FACES, STICK_FACES, case.mu, LABELS[problem.mesh.dim])
-        theirs = run_calculix(case.model(), contact, LIMIT_S_FACES)
+        theirs = run_calculix(case.model(), LIMIT_S_FACES, contact)
         source = "CalculiX, same mesh and law, run for this"
     wanted = case.kept if theirs is None else theirs.force
     on_walls = np.count_nonzero(end.state.force[problem.points.face > 0, 0] > 0.0)
@@ -244,7 +232,7 @@ def _section(quick: bool) -> Result:
         other, source = np.array(KEPT[size]), "CalculiX 2.20, same mesh and law, numbers kept"
         if not quick and program():
             slow = replace(model, legs=tuple(Leg(depth, steps=4) for depth in DEPTHS))
-            answer = run_calculix(slow, Contact(PENALTY_SECTION, STICK_SECTION, 0.25), LIMIT_S_FACES)
+            answer = run_calculix(slow, LIMIT_S_FACES, Contact(PENALTY_SECTION, STICK_SECTION, 0.25))
             other, source = answer.forces[:, 1] / WIDTH, "CalculiX, same mesh and law, run for this"
         for depth, theirs in zip(DEPTHS, other, strict=True):
             ours = float(np.interp(depth, *curves[size].T))

@@ -20,7 +20,7 @@ from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh import Mesh
 
-from ._common import box, convergence, held_at, mapped, side_load, solve
+from ._common import box, convergence, cube, held_at, mapped, side_load, solve
 from ._corner import clamped_free, extrapolated
 from ._rows import Result, Row, exact_columns
 
@@ -82,13 +82,8 @@ def deflection(flat: Mesh, panel: Panel, elastic: Elasticity | None = None) -> f
     return float(u[np.argmin(np.linalg.norm(mesh.points[:, :2] - [48.0, 52.0], axis=1)), 1])
 
 
-def square(count: int) -> Mesh:
-    """Unit square, `count` cells a side."""
-    return box([np.linspace(0.0, 1.0, count + 1)] * 2)
-
-
 def slab(count: int) -> Mesh:
-    """The same in one layer of cells, as thick as the panel's cells are long."""
+    """Unit square, `count` cells a side, in one layer of cells, as thick as the panel's cells are long."""
     return box([np.linspace(0.0, 1.0, count + 1)] * 2 + [np.array([0.0, 48.0 / count])])
 
 
@@ -111,7 +106,7 @@ def run(quick: bool) -> Result:
     rows, table, errors = [], [], {}
     panels = tuple(p for p in PANELS if not quick or p.nu not in (0.49, 0.4999))
     for panel in panels:
-        found = [deflection(square(n), panel) for n in counts]
+        found = [deflection(cube(2, n), panel) for n in counts]
         limit = extrapolated(found[-2], found[-1], panel.rate)
         corner = deflection(towards_corner(1 / 12 if quick else 1 / 32), panel)
         steps = np.diff(found)
@@ -128,7 +123,7 @@ def run(quick: bool) -> Result:
         if not panel.plane_stress:
             solid = [deflection(slab(n), panel) for n in thick]
             table += [(panel.name, 3, n, v) for n, v in zip(thick, solid, strict=True)]
-            flat = deflection(square(thick[-1]), panel)
+            flat = deflection(cube(2, thick[-1]), panel)
             why = "the diagonals of the slab's cells differ from the section's"
             what = f"held slab against section, {thick[-1]} cells, {panel.name} (mm)"
             rows.append(Row(what, "2D", flat, solid[-1], 1e-3, why))
@@ -140,7 +135,7 @@ def run(quick: bool) -> Result:
 def _locking(nu: float, measure: Any, bound: float) -> Row:
     """Linear triangles must fail at nu near 1/2, or the benchmark shows nothing."""
     panel = next(p for p in PANELS if p.nu == nu)
-    got = abs(deflection(square(24), panel, Elasticity.of(250.0, nu, mixed=False)) / panel.wanted - 1.0)
+    got = abs(deflection(cube(2, 24), panel, Elasticity.of(250.0, nu, mixed=False)) / panel.wanted - 1.0)
     what = f"error of linear triangles, 24 cells, nu = {nu:g}: {'fine' if measure == 'at most' else 'they must lock'}"
     return Row(what, _COOK, bound, got, 0.0, "shows that the benchmark detects locking", measure=measure)
 

@@ -42,7 +42,7 @@ from finger3d.objects import TIME
 from finger3d.progress import QUIET
 from finger3d.scene import scene_of
 
-from ._press import changed, converged
+from ._press import block_tables, changed, converged
 from ._rows import Result, Row, columns, committed_instead, listed
 from .held_weights import largest_change
 
@@ -57,7 +57,6 @@ COLUMNS = (
     "program pads pad_kg time_step_ms impratio noslip_iterations contacts creep_mm_per_min formula_mm_per_min "
     "least_grip_N"
 )
-TEXT = ("program", "pads")
 
 
 @dataclass(frozen=True)
@@ -130,15 +129,11 @@ def mujoco_least_grip(grip: Grip) -> float:
 
 def finger3d_hold(size: float, increments: int) -> tuple[float, float]:
     """Largest change in the hold, mm, and the least grip, N."""
-    tables = {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 20.0, "width_mm": 20.0},
-        "object": {"shape": "box", "size_mm": (40.0, 40.0, 120.0)},
-        "material": {"E_MPa": 1.0, "nu": 0.45},
-        "friction": {"mu": MU},
-        "grip": {"force_N": NORMAL, "mass_g": 1e3 * MASS * G / 9.80665, "steps": 2},
-        "mesh": {"size_mm": size, "base_size_mm": 2.0 * size, "mesher": "swept"},
-        "effects": {"auto": False},
-    }
+    tables = block_tables(
+        (10.0, 20.0, 20.0), 1.0, 0.45, (size, 2.0 * size), object={"shape": "box", "size_mm": (40.0, 40.0, 120.0)},
+        friction={"mu": MU}, grip={"force_N": NORMAL, "mass_g": 1e3 * MASS * G / 9.80665, "steps": 2},
+        effects={"auto": False},
+    )  # fmt: skip
     problem = build(scene_of(tables).model())
     close, weigh = problem.model.legs
     hold = replace(weigh, steps=increments, duration_s=HOLD_S)
@@ -152,7 +147,8 @@ def run(quick: bool) -> Result:
     """Quick: a coarse pad, and 2 s of two of MuJoCo's models."""
     ours, least = finger3d_hold(5.0 if quick else 2.5, 6 if quick else 60)
     if importlib.util.find_spec("mujoco") is None:
-        theirs = _committed()
+        kept = committed_instead("creep_of_a_hold", "MuJoCo", "pip install mujoco, or the extra dev")
+        theirs = [tuple(line.values()) for line in kept if line["program"] == "MuJoCo"]
     else:
         theirs = [_line(grip, 2.0 if quick else HOLD_S) for grip in GRIPS[: 2 if quick else None]]
     lines = [("finger3d", "block, E = 1 MPa", 0.0, 0.0, 0.0, 0.0, 0.0, ours, 0.0, least), *theirs]
@@ -165,13 +161,6 @@ def _line(grip: Grip, seconds: float) -> tuple[Any, ...]:
     formula = np.nan if grip.noslip else grip.formula()
     shown = 1e3 * grip.step_s, grip.impratio, float(grip.noslip), float(contacts)
     return "MuJoCo", grip.pads, grip.pad_kg, *shown, fall * 60.0 / seconds, formula, mujoco_least_grip(grip)
-
-
-def _committed() -> list[tuple[Any, ...]]:
-    """MuJoCo's lines of the committed table."""
-    kept = committed_instead("creep_of_a_hold", "MuJoCo", "pip install mujoco, or the extra dev")
-    lines = [line for line in kept if line["program"] == "MuJoCo"]
-    return [tuple(line[k] if k in TEXT else float(line[k]) for k in COLUMNS.split()) for line in lines]
 
 
 def _rows(ours: float, least: float, theirs: list[tuple[Any, ...]]) -> Iterator[Row]:

@@ -29,12 +29,11 @@ from finger3d.scene import Scene, parse
 
 from ._effect_scenes import scenes
 from ._press import changed
-from ._rows import Result, Row, at_least, columns, words, zero
+from ._rows import GOAL, Result, Row, at_least, columns, words, zero
 
 SEED = 68
 SECTIONS, LARGE_SECTIONS, SOLIDS = 12, 2, 2
 CLOSE, SHARE, BARS, LEAST = 0.05, 0.9, 2.0, 1e-3
-GOAL = "goal of this project"
 NAMES = (
     "normal_force_N", "friction_sum_N", "external_work_mJ", "contact_area_mm2", "stick_area_mm2", "gauge_a", "gauge_b",
 )  # fmt: skip

@@ -20,14 +20,13 @@ import numpy as np
 
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.model import Domain, Foils, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Foils, Leg
 
 from ._common import ticks_at
 from ._foil import alone, by_mesh, wing
-from ._press import fig9_finger, paper_gauges, under
+from ._press import fig9_model, paper_gauges, under
 from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
@@ -42,10 +41,8 @@ COLUMNS = "model length_mm mu free read share slope_free slope_read resolution_f
 
 def finger(domain: Domain, length: float, size: float, steps: int) -> Problem:
     """The finger with a pair of foils, mirror images of each other."""
-    gauges = paper_gauges(length, 38.0)
-    mesh, legs, law = MeshOptions(size, size, "swept"), (Leg(10.0, steps=steps),), Coulomb(0.25)
-    model = Model(fig9_finger(), Isotropic(1.0, NU), mesh, legs, friction=law, gauges=gauges, domain=domain)
-    return build(FOIL.apply(model))
+    legs, gauges = (Leg(10.0, steps=steps),), paper_gauges(length, 38.0)
+    return build(FOIL.apply(fig9_model(NU, size, size, domain, legs=legs, gauges=gauges, friction=Coulomb(0.25))))
 
 
 def strains(problem: Problem, mus: tuple[float, ...]) -> np.ndarray:

@@ -7,7 +7,7 @@ and a strain noise of 1.5e-4 makes an error of 0.1 in mu = 0.5.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,14 +18,13 @@ from finger3d.analyses.pressed_body import presses
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, Model
 
 from ._paper import STRAIN, STRESS, said
-from ._press import changed, fig9_finger, paper_gauges
+from ._press import fig9_model, paper_gauges
 from ._rows import Result, Row, at_least, at_most, columns, together
 
 NOISE, ERROR = 1.5e-4, 0.1
@@ -81,8 +80,7 @@ class Curve:
     @property
     def error(self) -> float:
         """Error of mu = 0.5 from the noise, by the change of the strain between the neighbours of 0.5."""
-        near = self.mu[self.mu < 0.5].max(), self.mu[self.mu > 0.5].min()
-        return float(NOISE * (near[1] - near[0]) / max(abs(self.at(near[1]) - self.at(near[0])), 1e-12))
+        return _local_error(self.mu, self.strain, 0.5)
 
     @property
     def by_slope(self) -> bool:
@@ -158,9 +156,8 @@ def _gauge(name: str, leaning: str, y: float, z: float, length: float = 0.0, sid
 
 def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> Model:
     size = (6.0 if quick else 2.5) if domain == "solid" else 3.0 if quick else 2.0 if large else 1.0
-    mesh = MeshOptions(size, 3.0 * size, "swept")
     legs = (Leg(10.0, steps=4 if quick else 10 if large else 80),)
-    model = Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, gauges=tuple(gauges), domain=domain)
+    model = fig9_model(nu, size, 3.0 * size, domain, legs=legs, gauges=tuple(gauges))
     return LargeDeformation().apply(model) if large else model
 
 
@@ -240,22 +237,15 @@ MUS_FOIL = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)
 
 def model(quick: bool) -> Model:
     """The finger with the gauge and its mirror image, in small strain."""
-    gauges = paper_gauges(4.0)
-    mesh = MeshOptions(5.0, 12.0, "swept") if quick else MeshOptions(2.0, 6.0, "swept")
-    legs = (Leg(10.0, steps=5 if quick else 10),)
-    return FOIL.apply(Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, friction=Coulomb(0.25), gauges=gauges))
+    sizes, legs = (5.0, 12.0) if quick else (2.0, 6.0), (Leg(10.0, steps=5 if quick else 10),)
+    return FOIL.apply(fig9_model(0.49, *sizes, legs=legs, friction=Coulomb(0.25), gauges=paper_gauges(4.0)))
 
 
 def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:
     """Free strain and that of the foil, and the normal force (N), for every mu."""
-    problem = build(model)
-    found: dict[str, list[float]] = {"free": [], "foil": [], "force": []}
-    for mu, frame in _pressed(problem, mus).items():
-        found["foil"].append(frame.gauges["g"])
-        found["free"].append(frame.gauges["g_free"])
-        state = changed(problem, friction=model.friction.with_mu(mu))
-        found["force"].append(-float(state.world_force(frame.meshed_state.contact)[:, 1].sum()))
-    return {key: np.array(values) for key, values in found.items()}
+    frames = _pressed(build(model), mus).values()
+    read = np.array([(f.gauges["g_free"], f.gauges["g"], f.state.force[:, 0].sum()) for f in frames])
+    return dict(zip(("free", "foil", "force"), read.T, strict=True))
 
 
 def _foil(quick: bool) -> Result:
@@ -301,10 +291,10 @@ def _error(mus: tuple[float, ...], strain: np.ndarray) -> float:
     return NOISE / abs(float(fit.deriv()(0.5)))
 
 
-def _local_error(mus: tuple[float, ...], strain: np.ndarray, mu: float) -> float:
+def _local_error(mus: Sequence[float] | Float, strain: Float, mu: float) -> float:
     """Noise over the difference quotient of the readings around mu."""
     k = min(max(int(np.searchsorted(mus, mu)), 1), len(mus) - 2)
-    return NOISE * (mus[k + 1] - mus[k - 1]) / abs(float(strain[k + 1] - strain[k - 1]))
+    return float(NOISE * (mus[k + 1] - mus[k - 1]) / max(abs(strain[k + 1] - strain[k - 1]), 1e-12))
 
 
 def _draw_foil(figure: Any, mus: tuple[float, ...], found: dict[str, dict[str, np.ndarray]]) -> None:

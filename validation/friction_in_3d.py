@@ -24,13 +24,12 @@ from finger3d.analyses.calibrate.tolerances import with_defaults
 from finger3d.analyses.gauge_places import GaugeFields, Region, search
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
-from finger3d.fem.laws.material import Isotropic
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.readings import Marker
 from finger3d.progress import QUIET
 from finger3d.sensor import Calibration
 
-from ._press import fig9_finger
+from ._press import fig9_model
 from ._rows import Result, Row, at_least, at_most, columns
 
 Domain = Literal["solid", "plane-strain"]
@@ -56,8 +55,7 @@ Spread = dict[tuple[Domain, str, str, str], Float]
 
 def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
     """Return the finger without readings."""
-    mesh, legs = MeshOptions(*sizes, "swept"), (Leg(10.0, steps=steps),)
-    found = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, legs, domain=domain)
+    found = fig9_model(0.49, *sizes, domain, legs=(Leg(10.0, steps=steps),))
     return LargeDeformation().apply(found) if large else found
 
 

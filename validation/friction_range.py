@@ -15,11 +15,8 @@ results are judged.
 
 from __future__ import annotations
 
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,10 +26,11 @@ from finger3d.analyses.calculix import press_deck
 from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.model import Leg, Model
 
-from ._ccx import printed_forces, program, solve
+from . import _ccx, _felupe
+from ._ccx import program, share_done
 from ._felupe import felupe_press, is_felupe_installed
 from ._hard_cases import DEPTH, MU, finger
-from ._rows import Result, Row, at_most, columns, committed
+from ._rows import Result, Row, at_most, columns, committed, committed_instead
 
 STIFFER = 100.0
 LIMIT_S = 900.0
@@ -50,31 +48,19 @@ def press(mu: float) -> Model:
     return replace(finger(2, 0.45, 4.0).model, friction=Coulomb(mu), legs=(Leg(DEPTH, steps=10),))
 
 
-def calculix_share(mu: float, stiffer: float) -> float:
-    """Share of the press that CalculiX has done when it ends."""
-    deck = replace(press_deck(press(mu)), fields=False)
-    contact = replace(deck.contact, stick=stiffer * deck.contact.stick)
-    with tempfile.TemporaryDirectory(prefix="finger3d_ccx_") as folder:
-        file = Path(folder) / "press.inp"
-        file.write_text(replace(deck, contact=contact).text(), encoding="ascii")
-        try:
-            solve(file, LIMIT_S)
-        except RuntimeError:
-            pass  # it gave up, which is what is measured: the forces printed so far say how far it came
-        times, _ = printed_forces(file.with_suffix(".dat"))
-    return float(times[-1]) if len(times) else 0.0
-
-
-def _felupe_share(mu: float, stiffer: float) -> float:
-    model = press(mu)
-    return felupe_press(model, press_deck(model).mesh, stiffer)[0]
-
-
 def run(quick: bool) -> Result:
     """Quick: the peers at one mu only, with their own stick slopes."""
+
+    def calculix(mu: float, stiffer: float) -> float:
+        return share_done(press(mu), LIMIT_S, stiffer)
+
+    def felupe(mu: float, stiffer: float) -> float:
+        model = press(mu)
+        return felupe_press(model, press_deck(model).mesh, stiffer)[0]
+
     theirs = [
-        _peer(quick, program() is not None, calculix_share, "calculix", "ccx (apt install calculix-ccx)"),
-        _peer(quick, is_felupe_installed(), _felupe_share, "felupe", "FElupe (pip install felupe)"),
+        _peer(quick, program() is not None, calculix, "calculix", "ccx", _ccx.INSTALL),
+        _peer(quick, is_felupe_installed(), felupe, "felupe", "FElupe", _felupe.INSTALL),
     ]
     lines = [(*_counted(mu), *(x for shares in theirs for x in shares.get(mu, (np.nan, np.nan)))) for mu in MU]
     table = columns(COLUMNS, lines)
@@ -83,33 +69,32 @@ def run(quick: bool) -> Result:
 
 
 def _counted(mu: float) -> tuple[float, int, int, int]:
-    chosen = [line for line in committed("hard_cases") if float(line["mu"]) == mu]
-    increments, settled, paper = (sum(int(x[k]) for x in chosen) for k in ("increments", "settled", "paper_settled"))
+    chosen = [line for line in committed("hard_cases") if line["mu"] == mu]
+    increments, settled, paper = (sum(x[k] for x in chosen) for k in ("increments", "settled", "paper_settled"))
     return mu, increments, settled, paper
 
 
 def _peer(
-    quick: bool, installed: bool, share: Callable[[float, float], float], name: str, program: str
+    quick: bool, installed: bool, share: Callable[[float, float], float], name: str, program: str, install: str
 ) -> dict[float, tuple[float, float]]:
     """Shares of the press that a peer does, by mu, with its own stick slope and the stiffer one."""
     if installed and quick:
         return {0.25: (share(0.25, 1.0), np.nan)}
     if installed:
         return {mu: (share(mu, 1.0), share(mu, STIFFER)) for mu in MU}
-    lines = committed("friction_range")
-    print(f"friction_range: {program} is not installed; its committed results stay", file=sys.stderr)
-    return {float(x["mu"]): (float(x[f"{name}_share"]), float(x[f"{name}_stiff_share"])) for x in lines}
+    lines = committed_instead("friction_range", program, install)
+    return {x["mu"]: (x[f"{name}_share"], x[f"{name}_stiff_share"]) for x in lines}
 
 
 def _creeps() -> dict[str, float]:
     """Creep in a minute, mm, by program and setting."""
     lines = committed("creep_of_a_hold")
-    found = {"finger3d": float(next(x["creep_mm_per_min"] for x in lines if x["program"] == "finger3d"))}
+    found = {"finger3d": next(x["creep_mm_per_min"] for x in lines if x["program"] == "finger3d")}
     keys = ("pad_kg", "time_step_ms", "impratio", "noslip_iterations")
     for name, (pads, impratio, noslip) in SHOWN.items():
         wanted = (1.0, 2.0, impratio, noslip)
-        match = (x for x in lines if x["pads"] == pads and tuple(float(x[k]) for k in keys) == wanted)
-        found[name] = abs(float(next(match)["creep_mm_per_min"]))
+        match = (x for x in lines if x["pads"] == pads and tuple(x[k] for k in keys) == wanted)
+        found[name] = abs(next(match)["creep_mm_per_min"])
     return found
 
 

@@ -15,7 +15,6 @@ and the soft ball with Hertz's solution for both moduli and both radii (1.3).  F
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,12 +28,11 @@ from finger3d.mechanics.march.solve import march
 from finger3d.scene import load
 
 from . import _layer
-from ._press import changed
+from ._press import GEOMETRIES, changed
 from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
 
-SCENES = Path(__file__).resolve().parents[1] / "geometries"
 SCATTER = "pytetwild's meshes differ from run to run"
 RIM = "first order at the sharp rim: swept meshes of 0.12 to 0.28 mm differ by 1.3 %"
 SIZES = {"edge": 0.2, "gear": 0.2, "coin_rim": 0.2, "wavy_plate": 0.3, "ball": 0.2, "soft_ball": 0.25}
@@ -47,7 +45,7 @@ EQUAL = (0.9, 0.95, 1.0, 1.05, 1.1)
 
 def pressed(name: str, *overrides: str) -> tuple[Problem, list[Any]]:
     """A scene, some keys changed: the condensed problem, and the frames of its press."""
-    problem = build(load(SCENES / f"{name}.toml", list(overrides)).model())
+    problem = build(load(GEOMETRIES / f"{name}.toml", list(overrides)).model())
     return problem, _marched(problem)
 
 

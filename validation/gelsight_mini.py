@@ -23,7 +23,9 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.identify.run import identify
 from finger3d.analyses.press import press
+from finger3d.io import write_csv
 
+from ._press import block_tables
 from ._rows import Result, Row, columns, listed
 
 judged = listed(__file__)
@@ -71,15 +73,11 @@ class Model:
 
 def scene(law: str, mu: float, nu: float, size: float, E_MPa: float = 0.4) -> dict[str, Any]:
     """The ball on the block."""
-    return {
-        "finger": {"geometry": "block", "half_length_mm": 10.375, "height_mm": 4.0, "width_mm": 25.25},
-        "material": {"E_MPa": E_MPa, "nu": nu},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": min(2.0 * size, 4.0)},
-        "object": {"shape": "sphere", "radius_mm": 7.5},
-        "friction": {"mu": mu},
-        "press": {"depth_mm": 2.4, "steps": 12},
-        "effects": {"large_deformation": LAWS[law]},
-    }
+    return block_tables(
+        (10.375, 4.0, 25.25), E_MPa, nu, (size, min(2.0 * size, 4.0)), friction={"mu": mu},
+        object={"shape": "sphere", "radius_mm": 7.5}, press={"depth_mm": 2.4, "steps": 12},
+        effects={"large_deformation": LAWS[law]},
+    )  # fmt: skip
 
 
 def run(quick: bool) -> Result:
@@ -102,8 +100,8 @@ def _identified(law: str, mu: float, nu: float, size: float, folder: Path) -> Mo
     for count in (4, 3):
         out = folder / f"{law} {mu} {nu} {count}"
         out.mkdir(parents=True)
-        rows = [f"{d},{f},{SHARE * f}" for d, f in zip(DEPTHS[:count], FORCES[:count], strict=True)]
-        (out / "bench.csv").write_text("\n".join(["depth_mm,normal_force_N,normal_force_N_std", *rows]) + "\n")
+        table = {"depth_mm": DEPTHS, "normal_force_N": FORCES, "normal_force_N_std": SHARE * FORCES}
+        write_csv(out / "bench.csv", {name: values[:count] for name, values in table.items()})
         found[count] = identify(scene(law, mu, nu, size), out / "bench.csv", FREE, out)
     modulus, zero = found[4].fitted.values
     curve, values = found[3].curve, found[3].fitted.values

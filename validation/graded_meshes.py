@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import curve_fit
 
 import finger3d
 from finger3d.accuracy.estimate import discretisation, press_numbers
@@ -28,12 +28,13 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, MeshOptions, Model
 
+from ._cost_figure import series
 from ._rows import Result, Row, columns, committed, listed
 
 judged = listed(__file__)
 
 FIG9 = Path(__file__).parents[1] / "geometries" / "fig9.toml"
-STEPS, ROUNDING = 10, 1e-9
+STEPS = 10
 GAUGE = "gauge_g36"
 TOLERANCES = {("plane-strain", GOAL): (1e-2, 3e-3, 1e-3, 3e-4), ("solid", GOAL): (5e-3, 2e-3, 1.5e-3)}
 TOLERANCES |= {("plane-strain", GAUGE): (3e-2, 1e-2, 4e-3), ("solid", GAUGE): (3e-2, 1.5e-2, 1e-2)}
@@ -108,30 +109,22 @@ def _value(problem: Problem, goal: str) -> float:
 
 def _uniform(domain: str, goal: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return edge lengths, unknowns and values of the mixed elements of cost_of_accuracy, coarse to fine."""
-    body = "section" if domain == "plane-strain" else "solid"
-    rows = [
-        row
-        for row in committed("cost_of_accuracy")
-        if (row["kind"], row["body"], row["element"], row["mesher"]) == ("run", body, "mixed", "swept")
-        and (row["solver"], row["way"], row["steps"]) == ("pardiso", "condensed", str(STEPS))
-        and abs(float(row["base_size_mm"]) / float(row["size_mm"]) - 4.0) < ROUNDING
-    ]
-    unique = {float(row["size_mm"]): row for row in rows}
-    sizes = np.array(sorted(unique, reverse=True))
-    chosen = [unique[size] for size in sizes]
-    return sizes, np.array([int(r["dofs"]) for r in chosen]), np.array([float(r[COLUMN[goal]]) for r in chosen])
+    runs = [line for line in committed("cost_of_accuracy") if line["kind"] == "run"]
+    chosen = series(runs, "section" if domain == "plane-strain" else "solid")
+    sizes, dofs, values = (np.array([run[key] for run in chosen]) for key in ("size_mm", "dofs", COLUMN[goal]))
+    return sizes, dofs, values
 
 
 def _extrapolated(sizes: np.ndarray, values: np.ndarray) -> float:
     """Return the limit x of ``x + c h^p`` fitted to values, with an order between 1 and 4."""
     scale = abs(values[-1])
 
-    def misfit(unknowns: np.ndarray) -> np.ndarray:
-        limit, factor, order = unknowns
-        return np.asarray(limit + factor * (sizes / sizes[0]) ** order - values / scale)
+    def value(size: np.ndarray, limit: float, factor: float, order: float) -> np.ndarray:
+        return limit + factor * size**order
 
     start = [values[-1] / scale, (values[0] - values[-1]) / scale, 1.5]
-    return float(least_squares(misfit, start, bounds=([-np.inf, -np.inf, 1.0], [np.inf, np.inf, 4.0])).x[0] * scale)
+    bounds = [-np.inf, -np.inf, 1.0], [np.inf, np.inf, 4.0]
+    return float(curve_fit(value, sizes / sizes[0], values / scale, start, bounds=bounds)[0][0] * scale)
 
 
 def _rows(found: list[Mesh]) -> Iterator[Row]:

@@ -34,16 +34,15 @@ from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.contact.friction import Coulomb
 from finger3d.errors import Outcome
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, largest_force, measure
 from finger3d.mechanics.march.solve import march
-from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Gauge, Leg, Model
 from finger3d.sensor import Calibration, Estimate, estimate
 
 from ._exact_path import exact_press
-from ._press import changed, fig9_finger
+from ._press import changed, fig9_model
 from ._rows import Result, Row, columns, listed
 
 judged = listed(__file__)
@@ -84,8 +83,7 @@ class Lift(NamedTuple):
 def model(domain: Domain, size: float) -> Model:
     """The finger of docs/tutorials/hold.py."""
     gauges = (Gauge("g36", 36.0, 40.0, 0.0, math.radians(30.0)),)
-    mesh = MeshOptions(size, 4.0 * size, "swept")
-    return Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(DEPTH),), gauges=gauges, domain=domain)
+    return fig9_model(0.49, size, 4.0 * size, domain, gauges=gauges)
 
 
 def held(domain: Domain, size: float) -> Problem:

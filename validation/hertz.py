@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.fem.laws.material import Elasticity, Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -36,8 +36,10 @@ from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, Sphere
 
-from ._common import body, contact_axis, convergence, distance, ellipse, graded, quarter_block, rate
+from ._common import contact_axis, convergence, ellipse, ellipse_error, graded, quarter_block, rate
+from ._halfplane import CANDIDATES, on_block
 from ._layer import line, point
+from ._press import converged
 from ._rows import Result, Row, exact_columns, rms, together, zero
 
 RADIUS = 1000.0  # a = 1: the circle is a parabola to 1e-6
@@ -71,10 +73,9 @@ def contact(x: Float, p: Float, force: float, modulus: float) -> Contact:
     p0 = 2.0 * force / (np.pi * a)
     half_width, peak = ellipse(x, p, 0.9 * a)
     fine = np.linspace(0.0, 1.3 * a, 8001)
-    hertz = p0 * np.sqrt(np.maximum(0.0, 1.0 - (fine / a) ** 2))
     drawn = np.interp(fine, x, p)
     moment = 2.0 * np.sqrt(np.sum(drawn * fine**2) / np.sum(drawn)) / a
-    return Contact(half_width / a, float(moment), peak / p0, distance(drawn, hertz))
+    return Contact(half_width / a, float(moment), peak / p0, ellipse_error(x, p, a, p0))
 
 
 def press(
@@ -82,13 +83,10 @@ def press(
 ) -> tuple[Problem, list[StepResult]]:
     """Press to 20 depths with half-widths near 0.7 to 1; `count` points to a."""
     depths = [line(v / height, nu).depth * v**2 / RADIUS for v in np.linspace(0.7, 1.0, 20)]
-    block = designs()["block"](half_length_mm=height, height_mm=height, width_mm=width)
-    mesh = MeshOptions(1.0 / count, 0.25 * height, "swept")
-    legs = tuple(Leg(d, steps=1) for d in depths)
-    held = domain == "solid"
-    model = Model(block, Isotropic(1.0, nu), mesh, legs, Cylinder(radius_mm=RADIUS), domain=domain, held_ends=held)
+    legs, bar = tuple(Leg(d, steps=1) for d in depths), Cylinder(radius_mm=RADIUS)
+    more = {"width": width, "domain": domain, "held_ends": domain == "solid"}
     # points that the rigid cylinder overlaps by 0.2 of the depth reach to 2 a here, far beyond the contact
-    problem = build(model, margin=-0.2)
+    problem = build(on_block(bar, Isotropic(1.0, nu), count, legs, height, **more), margin=CANDIDATES)
     return problem, list(march(problem))
 
 
@@ -201,8 +199,7 @@ def force_at(a: float, nu: float) -> float:
 
 def measured_sphere(nu: float, count: int) -> Float:
     """Per depth: P/P_Hertz(a) by the moment, and the pressure's L2 error at the points over Hertz's own norm."""
-    mesh, held = quarter_block(contact_axis(1.0, count, HEIGHT), graded(HEIGHT, 1.0 / count, 1.6))
-    block = body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < 1.3)
+    block = quarter_block(contact_axis(1.0, count, HEIGHT), graded(HEIGHT, 1.0 / count, 1.6), nu, 1.3)
     square = block.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
     place = (block.surface.points[:, [0, 2]] ** 2).sum(axis=1)
     found = []
@@ -227,8 +224,8 @@ def own_path(nu: float, count: int) -> float:
     samples = problem.surface.samples
     square = (problem.surface.average @ (samples[:, 0] ** 2 + samples[:, 2] ** 2))[problem.symmetry.image_of]
     ratios = []
-    for frame in march(problem):
-        f = frame.state.force[:, 0] if frame.outcome.ok else np.full(len(square), np.nan)
+    for frame in converged(problem):
+        f = frame.state.force[:, 0]
         ratios.append(f.sum() / force_at(float(np.sqrt(2.5 * (f @ square) / f.sum())), nu))
     return float(np.mean(ratios))
 

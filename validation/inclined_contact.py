@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from finger3d._types import Float
 from finger3d.fem.laws.material import Isotropic
@@ -23,7 +24,7 @@ from finger3d.objects import Cylinder, MeshObject, RigidObject, Sphere
 
 from ._press import converged
 from ._rows import Result, exact_columns, grouped, listed, together
-from .triangulated_objects import box
+from .triangulated_objects import box, of_trimesh
 
 judged = listed(__file__)
 
@@ -108,13 +109,8 @@ def groove(left: float, right: float, reach: float = 12.0, half_width: float = 2
     """A block with a V-groove along z below, its flanks inclined by so many degrees to the vertical."""
     a, b = (reach * np.array([s * math.tan(math.radians(v)), -1.0]) for s, v in ((-1.0, left), (1.0, right)))
     outline = np.array([[0.0, 0.0], a, [a[0] - 2.0, a[1]], [a[0] - 2.0, 4.0], [b[0] + 2.0, 4.0], [b[0] + 2.0, b[1]], b])
-    caps = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [0, 5, 6]])
-    points = np.vstack([np.insert(outline, 2, s * half_width, axis=1) for s in (-1.0, 1.0)])
-    n = len(outline)
-    here, after = np.arange(n), (np.arange(n) + 1) % n
-    sides = [np.stack([here, after, after + n], axis=1), np.stack([here, after + n, here + n], axis=1)]
-    found = Triangles(points, np.vstack([caps[:, ::-1], caps + n, *sides]))
-    return found if found.volume > 0.0 else Triangles(found.points, found.faces[:, ::-1])
+    fan = [[0, k, k + 1] for k in range(1, len(outline) - 1)]
+    return of_trimesh(trimesh.creation.extrude_triangulation(outline, fan, 2.0 * half_width), (0.0, 0.0, -half_width))
 
 
 def normals_of(angles: tuple[float, float]) -> Float:

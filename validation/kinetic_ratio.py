@@ -21,8 +21,9 @@ import numpy as np
 from finger3d.contact.friction import FrictionLaw, TwoCoefficients
 from finger3d.mechanics.discretise.problem import Problem
 
+from . import _halfplane
 from ._common import ticks_at
-from ._halfplane import compliance, line, loading, under
+from ._halfplane import line, loading, under
 from ._increments import PlainCoulomb
 from ._rows import Kind, Result, Row, at_least, exact_columns
 
@@ -36,10 +37,8 @@ Key = tuple[str, float, int, int]
 def numbers(problem: Problem, law: FrictionLaw, count: int) -> np.ndarray:
     """int q/P and c/a as means over the second half of the increments, D/(A P^2), and the most iterations."""
     found = under(problem, law, loading(count))
-    half, last = found[count // 2 :], found[-1]
-    share, lost = sum(p.outward for p in half) / sum(p.force for p in half), last.frame.dissipation_mJ / last.force**2
-    stuck, most = np.mean([p.c / p.a for p in half]), max(p.frame.iterations for p in found)
-    return np.array([share, lost / compliance(NU), stuck, most])
+    _, share, stuck, lost = _halfplane.numbers(found, _halfplane.compliance(NU))
+    return np.array([share, lost, stuck, max(p.frame.iterations for p in found)])
 
 
 def run(quick: bool) -> Result:

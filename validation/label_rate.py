@@ -24,11 +24,12 @@ import numpy as np
 from finger3d._machine import cores
 from finger3d._types import Float
 from finger3d.analyses.sweep.run import sweep
+from finger3d.io import write_csv
 
-from ._rows import Result, Row, at_most, columns
+from ._press import block_tables
+from ._rows import GOAL, Result, Row, at_most, columns
 
 BY_NAME = True
-GOAL = "goal of this project"
 HOURS, SAMPLES, ERROR = 10.0, 1e5, 0.03
 FINER, ORDER, FEW = 0.5, 1.2, 16
 SAMPLES_EACH, ALONE = 667, 334
@@ -75,8 +76,7 @@ class Swept(NamedTuple):
     def pressed(self, count: int, finer: float, folder: Path) -> Mapping[str, Sequence[Any]]:
         """Return the table of the first samples, pressed again on edges that are longer by a factor."""
         points, count = folder / "points.csv", min(count, self.samples)
-        lines = [",".join(repr(float(self.numbers[key][k])) for key in self.ranges) for k in range(count)]
-        points.write_text("\n".join([",".join(self.ranges), *lines]) + "\n", encoding="utf-8")
+        write_csv(points, {key: self.numbers[key][:count] for key in self.ranges})
         out = folder / f"{self.name} {self.large} {finer}"
         return sweep(scene(self.name, finer * self.size_mm, self.large), points, out).columns
 
@@ -94,16 +94,12 @@ class Swept(NamedTuple):
 
 def scene(name: str, size: float, large: bool) -> dict[str, Any]:
     """The pad under an object."""
-    return {
-        "finger": {"geometry": "block", "half_length_mm": 10.0, "height_mm": 4.0, "width_mm": 16.0},
-        "material": {"E_MPa": 0.1, "nu": 0.49},
-        "object": {**OBJECTS[name][0], "x_mm": 0.0, "z_mm": 0.0},
-        "friction": {"mu": 0.5},
-        "press": {"leg": [{"depth_mm": 0.5, "steps": 4}, {"depth_mm": 0.5, "slide_x_mm": 0.1, "steps": 4}]},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": 1.5 * size},
-        "labels": {"grid_mm": 0.5},
-        "effects": {"auto": False, **({"large_deformation": {}} if large else {})},
-    }
+    legs = [{"depth_mm": 0.5, "steps": 4}, {"depth_mm": 0.5, "slide_x_mm": 0.1, "steps": 4}]
+    return block_tables(
+        (10.0, 4.0, 16.0), 0.1, 0.49, (size, 1.5 * size), object={**OBJECTS[name][0], "x_mm": 0.0, "z_mm": 0.0},
+        friction={"mu": 0.5}, press={"leg": legs}, labels={"grid_mm": 0.5},
+        effects={"auto": False, **({"large_deformation": {}} if large else {})},
+    )  # fmt: skip
 
 
 def run(quick: bool) -> Result:

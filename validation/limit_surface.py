@@ -23,14 +23,13 @@ import numpy as np
 from scipy.integrate import dblquad
 
 from finger3d.contact.friction import STICK, Coulomb
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import StepResult, measure
-from finger3d.mechanics.model import Leg, MeshOptions, Model
+from finger3d.mechanics.model import Leg, Model
 from finger3d.objects import Plane
 
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_finger, fig9_model
 from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -73,7 +72,7 @@ class Sliding:
 def model(width: float, size: float) -> Model:
     """The finger of Fig. 9 with another width."""
     legs = (Leg(DEPTH, steps=4), Leg(DEPTH, slide_x_mm=5.0, slide_z_mm=5.0, turn_y=1.0))
-    return Model(fig9_finger(width), Isotropic(E, NU), MeshOptions(size, 10.0, "swept"), legs, friction=Coulomb(MU))
+    return fig9_model(NU, size, 10.0, design=fig9_finger(width), legs=legs, friction=Coulomb(MU))
 
 
 def centres(problem: Problem, width: float, across: tuple[float, ...]) -> list[float]:
@@ -92,9 +91,14 @@ def slid(problem: Problem, centre: float, steps: int) -> Sliding:
     turn = WAY / math.hypot(centre, radius) if math.isfinite(centre) else 0.0
     path = [Leg(DEPTH, WAY, steps=steps)]
     if turn:
-        angles = [turn * k / steps for k in range(1, steps + 1)]
-        path = [Leg(DEPTH, centre * math.sin(t), centre * (math.cos(t) - 1.0), turn_y=t, steps=1) for t in angles]
+        path = about(centre, turn, steps)
     return _sliding(problem, centre, _last(problem, (Leg(DEPTH, steps=4), *path)), turn / steps)
+
+
+def about(centre: float, turn: float, steps: int) -> list[Leg]:
+    """Legs of a turn (rad) of the plane about the point x = 0, z = -`centre`."""
+    angles = [turn * k / steps for k in range(1, steps + 1)]
+    return [Leg(DEPTH, centre * math.sin(t), centre * (math.cos(t) - 1.0), turn_y=t, steps=1) for t in angles]
 
 
 def _last(problem: Problem, legs: tuple[Leg, ...], plane: Plane | None = None) -> StepResult:
@@ -197,10 +201,8 @@ def _rows(found: list[Sliding], width: float, size: float) -> list[Row]:
 def _beside(problem: Problem, centre: float) -> list[Row]:
     """Turn a plane whose axis of turning is the centre, and a plane that slides and turns about the press axis."""
     steps, turn = 10, 0.5
-    angles = [turn * k / steps for k in range(1, steps + 1)]
-    both = [Leg(DEPTH, centre * math.sin(t), centre * (math.cos(t) - 1.0), turn_y=t, steps=1) for t in angles]
     press = Leg(DEPTH, steps=4)
-    one = measure(problem.points, _last(problem, (press, *both)))
+    one = measure(problem.points, _last(problem, (press, *about(centre, turn, steps))))
     other = measure(problem.points, _last(problem, (press, Leg(DEPTH, turn_y=turn, steps=steps)), Plane(z_mm=-centre)))
     names = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm", "moment_z_Nmm")
     away = max(abs(one[name] - other[name]) / max(abs(one[name]), one["normal_force_N"]) for name in names)

@@ -21,14 +21,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from finger3d.contact.friction import Coulomb
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg
 from finger3d.objects import Cylinder, Plane, RigidObject
 
-from ._press import converged, fig9_finger
+from ._press import converged, fig9_model
 from ._rows import Result, Row, listed
 
 judged = listed(__file__)
@@ -40,11 +39,8 @@ GAUGE = Gauge("g36", 36.0, 40.0, 0.0, np.deg2rad(30.0))
 
 def finger(obj: RigidObject, size: float, solid: bool = False) -> Problem:
     """The Fig. 9 finger under an object, deep enough for the force on any of them."""
-    model = Model(
-        fig9_finger(), Isotropic(1.0, 0.49), MeshOptions(size, 4.0 * size, "swept"), (Leg(14.0, steps=1),), object=obj,
-        gauges=(GAUGE,), domain="solid" if solid else "plane-strain",
-    )  # fmt: skip
-    return build(model)
+    domain, legs = "solid" if solid else "plane-strain", (Leg(14.0, steps=1),)
+    return build(fig9_model(0.49, size, 4.0 * size, domain, legs=legs, object=obj, gauges=(GAUGE,)))
 
 
 def at_force(problem: Problem, mu: float, steps: int) -> tuple[float, float, float]:

@@ -103,8 +103,7 @@ def run(quick: bool) -> Result:
             frame = under(fine, mu)[-1]
             profile = Profile.of(fine, frame)
             found[plane, nu, mu, "fine"] = (profile, strains(frame, len(x))[2])
-            friction = float(np.abs(profile.q) @ profile.area)
-            lines.append((plane, nu, mu, "fine", profile.force, profile.a, profile.c, friction, 0, 0.0))
+            lines.append((plane, nu, mu, "fine", profile.force, profile.a, profile.c, profile.friction, 0, 0.0))
             for rule in RULES:
                 steps = body.press(mu, rule)
                 found[plane, nu, mu, rule] = (body, steps)
@@ -137,7 +136,7 @@ def _statements(plane: str, nu: float, x: np.ndarray, found: dict[Any, Any]) -> 
     return [
         said("coarse-force", force, wanted=fine.force, against=against),
         said("coarse-stick", c, wanted=fine.c, tolerance=spacing, against=against),
-        said("coarse-friction", friction, wanted=np.abs(fine.q) @ fine.area, against=against),
+        said("coarse-friction", friction, wanted=fine.friction, against=against),
         said("coarse-shear", np.abs(coarse - shear).max() / np.abs(shear).max(), against=against),
         said("swaps-unique", unsettled, here=here),
         said("swaps-as-projection", friction, wanted=float(np.abs(best.force[:, 1]).sum()), here=here),

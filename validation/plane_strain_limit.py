@@ -22,12 +22,11 @@ from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._common import convergence, rate
 from ._corner import clamped_free, extrapolated
-from ._press import fig9_finger
+from ._press import converged, fig9_finger
 from ._rows import Result, Row, exact_columns, zero
 
 STEPS = 5
@@ -39,10 +38,7 @@ def press(size: float, nu: float, mesher: str = "swept", **changes: Any) -> list
     """Numbers of every increment."""
     mesh, legs = MeshOptions(size, 2.0 * size, mesher), (Leg(10.0, steps=STEPS),)
     problem = build(Model(fig9_finger(), Isotropic(1.0, nu), mesh, legs, friction=Coulomb(0.25), **changes))
-    frames = list(march(problem))
-    if len(frames) < STEPS or not frames[-1].outcome.ok:
-        return [{"normal_force_N": np.nan, "friction_sum_N": np.nan}] * STEPS
-    return [measure(problem.points, frame) for frame in frames]
+    return [measure(problem.points, frame) for frame in converged(problem)]
 
 
 def forces(size: float, nu: float, **changes: Any) -> Float:

@@ -12,9 +12,9 @@ import numpy as np
 
 from finger3d.contact.friction import SLIP
 
-from . import _halfspace, _rings
+from . import _halfplane, _halfspace, _rings
 from ._common import ticks_at
-from ._halfplane import RADIUS, Profile, compliance, hertz, line, loading, under
+from ._halfplane import RADIUS, Profile, compliance, line, loading, under
 from ._increments import PlainCoulomb
 from ._rows import Result, Row, exact_columns, listed, together
 
@@ -54,13 +54,9 @@ def numbers(profiles: list[Profile], nu: float) -> np.ndarray:
 
     The first, second and fourth are means over the second half of a self-similar loading, D is at its end.
     """
-    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
-    force = sum(p.force for p in half)
-    last = profiles[-1]
-    stuck = not (last.status == SLIP).any()
-    lost = np.array([end_force_loss(profiles), last.frame.dissipation_mJ]) / (compliance(nu) * last.force**2)
-    ratios = force / sum(hertz(nu, p.reach if stuck else p.a) for p in half), sum(p.outward for p in half) / force
-    return np.array([*ratios, lost[0], np.mean([p.c / p.a for p in half]), lost[1]])
+    last, soft = profiles[-1], compliance(nu)
+    force, outward, stick, lost = _halfplane.numbers(profiles, soft, by_reach=not (last.status == SLIP).any())
+    return np.array([force, outward, end_force_loss(profiles) / (soft * last.force**2), stick, lost])
 
 
 def _line(quick: bool) -> Result:
@@ -110,7 +106,7 @@ def _line(quick: bool) -> Result:
         rows += _few_rows(nu, at, c_own, finest, most)
         if nu == 0.3:
             rows += _step_rows(plain, c_last, finest, counts)
-            rows.append(_curve_row(curves[nu]))
+            rows.append(judged("q-x-largest-deviation-over-its", _off_curve(curves[nu])))
     columns = exact_columns(COLUMNS_LINE, table)
     return Result(tuple(rows), columns, lambda figure: _draw_line(figure, curves[0.3], columns, finest, most))
 
@@ -168,10 +164,10 @@ def _step_rows(at: dict[Any, np.ndarray], c_last: dict[Any, float], finest: int,
     yield judged("rate-at-which-the-error", float(np.log10(errors[0] / errors[1])))
 
 
-def _curve_row(profile: Profile) -> Row:
+def _off_curve(profile: Profile) -> float:
+    """Largest deviation of q(x) from the integral equations', over its peak."""
     got = _normalised(profile, np.linspace(0.0, 1.0, 11))
-    worst = float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
-    return judged("q-x-largest-deviation-over-its", worst)
+    return float(np.abs(got - CURVE)[:-1].max() / CURVE.max())
 
 
 def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
@@ -181,7 +177,7 @@ def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
 
 def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], finest: int, most: int) -> None:
     left, middle, right = figure.subplots(1, 3)
-    figure.suptitle(_title(profile))
+    figure.suptitle(f"nu = .3, mu = .25: error of friction {100 * _off_curve(profile):.1f} %")
     here = np.abs(profile.x) <= profile.a
     left.plot(profile.x[here] / profile.a, profile.q[here] * compliance(0.3) * RADIUS / profile.a, label="finger3d")
     left.plot(np.linspace(0, 1, 11), CURVE, "k--", label="integral equations")
@@ -215,11 +211,6 @@ def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], f
     right.axhline(1e4 * INTEGRALS_LINE[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
     right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="nu = .3, mu = .25")
     right.legend(fontsize=7)
-
-
-def _title(profile: Profile) -> str:
-    got = _normalised(profile, np.linspace(0.0, 1.0, 11))
-    return f"nu = .3, mu = .25: error of friction {100 * np.abs(got - CURVE)[:-1].max() / CURVE.max():.1f} %"
 
 
 C_OVER_A_SPHERE = {

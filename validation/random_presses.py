@@ -34,7 +34,7 @@ from finger3d.errors import Finger3dError
 from finger3d.scene import parse
 
 from ._effect_scenes import COIN, log_uniform, objects
-from ._rows import Result, Row, at_most, exact_columns
+from ._rows import GOAL, Result, Row, at_most, exact_columns
 
 SCENES, SCENES_QUICK = 60, 2
 LIMIT_S = 240.0
@@ -43,8 +43,6 @@ LIMIT_S = 240.0
 RESIDUAL, FORCE, DEEP = 1e-8, 1e-6, 0.02
 """Limits of the contract of a press: residual, relative error of a prescribed force; depth of a place of the surface
 inside the object, over that of the press, above which it is told."""
-
-GOAL = "goal of this project"
 
 _EXITS = {0: "converged", 2: "refused", 3: "ended"}
 _MARKERS = {"converged": "o", "ended": "s", "refused": "^", "not ended": "x"}

@@ -19,13 +19,12 @@ import numpy as np
 
 from finger3d.analyses.calibrate import TOLERANCES
 from finger3d.analyses.calibrate.run import calibrated
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Gauge, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Gauge, Leg, Model
 from finger3d.mechanics.readings import Taxel
 from finger3d.sensor import Estimate, estimate
 
-from ._press import changed, converged, fig9_finger
+from ._press import changed, converged, fig9_model
 from ._rows import Result, Row, at_least, at_most, columns, rms
 
 Domain = Literal["solid", "plane-strain"]
@@ -67,9 +66,8 @@ def model(domain: Domain, size: float, steps: int) -> Model:
     gauges = tuple(
         Gauge(name, x, y, angle=math.radians(a)) for name, (x, y, a) in zip("ab", GAUGES[domain], strict=True)
     )
-    mesh, legs = MeshOptions(size, 4.0 * size, "swept"), (Leg(DEPTH_MM, steps=steps),)
-    taxels = (Taxel("t", 25.0, 0.0, 6.0, 6.0),)
-    return Model(fig9_finger(), Isotropic(1.0, 0.45), mesh, legs, gauges=gauges, taxels=taxels, domain=domain)
+    legs, taxels = (Leg(DEPTH_MM, steps=steps),), (Taxel("t", 25.0, 0.0, 6.0, 6.0),)
+    return fig9_model(0.45, size, 4.0 * size, domain, legs=legs, gauges=gauges, taxels=taxels)
 
 
 def run(quick: bool) -> Result:

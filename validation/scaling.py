@@ -20,13 +20,12 @@ import numpy as np
 from finger3d._machine import cores
 
 from ._child import Bench, available_gb, best_of
-from ._rows import Result, Row, at_least, at_most, of_records
+from ._rows import GOAL, Result, Row, at_least, at_most, of_records
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]
 
 BY_NAME = True
-GOAL = "goal of this project"
 LIMITS_MB = {40_000: 2_000.0, 160_000: 5_000.0, 1_000_000: 20_000.0}
 CONTACT_LIMIT = 10_000, 180.0  # rows, and seconds of ten increments
 UNKNOWNS = (Size(2.4, 9.6), Size(1.25, 5.0), Size(0.95, 3.8), Size(0.73, 2.92), Size(0.95, 1.25), Size(0.95, 0.98),

@@ -28,6 +28,7 @@ import numpy as np
 from finger3d._types import Float
 from finger3d.analyses.press import press
 
+from ._press import block_tables
 from ._rows import Result, Row, Settled, at_most, columns, settled, zero
 
 CONE = "friction cone, as in Higuera et al. 2024; REFERENCES.md, 3.6"
@@ -86,13 +87,8 @@ class Slide:
 
 def ball(radius_mm: float, size_mm: float, half_length_mm: float, **effects: Any) -> dict[str, Any]:
     """Return the tables of a ball on the gel pad."""
-    return {
-        "finger": {"geometry": "block", "half_length_mm": half_length_mm, "height_mm": 4.0, "width_mm": 16.0},
-        "material": {"E_MPa": 0.1, "nu": 0.49},
-        "object": {"shape": "sphere", "radius_mm": radius_mm},
-        "mesh": {"mesher": "swept", "size_mm": size_mm, "base_size_mm": 2.0},
-        "effects": effects or {"auto": False},
-    }
+    more = {"object": {"shape": "sphere", "radius_mm": radius_mm}, "effects": effects or {"auto": False}}
+    return block_tables((half_length_mm, 4.0, 16.0), 0.1, 0.49, (size_mm, 2.0), **more)
 
 
 def fingertip(size_mm: float) -> dict[str, Any]:
@@ -154,9 +150,7 @@ def run(quick: bool) -> Result:
 
 
 def _lines(one: Slide) -> Iterator[tuple[Any, ...]]:
-    keys = (*NAMES, "normal_force_N", "tangential_force_N")
-    order = (*keys[:3], *keys[4:], "cone")
-    for slide, *values in zip(one.slide_mm.tolist(), *(one.numbers[key].tolist() for key in order), strict=True):
+    for slide, *values in zip(one.slide_mm.tolist(), *(v.tolist() for v in one.numbers.values()), strict=True):
         yield one.name, slide, one.gross_mm, *values
 
 

@@ -17,17 +17,15 @@ the base count as well, so that the refined solid is also meshed with edges twic
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from finger3d._types import Float
-from finger3d.contact.friction import Coulomb
+from finger3d.analyses.pressed_body import presses
 from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Domain, Gauge, Leg, MeshOptions, Model
 
 from ._press import fig9_finger
@@ -91,12 +89,8 @@ def curve(case: str, refinement: float, size: float, steps: int) -> Curve:
     gauge = Gauge("g", 36.0, 40.0, angle=math.radians(30.0))
     model = Model(fig9_finger(), Isotropic(1.0, 0.49), mesh, (Leg(10.0, steps=steps),), gauges=(gauge,), domain=domain)
     problem = build(model)
-    strain = []
-    near: Sequence[Float] = ()
-    for mu in ENDS:
-        frames = list(march(replace(problem, model=replace(model, friction=Coulomb(float(mu)))), near))
-        strain.append(frames[-1].gauges["g"] if frames[-1].outcome.ok else math.nan)
-        near = [frame.meshed_state.contact.force for frame in frames]
+    ends = [press.frame for press in presses(problem, ENDS.tolist())]
+    strain = [end.gauges["g"] if end.outcome.ok else math.nan for end in ends]
     return Curve(np.array(strain), problem.body.stiffness.upper.shape[0], len(problem.surface.nodes))
 
 

@@ -38,6 +38,7 @@ from finger3d.mechanics.model import Model
 from finger3d.meshing.mesh_files import write_mesh_vtu
 from finger3d.scene import scene_of
 
+from ._press import block_tables
 from ._rows import Result, Row, Settled, at_least, at_most, columns, grouped, settled
 
 SOURCE = "tutorials of solids4foam; REFERENCES.md, 6.7"
@@ -142,15 +143,10 @@ def spheres(size: float, steps: int, folder: Path) -> Model:
 def twist(size: float, press: int, turn: int) -> Model:
     """Return the cube with the ball, pressed and turned."""
     legs = [{"depth_mm": 1.0, "steps": press}, {"depth_mm": 1.0, "turn_y_deg": 180.0, "steps": turn}]
-    tables = {
-        "finger": {"geometry": "block", "half_length_mm": 1.0, "height_mm": 2.0, "width_mm": 2.0},
-        "material": {"E_MPa": 1.0, "nu": 0.3},
-        "object": {"shape": "sphere", "radius_mm": 1.0},
-        "friction": {"mu": 0.5},
-        "press": {"leg": legs},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": 2.0 * size},
-        "effects": LARGE,
-    }
+    tables = block_tables(
+        (1.0, 2.0, 2.0), 1.0, 0.3, (size, 2.0 * size), object={"shape": "sphere", "radius_mm": 1.0},
+        friction={"mu": 0.5}, press={"leg": legs}, effects=LARGE,
+    )  # fmt: skip
     return scene_of(tables).model()
 
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
-from finger3d._types import Float
 from finger3d.effects.viscosity import Effect as Viscosity
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
@@ -92,18 +92,12 @@ def _durations(body: Problem, control: str, bulk: bool, rate: float, steps: int)
 
     strain = np.array([pressed(mu, USUAL).gauges["g"] for mu in MUS])
     order = np.argsort(strain)
+    mu_of = make_interp_spline(strain[order], np.array(MUS)[order], k=1)  # goes on along the last piece outside
     reads = {}
     for time in DURATIONS:
         frame = pressed(MU, time)
-        read = float(_extended(frame.gauges["g"], strain[order], np.array(MUS)[order]))
-        reads[time] = Read(read - MU, _force(frame), frame.target.depth_mm)
+        reads[time] = Read(float(mu_of(frame.gauges["g"])) - MU, _force(frame), frame.target.depth_mm)
     return reads
-
-
-def _extended(value: float, x: Float, y: Float) -> float:
-    """Interpolate, and go on along the last piece outside."""
-    i = int(np.clip(np.searchsorted(x, value), 1, len(x) - 1))
-    return float(y[i - 1] + (y[i] - y[i - 1]) * (value - x[i - 1]) / (x[i] - x[i - 1]))
 
 
 def _pressed(problem: Problem, mu: float) -> StepResult:

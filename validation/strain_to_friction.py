@@ -26,14 +26,13 @@ from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.fem.laws.material import Isotropic
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.model import Domain, Leg, MeshOptions, Model
+from finger3d.mechanics.model import Domain, Leg, Model
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
 
 from ._paper import said
-from ._press import fig9_finger, paper_gauges
+from ._press import fig9_model, paper_gauges
 from ._rows import Result, Row, columns, listed
 from ._strain_maps import StrainMap, resolution_panel, slope_panel
 
@@ -55,8 +54,8 @@ Found = dict[tuple[Domain, str], Calibration]
 
 def model(domain: Domain, sizes: tuple[float, float], length: float, quick: bool = False) -> Model:
     """The finger with its gauge, and the mirror image of it."""
-    leg, mesh, gauges = Leg(10.0, steps=4 if quick else "auto"), MeshOptions(*sizes, "swept"), paper_gauges(length)
-    return Model(fig9_finger(), Isotropic(1.0, NU), mesh, (leg,), gauges=gauges, domain=domain)
+    leg = Leg(10.0, steps=4 if quick else "auto")
+    return fig9_model(NU, *sizes, domain, legs=(leg,), gauges=paper_gauges(length))
 
 
 def run(quick: bool) -> Result:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
@@ -26,6 +27,7 @@ from finger3d.objects import MeshObject
 
 from ._press import converged
 from ._rows import Result, listed, together
+from .triangulated_objects import of_trimesh
 
 judged = listed(__file__)
 
@@ -126,15 +128,13 @@ WALLS = FREE_FACES.index("walls")
 def slot(mouth: float, cavity: float, deep: float, lip: float = 0.0) -> Triangles:
     """A block with a slot along z below, `mouth` wide up to a height `lip`, and `cavity` wide above, `deep` in all."""
     from build123d import Align, Box, Pos
-    from trimesh import Trimesh
 
     above = (Align.CENTER, Align.MIN, Align.CENTER)
     solid = Box(cavity + 6.0, deep + 3.0, 40.0, align=above) - Box(mouth, deep, 40.0, align=above)
     if cavity > mouth:
         solid -= Pos(0.0, lip, 0.0) * Box(cavity, deep - lip, 40.0, align=above)
     points, faces = solid.tessellate(1e-3)
-    joined = Trimesh([tuple(p) for p in points], faces)  # merges the points of neighbouring faces
-    return Triangles(np.array(joined.vertices, dtype=float), np.array(joined.faces))
+    return of_trimesh(trimesh.Trimesh([tuple(p) for p in points], faces))  # merges the points of neighbouring faces
 
 
 def model(surface: Triangles, size: float, legs: tuple[Leg, ...], mu: float) -> Model:

@@ -12,14 +12,12 @@ file would hold them, and moved off the origin.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import trimesh
 
-from finger3d._types import Float
 from finger3d.contact.friction import Coulomb
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
@@ -36,47 +34,31 @@ from ._rows import Result, Row, exact_columns, listed
 judged = listed(__file__)
 
 RADIUS = 6.0
+AWAY = (3.0, -2.0, 1.0)
+"""Middle of the ball and the bar, mm."""
 
 
-def sewn(rings: Float) -> NDArray[np.int64]:
-    """Outward triangles between rings (k, n, 3) that rise along y and run from x to z."""
-    k, n, _ = rings.shape
-    here = np.arange(k * n).reshape(k, n)
-    a, b, c, d = here[:-1], np.roll(here, -1, axis=1)[:-1], here[1:], np.roll(here, -1, axis=1)[1:]
-    return np.vstack([np.stack([a, c, b], axis=-1).reshape(-1, 3), np.stack([b, c, d], axis=-1).reshape(-1, 3)])
+def of_trimesh(mesh: trimesh.Trimesh, at: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Triangles:
+    """Return a mesh of trimesh, moved, as a triangulated surface."""
+    return Triangles(np.array(mesh.vertices, dtype=float) + at, np.array(mesh.faces))
 
 
 def ball(sectors: int) -> Triangles:
-    """A ball of `sectors` around and half as many rings."""
-    polar = np.linspace(0.0, np.pi, sectors // 2 + 1)[1:-1, None]
-    turn = 2.0 * np.pi * np.arange(sectors) / sectors
-    r = np.sin(polar)
-    rings = RADIUS * np.stack([r * np.cos(turn), -np.cos(polar) + 0.0 * turn, r * np.sin(turn)], axis=2)
-    points = np.vstack([rings.reshape(-1, 3), [[0.0, -RADIUS, 0.0], [0.0, RADIUS, 0.0]]])
-    here, last = np.arange(sectors), len(points) - 2 - sectors + np.arange(sectors)
-    south, north = np.full(sectors, len(points) - 2), np.full(sectors, len(points) - 1)
-    caps = [np.stack([south, here, np.roll(here, -1)], axis=1), np.stack([north, np.roll(last, -1), last], axis=1)]
-    return Triangles(points + [3.0, -2.0, 1.0], np.vstack([sewn(rings), *caps]))
+    """A ball of `sectors` around and half as many rings, its poles on y."""
+    polar = np.linspace(0.0, np.pi, sectors // 2 + 1)
+    curve = RADIUS * np.column_stack([np.sin(polar), -np.cos(polar)])
+    upright = np.eye(4)[[0, 2, 1, 3]]  # trimesh revolves about z
+    return of_trimesh(trimesh.creation.revolve(curve, sections=sectors, transform=upright), AWAY)
 
 
 def bar(sectors: int) -> Triangles:
-    """A bar along z, 20 mm long, `sectors` around, a corner of its polygon straight down."""
-    turn = 2.0 * np.pi * np.arange(sectors) / sectors
-    round_ = np.stack([RADIUS * np.sin(turn), -RADIUS * np.cos(turn)], axis=1)
-    ends = [np.insert(round_, 2, z, axis=1) for z in (-10.0, 10.0)]
-    here, after = np.arange(sectors), np.roll(np.arange(sectors), -1)
-    sides = [np.stack([here, after, here + sectors], 1), np.stack([after, after + sectors, here + sectors], 1)]
-    middle = np.full(sectors, 2 * sectors)
-    caps = [np.stack([middle, after, here], axis=1), np.stack([middle + 1, here + sectors, after + sectors], axis=1)]
-    points = np.vstack([*ends, [[0.0, 0.0, -10.0], [0.0, 0.0, 10.0]]])
-    return Triangles(points + [3.0, -2.0, 1.0], np.vstack([*sides, *caps]))
+    """A bar along z, 20 mm long, `sectors` around, a multiple of four: a corner of its polygon is straight down."""
+    return of_trimesh(trimesh.creation.cylinder(RADIUS, 20.0, sections=sectors), AWAY)
 
 
 def box(*half_edges: float) -> Triangles:
     """A box about the origin."""
-    points = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half_edges
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return Triangles(points, np.array([t for a, b, c, d in sides for t in ([a, b, c], [a, c, d])]))
+    return of_trimesh(trimesh.creation.box(2.0 * np.array(half_edges)))
 
 
 def pressed(obj: RigidObject, size: float) -> float:

@@ -21,11 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import minimize_scalar
 
 from finger3d._types import Float
 from finger3d.analyses.press import press
 
+from ._press import block_tables
 from ._rows import Result, Row, columns, listed
 
 judged = listed(__file__)
@@ -63,9 +65,7 @@ class Compression:
 
     def at(self, travel: float) -> Float:
         """(3, 7) changes at a travel, mm."""
-        k = int(np.clip(np.searchsorted(self.travel, travel), 1, len(self.travel) - 1))
-        a = (travel - self.travel[k - 1]) / (self.travel[k] - self.travel[k - 1])
-        return (1.0 - a) * self.changes[k - 1] + a * self.changes[k]
+        return np.asarray(make_interp_spline(self.travel, self.changes, k=1)(travel))
 
     def fitted(self, measured: Float, which: slice = slice(None)) -> tuple[float, Float]:
         """Travel that fits changes (3, 7) best, by all or some kinds, and the differences, computed less measured."""
@@ -98,15 +98,8 @@ def computed(mu: float, size: float, nu: float = NU) -> Compression:
         for name, x in (("centre", 0.0), ("outer", 30.0))
         for k, y in enumerate(HEIGHTS)
     ]
-    scene = {
-        "finger": {"geometry": "block", "half_length_mm": 0.5 * SIZE, "height_mm": SIZE, "width_mm": SIZE},
-        "material": {"E_MPa": 0.02, "nu": nu},
-        "mesh": {"mesher": "swept", "size_mm": size, "base_size_mm": 1.5 * size},
-        "friction": {"mu": mu},
-        "press": {"depth_mm": DEEPEST, "steps": INCREMENTS},
-        "effects": {"large_deformation": {}},
-        "marker": beads,
-    }
+    more = {"press": {"depth_mm": DEEPEST, "steps": INCREMENTS}, "effects": {"large_deformation": {}}, "marker": beads}
+    scene = block_tables((0.5 * SIZE, SIZE, SIZE), 0.02, nu, (size, 1.5 * size), friction={"mu": mu}, **more)
     result = press(scene, error=False)
     assert result.outcome.ok, result.outcome
     moved = np.array([[s.markers[b["name"]] for b in beads] for s in result.steps]).reshape(-1, 2, len(HEIGHTS), 3)

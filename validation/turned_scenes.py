@@ -43,6 +43,7 @@ from finger3d.objects import (
     Wedge,
     first_touch,
 )
+from finger3d.objects.rigid import rotation
 
 from ._common import Body, body, increment
 from ._press import converged
@@ -56,18 +57,23 @@ WRENCH = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nmm", "moment_y_Nmm",
 ROTATED = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])
 
 
+def oval(sectors: int, turned: Float | None = None) -> Triangles:
+    """An oval body about the origin, turned by a matrix (3, 3)."""
+    round_ = ball(sectors)
+    points = (round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8]
+    return Triangles(points if turned is None else points @ turned.T, round_.faces)
+
+
 def objects() -> dict[str, RigidObject]:
     """Every shape, off the middle and in a pose of its own."""
     at: dict[str, Any] = {"x_mm": 0.7, "z_mm": 0.4, **POSE}
-    round_ = ball(24)
-    oval = Triangles((round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8], round_.faces)
     return {
         "plane": Plane(tilt=0.02, **at),
         "cylinder": Cylinder(radius_mm=3.0, **at),
         "sphere": Sphere(radius_mm=3.0, **at),
         "wedge": Wedge(angle=0.5, tip_radius_mm=1.0, **at),
         "wave": Wave(wavelength_mm=6.0, amplitude_mm=0.3, **at),
-        "mesh": MeshObject(surface=oval, **at),
+        "mesh": MeshObject(surface=oval(24), **at),
     }
 
 
@@ -134,8 +140,7 @@ FINGER = 4.0
 
 def turn(degrees: float) -> Float:
     """Matrix (3, 3) that turns about y."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return rotation(0.0, math.radians(degrees), 0.0)
 
 
 def finger(size: float) -> Mesh:
@@ -151,12 +156,10 @@ def condensed(mesh: Mesh) -> Body:
     return body(mesh, Elasticity.of(1.0, 0.45), held, "contact", lambda p: np.hypot(p[:, 0], p[:, 2]) < 2.0)
 
 
-def oval(degrees: float, sectors: int) -> tuple[MeshObject, float]:
+def turned_oval(degrees: float, sectors: int) -> tuple[MeshObject, float]:
     """The object at its place, turned, and the height of its lowest point at first touch."""
     q = turn(degrees)
-    round_ = ball(sectors)
-    points = (round_.points - round_.points.mean(axis=0)) * [1.6, 1.0, 0.8] @ q.T
-    obj = MeshObject(*(q @ PLACE)[[0, 2]], surface=Triangles(points, round_.faces))
+    obj = MeshObject(*(q @ PLACE)[[0, 2]], surface=oval(sectors, q))
     return obj, first_touch(ContactPath(designs()["hemisphere"](radius_mm=FINGER).top, obj, FINGER, FINGER)).height_mm
 
 
@@ -193,7 +196,7 @@ def _angles(quick: bool) -> Result:
     rest = condensed(mesh)
     with_mesh, alone, touched = [], [], []
     for angle in angles:
-        obj, found = oval(angle, 24 if quick else 64)
+        obj, found = turned_oval(angle, 24 if quick else 64)
         touched.append(found)
         touch = touched[0]  # the same height: what the search for it leaves is judged by itself
         turned = condensed(replace(mesh, points=mesh.points @ turn(angle).T)) if angle else rest

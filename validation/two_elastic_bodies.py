@@ -35,7 +35,7 @@ from finger3d.objects import Cylinder, Plane, vertical_frame
 from finger3d.progress import QUIET
 
 from ._common import ellipse, held_at, solve
-from ._halfplane import Profile, under
+from ._halfplane import CANDIDATES, Profile, loading, numbers, on_block, under
 from ._press import converged
 from ._rows import Result, Row, exact_columns, listed
 from .press_with_friction import CURVE
@@ -54,30 +54,11 @@ def both(pair: Any) -> float:
     return sum(2.0 * (1.0 - nu**2) / modulus for modulus, nu in pair)
 
 
-def legs(steps: int, size: float) -> tuple[Leg, ...]:
-    """Equal steps of a^2 up to about a = 1 mm, bodies `size` mm thick."""
-    a = np.sqrt(np.arange(1, steps + 1) / steps)
-    return tuple(Leg(float(d), steps=1) for d in a**2 / (2.0 * size) * np.log(2.0 * size / a))
-
-
 def line(pair: Any, points: float, size: float, steps: int) -> Problem:
-    """A cylinder of radius `size` (mm) on a block as high, plane strain, `points` to a."""
-    block = designs()["block"](half_length_mm=size, height_mm=size, width_mm=1.0)
-    mesh = MeshOptions(1.0 / points, size / 8.0, "swept")
-    model = Model(
-        block, Isotropic(*pair[0]), mesh, legs(steps, size), object=Cylinder(radius_mm=size), domain="plane-strain"
-    )
-    return build(Effect(*pair[1]).apply(model), margin=-0.2)
-
-
-def numbers(profiles: list[Profile], pair: Any, size: float) -> np.ndarray:
-    """P/P_Hertz(a), int_0^a q/P, c/a as means over the second half of the increments, and D/(A P^2) at their end."""
-    half = [p for p in profiles[len(profiles) // 2 :] if p.touching >= 6] or profiles[-1:]
-    force = sum(p.force for p in half)
-    hertz = sum(np.pi * p.a**2 / (2.0 * size * both(pair)) for p in half)
-    last = profiles[-1]
-    lost = last.frame.dissipation_mJ / (both(pair) * last.force**2)
-    return np.array([force / hertz, sum(p.outward for p in half) / force, np.mean([p.c / p.a for p in half]), lost])
+    """A cylinder of radius `size` (mm) on a block as high, plane strain, `points` to a, up to about a = 1 mm."""
+    path = loading(steps, size, radius=size)
+    model = on_block(Cylinder(radius_mm=size), Isotropic(*pair[0]), points, path, size, 0.125)
+    return build(Effect(*pair[1]).apply(model), margin=CANDIDATES)
 
 
 def run(quick: bool) -> Result:
@@ -89,7 +70,7 @@ def run(quick: bool) -> Result:
         at = []
         for size in (100.0, 200.0):
             profiles = under(line(pair, points, size, steps), mu)
-            at.append(numbers(profiles, pair, size))
+            at.append(numbers(profiles, both(pair), size))
             table.append((name, mu, size, *at[-1]))
         found[name] = 2.0 * at[1] - at[0]
         curves[name] = profiles[-1]

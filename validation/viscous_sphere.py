@@ -13,7 +13,6 @@ relaxes and K does not (correspondence principle).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,11 +25,9 @@ from scipy.signal import residue
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
-from finger3d.contact.state import ContactState
-from finger3d.fem.assembly import Stiffness, stiffness
+from finger3d.fem.assembly import stiffness
 from finger3d.fem.laws.material import Elasticity, Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
-from finger3d.fem.mesh import Mesh
 from finger3d.fem.solids.embedded import AddedStiffness
 from finger3d.fem.solvers.condense import condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
@@ -58,88 +55,43 @@ HALF = "0.01 % or less measured on rings of a/100, 0.2 % or less on tetrahedra o
 COLUMNS = "body nu bulk resolution steps_per_s t P_over_k theory a"
 
 
-@dataclass(frozen=True)
-class StandIn:
-    """As much of a `Problem` as a press needs, over a surface that no design has; gap (c,) at rest."""
+def stand_in(rest: Float, area: Float, delassus: Float, dofs: NDArray[np.int64], nu: float, **more: Any) -> Any:
+    """As much of a `Problem` as a press needs, over a surface that no design has; gap (c,) at rest.
 
-    rest: Float
-    area: Float
-    delassus: Float
-    condensed: Any
-    active_dofs: NDArray[np.int64]
-    parts: int
-    nu: float
-    mesh: Mesh | None = None
-    elastic: Elasticity | None = None
-    stiffness: Stiffness | None = None
-    second: None = None
-    thickness: float = 1.0
-    inclusions: AddedStiffness = field(default_factory=AddedStiffness)
-    origin: ObjectPose = ObjectPose(0.0)
-    contact_geometry: None = None
-
-    @property
-    def model(self) -> Any:
-        material = Isotropic(1.0, self.nu)
-        return SimpleNamespace(
-            rule="projection", friction=Coulomb(0.0), legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
-            materials=lambda labels: (material,), object=Plane(),
-            design=SimpleNamespace(height_mm=HEIGHT_MM), is_defined_by_increments=False,
-        )  # fmt: skip
-
-    @property
-    def body(self) -> StandIn:
-        return self
-
-    @property
-    def system(self) -> StandIn:
-        return self
-
-    @property
-    def dim(self) -> int:
-        return int(self.delassus.shape[1])
-
-    @property
-    def surface(self) -> BoundarySurface:
-        """Points so high under a plane that their gaps are those under the ball: the half-space has no slopes."""
-        count, none = len(self.rest), sp.csr_matrix((len(self.rest), 0))
-        points = np.zeros((count, self.dim))
-        points[:, 1] = -self.rest
-        same = sp.eye_array(count, format="csr")
-        return BoundarySurface(
-            nodes=np.arange(count), face=np.zeros(count, dtype=np.int8), points=points, area=self.area,
-            normals=np.zeros_like(points), trace=none, samples=points, average=same, interpolate=none, hats=same,
-        )  # fmt: skip
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def object_share(self) -> None:
-        return None
-
-    def placed(self, pose: ObjectPose) -> PlacedObject:
-        return PlacedObject.of(Plane(), 0.0, pose)
-
-    def upright_force(self, state: ContactState) -> Float:
-        return np.asarray(state.scene_force @ vertical_frame(self.dim).T)
-
-    def row_forces(self, force: Float) -> Float:
-        return force.ravel()[self.active_dofs]
+    Points lie so high under a plane that their gaps are those under the ball: the half-space has no slopes.
+    """
+    count, dim = delassus.shape[:2]
+    points, none, same = np.zeros((count, dim)), sp.csr_matrix((count, 0)), sp.eye_array(count, format="csr")
+    points[:, 1] = -rest
+    face = BoundarySurface(
+        nodes=np.arange(count), face=np.zeros(count, dtype=np.int8), points=points, area=area,
+        normals=np.zeros_like(points), trace=none, samples=points, average=same, interpolate=none, hats=same,
+    )  # fmt: skip
+    material, smooth = Isotropic(1.0, nu), Coulomb(0.0)
+    model = SimpleNamespace(
+        rule="projection", friction=smooth, legs=(Leg(DEPTH),), domain="solid", gauges=(), material=material,
+        materials=lambda labels: (material,), object=Plane(),
+        design=SimpleNamespace(height_mm=HEIGHT_MM), is_defined_by_increments=False,
+    )  # fmt: skip
+    body = SimpleNamespace(
+        model=model, surface=face, area=area, delassus=delassus, active_dofs=dofs, dim=dim, axes=(), thickness=1.0,
+        object_share=None, second=None, contact_geometry=None, inclusions=AddedStiffness(), origin=ObjectPose(0.0),
+        placed=lambda pose: PlacedObject.of(Plane(), 0.0, pose), row_forces=lambda force: force.ravel()[dofs],
+        upright_force=lambda state: np.asarray(state.scene_force @ vertical_frame(dim).T), **more,
+    )  # fmt: skip
+    body.body = body.system = body
+    return body
 
 
-def on_rings(nu: float, count: int) -> StandIn:
+def on_rings(nu: float, count: int) -> Any:
     """Rings a / count wide on the exact half-space."""
     body = _rings.rings(nu, round(1.1 * count), round(1.1 * count) / count)
-    rest = (body.edges[1:] ** 2 + body.edges[:-1] ** 2) / (4.0 * RADIUS)
-    flat = body.compliance.reshape(2 * len(rest), -1)
-    condensed = SimpleNamespace(compliance=flat)
-    area = np.pi * np.diff(body.edges**2)
-    return StandIn(rest, area, body.compliance, condensed, np.arange(len(flat)), parts=1, nu=nu)
+    flat = body.compliance.reshape(2 * len(body.area), -1)
+    more = {"condensed": SimpleNamespace(compliance=flat), "parts": 1, "mesh": None, "elastic": None, "stiffness": None}
+    return stand_in(body.gap(RADIUS), body.area, body.compliance, np.arange(len(flat)), nu, **more)
 
 
-def on_tets(nu: float, points: int) -> StandIn:
+def on_tets(nu: float, points: int) -> Any:
     """A quarter of a block 100 x 50 x 100 mm, `points` to a."""
     mesh = _halfspace.graded_block(points, HEIGHT_MM)
     held = held_at(mesh, {"x-": (0,), "y-": (0, 1, 2), "z-": (2,)})
@@ -151,10 +103,11 @@ def on_tets(nu: float, points: int) -> StandIn:
     small = condense(matrix, np.flatnonzero(held.ravel()), local_rows(face, vertical_frame(3))[kept])
     delassus = scatter_to_points(small.compliance, kept, len(face.nodes), 3)
     rest = np.asarray(face.average @ Sphere(radius_mm=RADIUS).profile(face.samples[:, 0], face.samples[:, 2]))
-    return StandIn(rest, face.area, delassus, small, kept, parts=4, nu=nu, mesh=mesh, elastic=elastic, stiffness=matrix)
+    more = {"condensed": small, "parts": 4, "mesh": mesh, "elastic": elastic, "stiffness": matrix}
+    return stand_in(rest, face.area, delassus, kept, nu, **more)
 
 
-def march(body: StandIn, kinematics: Formulation[Any, Any], path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
+def march(body: Any, kinematics: Formulation[Any, Any], path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
     """Force (N) and contact radius (mm) at the end of every increment of a path of (time, depth over DEPTH)."""
     state, at, workspace = kinematics.start(body), body.origin, kinematics.workspace()
     force, radius = [], []
@@ -195,24 +148,21 @@ def lee_radok(t: float, relax: Any = modulus, until: float = 1.0) -> float:
 
 def ting(t: float) -> tuple[float, float]:
     """(P/k, a in mm) while the ball is drawn back; t1 lies on the ramp, since the hold moves nothing."""
-
-    def moved(low: float, high: float) -> float:
-        return float(quad(lambda s: modulus(t - s), low, high, epsabs=1e-13)[0])
-
-    back = moved(HELD, t)
-    if moved(0.0, 1.0) <= back:
+    back = _moved(t, HELD, t)
+    if _moved(t, 0.0, 1.0) <= back:
         return 0.0, 0.0
-    t1 = float(brentq(lambda x: moved(x, 1.0) - back, 0.0, 1.0, xtol=1e-12))
+    t1 = float(brentq(lambda x: _moved(t, x, 1.0) - back, 0.0, 1.0, xtol=1e-12))
     return lee_radok(t, until=t1), float(np.sqrt(t1))
+
+
+def _moved(t: float, low: float, high: float) -> float:
+    """Integral of the modulus at t over the times of a motion at unit speed."""
+    return float(quad(lambda s: modulus(t - s), low, high, epsabs=1e-13)[0])
 
 
 def time_of_parting() -> float:
     """When the ball that is drawn back leaves the body (s)."""
-
-    def ahead(t: float) -> float:
-        return float(quad(lambda s: modulus(t - s), 0.0, 1.0)[0] - quad(lambda s: modulus(t - s), HELD, t)[0])
-
-    return float(brentq(ahead, 1.51, 2.5))
+    return float(brentq(lambda t: _moved(t, 0.0, 1.0) - _moved(t, HELD, t), 1.51, 2.5))
 
 
 def contact_modulus(nu: float) -> Any:
