@@ -62,7 +62,13 @@ def differences(given: Any, key: str, value: float, change: float, number: str, 
     return at(value - change) - own, at(value + change) - own
 
 
-@pytest.mark.parametrize("effects", [{}, {"large_deformation": {}}], ids=["small strain", "large deformation"])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        pytest.param({}, id="small strain"),
+        pytest.param({"large_deformation": {}}, marks=pytest.mark.slow, id="large deformation"),
+    ],
+)
 def test_effects_are_differences_of_presses(effects: dict[str, Any]) -> None:
     given = scene(**SECTION | {"effects": {"auto": False, **effects}, "press": {"depth_mm": 4.0, "steps": 4}})
     found = finger3d.sensitivity(given, NUMBERS)

@@ -212,6 +212,7 @@ def test_a_face_named_base_that_is_none_is_refused(tmp_path: Path) -> None:
         imported(step_with_base(tmp_path / "round.step", SMALL.solid(), dome))
 
 
+@pytest.mark.slow
 def test_a_body_drawn_with_z_up_is_turned_about_x(tmp_path: Path) -> None:
     from build123d import Axis, Rot
 
@@ -257,6 +258,7 @@ def options(size: float, base: float) -> Any:
     return MeshOptions(size, base, "ftetwild")
 
 
+@pytest.mark.slow
 def test_press_takes_a_finger_and_an_object_from_files(drawn: Path, tmp_path: Path, capsys: Any) -> None:
     write_stl(tmp_path / "plate.stl", box(30.0, 1.0, 20.0))
     scene = tmp_path / "scene.toml"
@@ -353,6 +355,7 @@ def test_solids_that_overlap_are_refused() -> None:
         glue({"": Box(4.0, 4.0, 4.0), "core": Pos(1.0, 0.0, 0.0) * Box(4.0, 4.0, 4.0)}, "two")
 
 
+@pytest.mark.slow
 def test_solids_of_a_step_file_are_parts_with_their_names(tmp_path: Path) -> None:
     from build123d import Pos, Rot
 
@@ -385,6 +388,7 @@ def test_step_files_of_solids_that_do_not_fit_together(tmp_path: Path, shift: fl
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_core_with_clearance_in_its_pocket_is_told_with_the_place(tmp_path: Path) -> None:
     from build123d import Box, Pos
 

@@ -204,6 +204,7 @@ def test_a_command_that_lacks_its_extra_ends_with_one_line(root, paper_scene, tm
         assert "Traceback" not in text
 
 
+@pytest.mark.slow
 def test_a_solid_is_pressed_and_drawn_without_any_extra(paper_scene, tmp_path) -> None:
     words = ["press", str(paper_scene), "--out", "o", "--set", "mesh.mesher=swept", "--set", "mesh.size_mm=8"]
     words += ["--set", "mesh.base_size_mm=16", "--set", "press.steps=2"]

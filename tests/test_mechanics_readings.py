@@ -256,6 +256,7 @@ def test_a_marker_beside_the_facets_of_a_rim_is_read_at_the_nearest() -> None:
     assert there == pytest.approx(np.array([[-3.0, 3.0, 1.0], [4.0, 3.0, -0.5], [0.3, 3.0, 0.2]]), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_grid_follows_the_shape_whatever_the_mesh() -> None:
     """A round rim: chords of a coarse mesh leave out dots that those of a fine one cover."""
     design = designs()["hemisphere"](radius_mm=5.0)

@@ -18,7 +18,8 @@ SLOW = (
     "action_reaction", "rolling_cylinder", "meshers", "readings_within_tolerances", "friction_in_3d", "scaling",
     "effects_by_need", "cost_of_accuracy", "hertz", "bonded", "wide_finger", "gelsight_mini", "cost_forecast",
     "held_weights", "creep_of_a_hold", "friction_range", "what_each_effect_does", "identify_z_scores", "truth_cube",
-    "random_presses", "effects_of_keys", "slip_warning", "solids4foam",
+    "random_presses", "effects_of_keys", "slip_warning", "solids4foam", "label_rate", "beside_ansys", "meunier",
+    "press_with_friction",
 )  # fmt: skip
 """Studies that take about four seconds or more in their quick form; `make test-all` runs them."""
 

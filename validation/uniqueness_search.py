@@ -25,6 +25,7 @@ from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.march.solve import Press
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.path import stations
+from finger3d.objects import ObjectPose
 
 from ._increments import PlainCoulomb
 from ._paper import STRAIN, STRESS, fig9, said
@@ -81,9 +82,18 @@ def run(quick: bool) -> Result:
     return Result(tuple(rows), columns(names, found), lambda figure: _draw(figure, found))
 
 
+class PressFromForces(Press):
+    """A press whose increments begin their iteration at forces (c, d) N that are given, if any are."""
+
+    start: Float | None = None
+
+    def expected_force(self, pose: ObjectPose) -> Float | None:
+        return super().expected_force(pose) if self.start is None else self.start
+
+
 def _search(problem: Problem, found: Searched, starts: int, random: np.random.Generator) -> Searched:
     """Solve every increment from the path, and from random forces."""
-    press = Press(problem)
+    press = PressFromForces(problem)
     for station in stations(problem.model.legs):
         before = copy(press)
         frame = press.advance(station)
@@ -92,7 +102,9 @@ def _search(problem: Problem, found: Searched, starts: int, random: np.random.Ge
         force = frame.meshed_state.contact.force
         scale = np.abs(force).max()
         for _ in range(starts if scale else 0):
-            other = copy(before).advance(station, _start(force, problem.model.friction.mu, random))
+            again = copy(before)
+            again.start = _start(force, problem.model.friction.mu, random)
+            other = again.advance(station)
             if not other.outcome.ok:
                 found = found._replace(unsettled=found.unsettled + 1)
                 continue

@@ -383,6 +383,11 @@ def reflect_into_part(point: Float, direction: Float, axes: tuple[str, ...], dim
     return (point * sign)[:dim], (direction * sign)[:dim]
 
 
+def in_space(vectors: Float) -> Float:
+    """Return vectors (n, d) as (n, 3)."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
 def signs_into_part(points: Float, axes: Iterable[str]) -> Float:
     """Return the factors (p, d), 1 or -1, that reflect points (p, d) into the meshed part."""
     sign = np.ones_like(points)

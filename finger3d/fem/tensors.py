@@ -104,11 +104,6 @@ def rotated_delassus(delassus: Float, rotations: Float, points: Int | None = Non
     return np.asarray((half.transpose(1, 0, 2) @ rotations.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(k, d, k, d))
 
 
-def in_space(vectors: Float) -> Float:
-    """Return vectors (n, d) as (n, 3)."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
 def block_diagonal(blocks: Float) -> sp.csr_array:
     """Return the sparse matrix (c m, c n) of blocks (c, m, n)."""
     c = len(blocks)

@@ -18,7 +18,7 @@ from finger3d.contact.friction import SLIP, STICK
 from finger3d.contact.resultants import ForceConditions
 from finger3d.contact.state import ContactSolution, ContactState
 from finger3d.errors import Outcome
-from finger3d.fem.tensors import in_space
+from finger3d.fem.mesh import in_space
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.objects import ObjectPose
 from finger3d.objects.rigid import rotation

@@ -28,9 +28,10 @@ from finger3d.contact.resultants import solve_to_forces
 from finger3d.contact.solve import RULES
 from finger3d.contact.state import ContactSolution, ContactState, next_state
 from finger3d.errors import Outcome
+from finger3d.fem.mesh import in_space
 from finger3d.fem.recovery import displacement
 from finger3d.fem.surface import BoundarySurface
-from finger3d.fem.tensors import in_space, rotated_delassus
+from finger3d.fem.tensors import rotated_delassus
 from finger3d.mechanics.discretise.contact_points import ContactGeometry, contact_geometry
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.formulation import Loads, Workspace, length_scale

@@ -12,7 +12,7 @@ import numpy as np
 from finger3d._cost import tets_made
 from finger3d._types import Float, Int, freeze_arrays
 from finger3d.errors import Finger3dError
-from finger3d.fem.tensors import in_space
+from finger3d.fem.mesh import in_space
 from finger3d.geometry.design import Design
 
 if TYPE_CHECKING:

@@ -9,10 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from finger3d._types import Float, Tree
-from finger3d.fem.mesh import FREE_FACES, signs_into_part
+from finger3d.fem.mesh import FREE_FACES, in_space, signs_into_part
 from finger3d.fem.recovery import displacement
 from finger3d.fem.surface import values_over
-from finger3d.fem.tensors import in_space
 from finger3d.geometry.design import Design
 from finger3d.geometry.surface import Triangles
 from finger3d.mechanics.discretise.problem import Problem
