@@ -209,6 +209,9 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
     columns : name (with its unit) -> (n,) numbers, or texts; all of one length
     """
     arrays = [np.asarray(column) for column in columns.values()]
+    shapes = {a.shape for a in arrays}
+    if len(shapes) > 1 or any(len(s) != 1 for s in shapes):
+        raise ValueError(f"columns of {path} differ in shape: { {k: np.shape(v) for k, v in columns.items()} }")
     with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)

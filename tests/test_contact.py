@@ -15,6 +15,7 @@ from finger3d.contact.conditions import (
     residual,
 )
 from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw, TwoCoefficients
+from finger3d.contact.newton import ActiveSet, assemble
 from finger3d.contact.solve import RULES, RuleName, maeno_active_set, solve_increment
 from finger3d.contact.state import ContactState
 from finger3d.contact.zones import FACET_SIDES, Zone, facet_borders, zone_area, zone_ends, zones
@@ -41,6 +42,21 @@ def test_projected_forces_are_admissible_and_projected_on_themselves(dim: int) -
         assert np.allclose(friction[status == SLIP], (problem.friction * normal)[status == SLIP])
         again, _, _ = project_on_friction_cone(problem, projected, np.zeros_like(projected))
         assert np.allclose(again, projected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_matrix_of_an_active_set_has_the_columns_that_unit_unknowns_give(dim: int) -> None:
+    # A = D W P + diag(0, 0, 1 - a), column by column from the functions P and D
+    for seed in range(5):
+        problem, force = random_problem(dim, seed)
+        status = np.resize(np.array([STICK, SLIP, OPEN], dtype=np.int8), len(force))
+        active = ActiveSet.of(problem, status, np.abs(force))
+        wanted = np.diag(np.concatenate([np.zeros(len(active.active_dofs)), 1.0 - active.turning]))
+        wanted = wanted[: active.size, : active.size]
+        for k, unit in enumerate(np.eye(active.size)):
+            moved = (problem.delassus @ active.force(unit).ravel()).reshape(force.shape)
+            wanted[:, k] += active.weighted(problem, moved)
+        np.testing.assert_allclose(assemble(problem, active, np.float64), wanted, rtol=1e-12, atol=1e-12)
 
 
 def test_the_projection_and_the_residual_know_the_same_solutions() -> None:

@@ -34,9 +34,13 @@ def program() -> str | None:
 # a small process between: the peak of its children is then that of ccx alone
 _LAUNCH = """
 import json, resource, subprocess, sys, time
+limit, *command = sys.argv[1:]
 start = time.perf_counter()
-with open(sys.argv[2] + ".log", "w") as log:
-    status = subprocess.run(sys.argv[1:], stdout=log, stderr=subprocess.STDOUT).returncode
+with open(command[1] + ".log", "w") as log:
+    try:
+        status = subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, timeout=float(limit)).returncode
+    except subprocess.TimeoutExpired:  # which has ended ccx
+        status = None
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
 print(json.dumps([status, time.perf_counter() - start, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
 """
@@ -57,9 +61,11 @@ def solve(deck: Path, seconds: float) -> tuple[float, float, float]:
     ccx = program()
     if ccx is None:
         raise MissingError(f"ccx, CalculiX's solver, is not installed; {INSTALL}")
-    command = [sys.executable, "-I", "-S", "-c", _LAUNCH, ccx, deck.stem]
-    done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, timeout=seconds, check=True)
+    command = [sys.executable, "-I", "-S", "-c", _LAUNCH, str(seconds), ccx, deck.stem]
+    done = subprocess.run(command, cwd=deck.parent, capture_output=True, text=True, check=True)
     status, wall, cpu, peak = json.loads(done.stdout)
+    if status is None:
+        raise subprocess.TimeoutExpired(command, seconds)
     log = deck.with_suffix(".log").read_text(encoding="utf-8", errors="replace")
     if status != 0 or "Job finished" not in log:
         raise RuntimeError(f"ccx ended with {status}: {' '.join(log[-_SAID:].split())}")

@@ -1,42 +1,46 @@
 """Cases run one after the other, each in a process of its own, so that no case shadows another's memory or caches.
 
-Processes are forked from one that has only loaded the libraries.  A peak is VmHWM of the process that did the work:
-ru_maxrss would start at its parent's.
+Run as a program this file reads a job a line, forks, and writes the answer as a line; the libraries are loaded once,
+before the first fork.  A peak is VmHWM of the process that did the work: ru_maxrss would start at its parent's.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import importlib
+import json
 import os
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
+import traceback
+import types
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
-
-from finger3d.geometry.design import import_from
+from typing import Any, TypeVar
 
 PACKAGE = "finger3d_validation"
 HOME = Path(__file__).resolve().parent
 
 _TIMES = {"seconds", "processor_seconds"}
 
+Key = TypeVar("Key")
+
 
 def peak_mb() -> float:
     """Largest resident memory (MB) of this process since its start or the last `reset_peak`."""
-    return _kilobytes("/proc/self/status", "VmHWM") / 1024.0
+    for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
+        if line.startswith("VmHWM:"):
+            return float(line.split()[1]) / 1024.0
+    raise OSError("/proc/self/status has no VmHWM")
 
 
 def available_gb() -> float:
     """Memory (GB) that processes can get without swapping, page cache included."""
-    return _kilobytes("/proc/meminfo", "MemAvailable") * 1024e-9
-
-
-def _kilobytes(file: str, key: str) -> float:
-    lines = Path(file).read_text(encoding="ascii").splitlines()
-    return float(next(line.split()[1] for line in lines if line.startswith(f"{key}:")))
+    for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+        if line.startswith("MemAvailable:"):
+            return float(line.split()[1]) * 1024e-9
+    raise OSError("/proc/meminfo has no MemAvailable")
 
 
 def reset_peak() -> None:
@@ -45,37 +49,42 @@ def reset_peak() -> None:
 
 
 class Bench:
-    """Calls functions ``(case: dict) -> dict`` of a module in this folder, each in a process of its own."""
+    """Calls functions ``(case: dict) -> dict`` of a module in this folder, each in a fork of its own."""
 
     def __init__(self, module: str) -> None:
         self.module = module
 
     def __enter__(self) -> Bench:
-        known = HOME, PACKAGE, self.module
-        server = multiprocessing.get_context("forkserver")
-        server.set_forkserver_preload([f"validation.{self.module}"])
-        self._pool = ProcessPoolExecutor(1, server, import_from, known, max_tasks_per_child=1)
+        root = str(HOME.parent)
+        path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+        command = [sys.executable, "-P", str(HOME / "_child.py"), self.module]
+        self._server = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}
+        )
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._pool.shutdown()
+        self._server.communicate()
 
     def __call__(self, function: str, case: dict[str, Any]) -> dict[str, Any]:
-        """Answer of one call, with `load`, the machine's load average when it began."""
+        """Answer of one call, with `load`, the machine's load average when it began.
+
+        Raises
+        ------
+        RuntimeError
+            With the traceback of what went wrong there.
+        """
+        stdin, stdout = self._server.stdin, self._server.stdout
+        if stdin is None or stdout is None:
+            raise RuntimeError("the server's pipes are closed")
         load = os.getloadavg()[0]
-        answered = import_from(HOME, PACKAGE, "_child").answer  # under the name that the process knows it by
-        return {**self._pool.submit(answered, self.module, function, case, dict(os.environ)).result(), "load": load}
-
-
-def answer(module: str, function: str, case: dict[str, Any], environment: Mapping[str, str]) -> dict[str, Any]:
-    """What a process does: load the libraries, call the function, and add the peak; its output goes to stderr."""
-    os.dup2(2, 1)
-    os.environ.clear()
-    os.environ.update(environment)  # the server has that of its start
-    known = sys.modules[f"{PACKAGE}.{module}"]
-    known.prepare()
-    found = getattr(known, function)(case)
-    return {"peak_MB": peak_mb(), **found}
+        stdin.write(json.dumps([function, case]) + "\n")
+        stdin.flush()
+        line = stdout.readline()
+        answer = json.loads(line) if line else {"error": "the server ended"}
+        if "error" in answer:
+            raise RuntimeError(f"{function} {case}: {answer['error']}")
+        return {**answer, "load": load}
 
 
 def best_of(
@@ -104,3 +113,43 @@ def best_of(
         turn += 1
         left = [c for c in left if wanted[c] > turn]
     return found
+
+
+def _answer(function: Callable[[dict[str, Any]], dict[str, Any]], case: dict[str, Any], to: int) -> None:
+    """What a fork does: its own output goes to stderr, its answer into the pipe."""
+    os.dup2(2, 1)
+    try:
+        answer = function(case)
+        text = json.dumps({"peak_MB": peak_mb(), **answer})
+    except Exception:  # noqa: BLE001 - handed on as text, and raised again where the case was asked for
+        text = json.dumps({"error": traceback.format_exc()})
+    with os.fdopen(to, "w") as pipe:
+        pipe.write(text)
+
+
+def _serve(module_name: str) -> None:
+    package = types.ModuleType(PACKAGE)
+    package.__path__ = [str(HOME)]
+    sys.modules[PACKAGE] = package
+    module = importlib.import_module(f"{PACKAGE}.{module_name}")
+    module.prepare()
+    for line in sys.stdin:
+        function, case = json.loads(line)
+        source, to = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.close(source)
+            _answer(getattr(module, function), case, to)
+            os._exit(0)
+        os.close(to)
+        with os.fdopen(source) as pipe:
+            text = pipe.read()
+        _, status = os.waitpid(child, 0)
+        print(text or json.dumps({"error": f"the process ended with status {status}, no memory left?"}), flush=True)
+
+
+if __name__ == "__main__":
+    try:
+        _serve(sys.argv[1])
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -49,6 +49,11 @@ class SafeStream:
         self._attempt(lambda: self._stream.write(text))
         return len(text)
 
+    def writelines(self, lines: Iterable[str]) -> None:
+        """Write a sequence of texts."""
+        for line in lines:
+            self.write(line)
+
     def flush(self) -> None:
         """Flush the stream."""
         self._attempt(self._stream.flush)

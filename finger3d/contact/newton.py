@@ -190,11 +190,11 @@ class ActiveSet:
 
 def submatrix(delassus: Float, dofs: NDArray[np.int64], precision: Precision) -> Array:
     """Return the Delassus operator (k, k) between directions (k,); some rows at a time stay in the cache."""
-    submatrix = np.empty((len(dofs), len(dofs)), precision)
+    matrix = np.empty((len(dofs), len(dofs)), precision)
     for first in range(0, len(dofs), _ROWS_IN_CACHE):
         part = slice(first, first + _ROWS_IN_CACHE)
-        submatrix[part] = delassus[dofs[part]].take(dofs, axis=1)
-    return submatrix
+        matrix[part] = delassus[dofs[part]].take(dofs, axis=1)
+    return matrix
 
 
 def assemble(problem: ContactProblem, active: ActiveSet, precision: Precision) -> Array:

@@ -131,7 +131,7 @@ def quadrature(dim: int, degree: int) -> tuple[Float, Float]:
 
     In 1D it is Gauss and Legendre's rule. Degree 2 in 2D and 3D are the symmetric 3- and 4-point rules (Strang and Fix
     1973), degree 3 in 3D is Keast's 5-point rule (1986), whose weight at the centre is negative, and degree 5 in 2D is
-    Radon's symmetric 7-point rule (1948). There is no other.
+    Radon's symmetric 7-point rule (1948).  Other degrees have no rule in 2D and 3D.
     """
     if dim == 1:
         x, w = np.polynomial.legendre.leggauss(degree // 2 + 1)

@@ -167,7 +167,10 @@ class Triangles:
 
     @cached_property
     def neighbours(self) -> tuple[Int, Int, Int]:
-        """Triangles a (e,) and b (e,) on both sides of every edge (e, 2) that has two; each pair of successive ones."""
+        """Triangles a (e,) and b (e,) on both sides of every edge (e, 2).
+
+        An edge of one triangle has no row; one of more than two has a row for each two that follow one another.
+        """
         edges = np.sort(self.edges, axis=1)
         order = np.lexsort(edges.T)
         edges = edges[order]

@@ -270,7 +270,7 @@ def voids_of(solid: Solid | Compound, tolerance_mm: float) -> Triangles:
 
 def _seams_at_points(triangles: Int, face: Int, count: int) -> Int:
     """Number (n,) of edges at every point that lie between different faces."""
-    a, b, edges = Triangles(np.zeros((count, 3)), triangles).neighbours  # in the order of the faces
+    a, b, edges = Triangles(np.zeros((count, 3)), triangles).neighbours
     return np.bincount(np.unique(edges[face[a] != face[b]], axis=0).ravel(), minlength=count)
 
 

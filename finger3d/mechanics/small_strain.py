@@ -162,7 +162,8 @@ _NEAR = 0.05
 """Distance, over the depth, within which points are evaluated again while an increment is solved."""
 
 _MEMORY, _SAME = 3, 1e-10
-"""Earlier displacements from which the next is extrapolated, and relative difference of their steps that is none."""
+"""Earlier displacements from which the next is extrapolated, and singular value of the differences of their steps, over
+the largest, below which it counts as zero."""
 
 
 @dataclass(frozen=True)

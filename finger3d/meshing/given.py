@@ -189,6 +189,8 @@ def _labelled(path: Path, contents: MeshContents) -> Mesh:
         return mesh
     points = mesh.points.copy()
     points[mesh.cells[:, 4:]] = contents.points[contents.cells[:, 4:]]  # the middles of curved edges
+    if (points[mesh.cells[:, 4:]] != contents.points[contents.cells[:, 4:]]).any():
+        raise Finger3dError(f"{path}: the middle node of an edge differs between its tetrahedra; merge nodes")
     return replace(mesh, points=points)
 
 

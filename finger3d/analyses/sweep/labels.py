@@ -7,6 +7,7 @@ and the rows of the sweep: an interruption at any time loses no sample that has 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d.io import atomic
+from finger3d.io import atomic, cannot_write
 from finger3d.mechanics.postprocess.labels import FIELDS, Sample
 
 if TYPE_CHECKING:
@@ -33,8 +34,14 @@ SAMPLE = "sample"
 
 def store_part(folder: Path, number: int, sample: Sample) -> None:
     """Write the arrays of a sample into a file of its own."""
-    with atomic(_part(folder, number)) as temporary:
-        np.savez(temporary, allow_pickle=False, **sample)
+    path = _part(folder, number)
+    try:  # not `atomic`, which would search a folder of up to 100 000 files for stale ones
+        path.parent.mkdir(exist_ok=True)
+        with path.with_suffix(".tmp").open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **sample)
+        os.replace(stream.name, path)
+    except OSError as error:
+        raise cannot_write(path, error) from error
 
 
 def _part(folder: Path, number: int) -> Path:

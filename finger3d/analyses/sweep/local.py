@@ -67,7 +67,9 @@ def press(bodies: Sequence[BodyPoints], progress: SweepProgress, workers: int) -
     Raises
     ------
     MissingError
-        If no process could be started, or a row cannot be stored.
+        If no process could be started.
+    Finger3dError
+        If a row cannot be stored.
     """
     waiting, deaths = deque(bodies), Counter[int]()
     running: dict[Future[list[Row]], tuple[_Worker, BodyPoints]] = {}

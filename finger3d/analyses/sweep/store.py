@@ -62,10 +62,10 @@ class ResultStore:
             self.rows = {row["point"]: row for row in j.rows}
             try:
                 yield self
-            except Finger3dError as error:
-                if not isinstance(error.__cause__, OSError):
+            except (OSError, Finger3dError) as error:
+                if not isinstance(error.__cause__ or error, OSError):
                     raise
-                raise MissingError(f"{error}; {self.said()}") from None
+                raise MissingError(f"{error}; {self.said()}; the same command continues there") from None
 
     def add(self, row: Row) -> None:
         """Keep the row of a finished point.
