@@ -352,7 +352,7 @@ class ReducedModel:
             raise Finger3dError(f"{path}: there is no such file") from None
         except (OSError, ValueError):
             raise Finger3dError(
-                f"{path}: no reduced model, or cut short or damaged; `finger3d calibrate` writes one, reduced.npz"
+                f"{path}: no reduced model, or cut short or damaged; condense the scene again by `finger3d calibrate`"
             ) from None
         header = json.loads(arrays["header"].tobytes()) if "header" in arrays else {}
         if header.get("format") != FORMAT:
