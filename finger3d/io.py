@@ -12,7 +12,9 @@ import math
 import os
 import secrets
 import time
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from enum import Enum
@@ -143,6 +145,22 @@ def claimed(folder: str | Path, command: str = "") -> Iterator[Path]:
         lock.release()
 
 
+_DAMAGED = (
+    ValueError,
+    TypeError,
+    KeyError,
+    AttributeError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What NumPy raises for an .npz file that is cut short, changed, or of another kind."""
+
 _CHECKSUM = "checksum"
 """Name of the array of an .npz file with the SHA-256 of all others."""
 
@@ -167,9 +185,7 @@ def read_arrays(path: str | Path) -> dict[str, Array]:
             raise ValueError(f"it expands to {expanded / 1e6:.0f} MB")
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except OSError:
-        raise
-    except Exception as error:
+    except _DAMAGED as error:
         raise ValueError(f"no .npz file, or damaged: {error}") from error
     if not np.array_equal(arrays.pop(_CHECKSUM, np.zeros(0)), _checksum_of(arrays)):
         raise ValueError("it was altered after it was written")

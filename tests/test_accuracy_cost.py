@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from finger3d._cost import mesh_gb
@@ -144,13 +145,16 @@ def test_points_at_the_border_of_stick_are_foretold() -> None:
 
 
 @pytest.mark.slow
-def test_an_unstructured_solid_has_the_size_that_was_foretold() -> None:
+def test_unstructured_solids_have_the_size_that_was_foretold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plain = replace(baseline("solid"), legs=(Leg(3.0, steps=2),), object=Sphere(radius_mm=20.0))
     model = replace(plain, mesh=MeshOptions(1.5, 8.0, "ftetwild"))
-    expected, problem = forecast(model), build(model)
-    # nine meshes of fTetWild had 0.79 to 1.01 times the unknowns and 1.04 to 1.27 times the contact points
-    assert 0.7 < problem.body.stiffness.upper.shape[0] / expected["dofs"] < 1.15
-    assert 0.85 < len(problem.surface.nodes) / expected["contact_points"] < 1.45
+    expected, made = forecast(model), []
+    for number in range(3):
+        monkeypatch.setenv("FINGER3D_CACHE", str(tmp_path / str(number)))  # each mesh is made anew
+        made.append(build(model))
+    # nine meshes had 0.79 to 1.01 times the unknowns, and eight 1.04 to 1.27 times the contact points: 60 on average
+    assert 0.8 < np.mean([one.body.stiffness.upper.shape[0] for one in made]) / expected["dofs"] < 1.15
+    assert 0.85 < np.mean([len(one.surface.nodes) for one in made]) / expected["contact_points"] < 1.4
 
 
 FINGERTIP = {"radius_mm": 20.0, "half_length_mm": 10.0, "edge_height_mm": 6.0, "width_mm": 12.0}

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._machine import versions
-from finger3d.io import atomic, cannot_write
+from finger3d.io import atomic
 from finger3d.mechanics.postprocess.labels import FIELDS, Sample
 
 if TYPE_CHECKING:
@@ -35,13 +35,10 @@ SAMPLE = "sample"
 def store_part(folder: Path, number: int, sample: Sample) -> None:
     """Write the arrays of a sample into a file of its own."""
     path = _part(folder, number)
-    try:  # not `atomic`, which would search a folder of up to 100 000 files for stale ones
-        path.parent.mkdir(exist_ok=True)
-        with path.with_suffix(".tmp").open("wb") as stream:
-            np.savez(stream, allow_pickle=False, **sample)
-        os.replace(stream.name, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
+    path.parent.mkdir(exist_ok=True)
+    with path.with_suffix(".tmp").open("wb") as stream:  # `atomic` would search a folder of up to 100 000 files
+        np.savez(stream, allow_pickle=False, **sample)
+    os.replace(stream.name, path)
 
 
 def _part(folder: Path, number: int) -> Path:
