@@ -92,6 +92,41 @@ def test_effects_are_judged_beside_stiff_gauges() -> None:
     assert not any(name.endswith("_free") for one in found.judged.values() for name in one.estimate.changes)
 
 
+def test_a_cheap_press_is_judged_on_its_own_mesh() -> None:
+    """On twice the edges kinetic friction changes three times as much, which made it seem to matter."""
+    light = scene(
+        material={"E_MPa": 1.0, "nu": 0.4}, object={"shape": "sphere", "radius_mm": 25.7}, friction={"mu": 0.3},
+        press={"depth_mm": 1.06, "steps": 4}, mesh={"size_mm": 0.75, "base_size_mm": 8.0}, gauge=[],
+        effects={"auto": True, "kinetic_friction": {"ratio": 0.72}},
+    )  # fmt: skip
+    found = judge(light, QUIET).judged["kinetic_friction"]
+    assert not found.used
+    with_kinetic, without = (
+        changing_numbers(*ended(with_ratio(light, ratio).model()))["friction_sum_N"] for ratio in (0.72, 1.0 - 1e-9)
+    )
+    change = found.estimate.changes["friction_sum_N"]
+    assert change.low <= with_kinetic - without <= change.high
+
+
+def with_ratio(given: Scene, ratio: float) -> Scene:
+    effects = {"large_deformation": {}, "kinetic_friction": {"ratio": ratio}}
+    return parse({**given.given, "effects": effects})
+
+
+def test_effects_are_judged_in_small_strain_where_large_deformation_costs_too_much() -> None:
+    """No longer edges resolve this ball, and at large deformation its own press costs more than a judgement may."""
+    solid = scene(
+        model={"domain": "solid"}, object={"shape": "sphere", "radius_mm": 157.3}, friction={"mu": 0.66},
+        press={"leg": [{"depth_mm": 0.287, "steps": 4}, {"depth_mm": 0.287, "slide_x_mm": 0.1, "steps": 2}]},
+        mesh={"size_mm": 5.0, "base_size_mm": 15.0, "mesher": "swept"},
+        gauge=[{"name": "b", "x_mm": 0.0, "y_mm": 30.0, "angle_deg": 0.0, "length_mm": 5.0}],
+        effects={"auto": True, "kinetic_friction": {"ratio": 0.51}, "embedded_gauge": GAUGES},
+    )  # fmt: skip
+    judged = judge(solid, QUIET).judged
+    assert (judged["kinetic_friction"].used, judged["kinetic_friction"].why) == (False, "changes no number")
+    assert judged["large_deformation"].why.startswith("principal strains reach")
+
+
 def test_what_is_left_out_is_told_and_holds(tmp_path: Path) -> None:
     """The truth is the same press at large deformation."""
     given = changed(

@@ -10,6 +10,7 @@ import numpy as np
 
 from finger3d._types import Tree
 from finger3d.errors import Finger3dError
+from finger3d.mechanics.discretise.build import build
 from finger3d.scene import Scene, parse
 
 FINGERS: tuple[Tree, ...] = (
@@ -43,6 +44,8 @@ def scenes(sections: int, solids: int, seed: int, longer: float = 1.5) -> Iterat
             for _ in range(_TRIES):
                 try:
                     scene = parse(_drawn(random, finger, shape, domain == "solid", longer))
+                    if domain == "solid":  # its edges are given, and may be too long for the object
+                        build(scene.with_effects(()).model())
                     break
                 except Finger3dError:
                     continue

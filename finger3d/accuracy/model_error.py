@@ -1,15 +1,19 @@
 """Model error of a press: what effects that are off would change, and which effects it calls for.
 
 The scene is pressed on a coarse mesh and in few increments with all effects and without one of them; both presses take
-the same increments, so that these leave the same error in both.  The error of a change d follows from the change d' on
-a mesh with twice the edges ::
+the same increments, so that these leave the same error in both.  The error of a change d follows from the change d' in
+fewer increments on a mesh with twice the edges ::
 
     error of d = max(1.5 |d - d'|, 0.15 |d|)
 
+If the press is so cheap that its own mesh takes the place of the coarse one, a decision needs fewer increments only:
+what an effect changes on that mesh is what it changes in the press.
+
 An effect is called for if the change of a number and its error exceed a tolerance times the number's natural scale
 (`finger3d.accuracy.changes.natural_scales`).  Lengths and areas, which change by whole contact points on a coarse mesh,
-count only if they change by more than these resolve.  Where such presses cost too much, the strain of a press of linear
-elasticity decides on large deformation.  ``validation/effects_by_need.py`` measures how often both are right.
+count only if they change by more than these resolve.  Where presses at large deformation cost too much, the strain of a
+press of linear elasticity decides on large deformation, and the other effects are judged without it.
+``validation/effects_by_need.py`` measures how often both are right.
 """
 
 from __future__ import annotations
@@ -177,7 +181,7 @@ class Judgement:
     tolerance: float = 0.02
     _known: dict[tuple[bool, frozenset[str]], _Press] = field(default_factory=dict)
     _decides: bool = True
-    _is_resolved: bool = True
+    _unresolved_from: float = math.inf  # factor of edge lengths from which the object is not resolved
 
     def found(self, shortcut: bool = True) -> dict[str, Judged]:
         """Return what was found about every effect, by name.
@@ -187,14 +191,16 @@ class Judgement:
         shortcut : whether to decide only: large strains, or a large change whose error is not known, are enough
         """
         everything, self._decides = frozenset(self.effects), shortcut
-        factor = self._factor(everything)
+        for beside in filter(None, (everything, everything - {LARGE_DEFORMATION})):
+            if factor := self._factor(beside):
+                break
         out = dict[str, Judged]()
         if LARGE_DEFORMATION in everything:
             strain = self._strain(factor)
-            if factor is None or strain is None or (shortcut and strain >= _CERTAIN):
+            if factor is None or strain is None or LARGE_DEFORMATION not in beside or (shortcut and strain >= _CERTAIN):
                 out[LARGE_DEFORMATION] = self._by_strain(strain)
         for name in everything - out.keys():
-            out[name] = self._by_presses(name, everything, factor)
+            out[name] = self._by_presses(name, beside, factor)
         return {name: out[name] for name in self.effects}
 
     def _factor(self, effects: frozenset[str]) -> float | None:
@@ -204,7 +210,7 @@ class Judgement:
             budget = max(JUDGEMENT_SHARE * without_output_s(forecast(everything)), JUDGEMENT_S)
         except Finger3dError:  # more than the machine has; the press will say so
             budget = JUDGEMENT_S
-        for factor in _FACTORS:
+        for factor in (one for one in _FACTORS if one < self._unresolved_from):
             try:
                 one = forecast(self._coarse(effects, factor, _STEPS[0]))
                 seconds = without_output_s(one) - (float(one["mesh_s"]) if factor == 1.0 else 0.0)
@@ -212,7 +218,7 @@ class Judgement:
                     self._press(frozenset(), False, factor)
                     return factor
             except UnresolvedError:  # and longer edges resolve the object no better
-                self._is_resolved = False
+                self._unresolved_from = factor
                 return None
             except FAILURES:
                 continue
@@ -229,11 +235,16 @@ class Judgement:
             found = replace(found, friction=TwoCoefficients(found.friction.mu, _NO_DIFFERENCE, "keep"))
         return found
 
+    def _on_its_mesh(self, factor: float) -> bool:
+        """Whether a decision follows from presses on the mesh of the press itself."""
+        return self._decides and factor == 1.0 and self.model.mesh.borders is None
+
     def _press(self, effects: frozenset[str], still: bool, factor: float) -> _Press:
         """Press with some effects; raises what such a press raises."""
         key = still, effects
         if key not in self._known:
-            model = self._coarse(effects, factor * (_STILL if still else 1.0), _STEPS[still])
+            longer = _STILL if still and not self._on_its_mesh(factor) else 1.0
+            model = self._coarse(effects, factor * longer, _STEPS[still])
             problem = replace(build(model), without_inclusions=None)
             last = all_steps(problem, rough_workspace(problem), cuts=FEW_CUTS)[-1]
             strain = formulation_of(model).fields(problem, last.meshed_state)[1]
@@ -244,7 +255,7 @@ class Judgement:
 
     def _strain(self, factor: float | None) -> float | None:
         """Return the largest principal strain without large deformation; None if no press tells it."""
-        if not self._is_resolved:
+        if factor is None and self._unresolved_from < math.inf:
             return None
         without = frozenset[str]() if factor is None else frozenset(self.effects) - {LARGE_DEFORMATION}
         for chosen in (factor,) if factor else _FACTORS[::-1]:
@@ -270,7 +281,7 @@ class Judgement:
     def _by_presses(self, name: str, everything: frozenset[str], factor: float | None) -> Judged:
         """Judge an effect by presses with all effects and without it; if they fail, beside fewer others."""
         failure: Exception = Finger3dError("it would take too long")
-        for beside in (everything, everything - {LARGE_DEFORMATION} | {name}, frozenset({name})):
+        for beside in dict.fromkeys((everything, everything - {LARGE_DEFORMATION} | {name}, frozenset({name}))):
             if factor is None:
                 break
             try:
@@ -297,7 +308,8 @@ class Judgement:
             except FAILURES:
                 pass
             else:
-                how = f"with {_STILL:g} times these edges in at most {_STEPS[1]}"
+                longer = "" if self._on_its_mesh(factor) else f"with {_STILL:g} times these edges "
+                how = f"{longer}in at most {_STEPS[1]}"
                 error = {
                     key: max(_SAFETY * abs(d - more.numbers[key] + less.numbers[key]), _LEAST_ERROR * abs(d))
                     for key, d in change.items()
