@@ -52,7 +52,7 @@ def ball(nu: float, points: int, height: float, count: int) -> tuple[Any, ...]:
     """A row of the table for one cycle of a ball."""
     depth = 1.0 / _halfspace.RADIUS
     path = [depth * k / count for k in (*range(1, count + 1), *range(count - 1, -1, -1))]
-    found = _halfspace.press(_halfspace.quarter(nu, points, height), MU, [(d, 0.0) for d in path])
+    found = _halfspace.press(_halfspace.Ball.on(_halfspace.block(nu, points, height)), MU, [(d, 0.0) for d in path])
     work = float(np.trapezoid([0.0, *(s.P for s in found)], [0.0, *path]))
     top, lost = found[count - 1], found[-1].D
     scale = top.P * depth

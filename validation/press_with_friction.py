@@ -259,7 +259,7 @@ def _sphere(quick: bool) -> Result:
                 [r.P / hertz_sphere(nu), r.T / r.P, r.D / (r.P * DEPTH), r.c / r.a, r.iterations]
             )
         for points in meshes:
-            ball = _halfspace.quarter(nu, points, 20.0 if quick else 50.0)
+            ball = _halfspace.Ball.on(_halfspace.block(nu, points, 20.0 if quick else 50.0))
             force = _halfspace.press(ball, 0.0, [(DEPTH, 0.0)])[-1].P
             steps = _halfspace.press(ball, 0.25, [(d, 0.0) for d in depths(40)])
             s = steps[-1]

@@ -25,21 +25,17 @@ from scipy.signal import residue
 
 from finger3d._types import Float
 from finger3d.contact.friction import OPEN, Coulomb
-from finger3d.fem.assembly import stiffness
-from finger3d.fem.laws.material import Elasticity, Isotropic
+from finger3d.fem.laws.material import Isotropic
 from finger3d.fem.laws.relaxation import Relaxation
 from finger3d.fem.solids.embedded import AddedStiffness
-from finger3d.fem.solvers.condense import condense
-from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
-from finger3d.mechanics.discretise.problem import scatter_to_points
+from finger3d.fem.surface import BoundarySurface
 from finger3d.mechanics.formulation import Formulation
 from finger3d.mechanics.model import Leg
 from finger3d.mechanics.small_strain import SmallStrain
 from finger3d.mechanics.viscoelastic import Viscoelastic
-from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, Sphere, vertical_frame
+from finger3d.objects import Move, ObjectPose, PlacedObject, Plane, vertical_frame
 
 from . import _halfspace, _rings
-from ._common import held_at
 from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
@@ -93,18 +89,10 @@ def on_rings(nu: float, count: int) -> Any:
 
 def on_tets(nu: float, points: int) -> Any:
     """A quarter of a block 100 x 50 x 100 mm, `points` to a."""
-    mesh = _halfspace.graded_block(points, HEIGHT_MM)
-    held = held_at(mesh, {"x-": (0,), "y-": (0, 1, 2), "z-": (2,)})
-    face = surface(mesh, "y+")
-    face = restrict(face, np.hypot(face.points[:, 0], face.points[:, 2]) < 1.2)
-    elastic = Elasticity.of(1.0, nu)
-    matrix = stiffness(mesh, elastic)
-    kept = np.flatnonzero(~held[face.nodes][:, [1, 0, 2]].ravel())
-    small = condense(matrix, np.flatnonzero(held.ravel()), local_rows(face, vertical_frame(3))[kept])
-    delassus = scatter_to_points(small.compliance, kept, len(face.nodes), 3)
-    rest = np.asarray(face.average @ Sphere(radius_mm=RADIUS).profile(face.samples[:, 0], face.samples[:, 2]))
-    more = {"condensed": small, "parts": 4, "mesh": mesh, "elastic": elastic, "stiffness": matrix}
-    return stand_in(rest, face.area, delassus, kept, nu, **more)
+    block = _halfspace.block(nu, points, HEIGHT_MM)
+    ball = _halfspace.Ball.on(block)
+    more = {"condensed": block.condensed, "mesh": block.mesh, "elastic": block.elastic, "stiffness": block.stiffness}
+    return stand_in(ball.gap, ball.area, ball.compliance, block.dofs, nu, parts=4, **more)
 
 
 def march(body: Any, kinematics: Formulation[Any, Any], path: Sequence[tuple[float, float]]) -> tuple[Float, Float]:
