@@ -164,19 +164,6 @@ def contact_modulus(nu: float) -> Any:
     return lambda t: float(np.real((shares * np.exp(poles * t)).sum() / shares.sum()))
 
 
-def convolved(elastic: Float, times: Float) -> Float:
-    """Force of a growing contact from the elastic one at the same depths, linear within each step."""
-    t = np.concatenate([[0.0], times])
-    rate = np.diff(np.concatenate([[0.0], elastic]))
-    (share, tau) = PRONY[0]
-    out = []
-    for n in range(1, len(t)):
-        low, high = t[n] - t[1 : n + 1], t[n] - t[:n]
-        mean = (1.0 - share) + share * tau * (np.exp(-low / tau) - np.exp(-high / tau)) / (high - low)
-        out.append(float(mean @ rate[:n]))
-    return np.array(out)
-
-
 def run(quick: bool) -> Result:
     """Rings a/100 wide under 100 steps a second; tets of a/4, a/7, a/10 under 20."""
     count, per_second, meshes = (40, 20, (3,)) if quick else (100, 100, (4, 7, 10))
@@ -238,8 +225,6 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
             found[points, bulk] = force / elastic
             for t, p, a in zip(times, force / elastic * np.minimum(times, 1.0) ** 1.5, radius, strict=True):
                 table.append(("tets", 0.3, bulk, points, per_second, t, p, lee_radok(t, relax), a))
-        away = float(np.abs(found[points, True] - convolved(elastic, times) / elastic).max())
-        yield judged("distance-from-the-convolution", away, points=points)
     limit, why = (0.02, "three points to a in the quick version") if quick else (0.005, HALF)
     for bulk, relax, source, kind in (
         (True, modulus, LEE, ""),
