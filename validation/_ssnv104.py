@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
-from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
+from ._common import Body, body, box, contact_axis, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns
 
 R, E, NU = 50.0, 20_000.0, 0.3
@@ -116,16 +116,13 @@ def run(quick: bool) -> Result:
     flat = [
         (n, 2.0 * d, *v) for n, level in zip(counts, levels, strict=True) for d, v in zip(DEPTHS, level, strict=True)
     ]
-    return Result(tuple(rows), exact_columns(names, flat), lambda figure: draw(figure, counts, errors, levels, true))
+    return Result(tuple(rows), exact_columns(names, flat), lambda figure: _draw(figure, levels[-1][:, 0], true))
 
 
-def draw(figure: Any, counts: tuple[int, ...], errors: list[float], levels: list[Float], true: Float) -> None:
-    """Errors over the point spacing; force over approach against both theories."""
-    left, right = figure.subplots(1, 2)
-    label = "relative L2 error of the pressure, rms over depths"
-    convergence(left, 1.0 / np.array(counts), {"pressure": errors}, 1.0, "point spacing / a", label)
-    for n, level in zip(counts, levels, strict=True):
-        right.plot(2.0 * DEPTHS, level[:, 0] / 1e3, "os^"[counts.index(n)], markersize=4.5, label=f"{n} points to a")
-    right.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")
-    right.plot(2.0 * DEPTHS, force_at(np.sqrt(R * DEPTHS)) / 1e3, "k:", linewidth=1.0, label="Hertz, half-spaces")
-    right.set(xlabel="approach of the two balls, mm", ylabel="force, kN")
+def _draw(figure: Any, force: Float, true: Float) -> None:
+    """Force over approach against both theories."""
+    axes = figure.subplots()
+    axes.plot(2.0 * DEPTHS, force / 1e3, "o", label="finest mesh")
+    axes.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")
+    axes.plot(2.0 * DEPTHS, force_at(np.sqrt(R * DEPTHS)) / 1e3, "k:", linewidth=1.0, label="Hertz, half-spaces")
+    axes.set(xlabel="approach of the two balls, mm", ylabel="force, kN")

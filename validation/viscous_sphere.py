@@ -237,22 +237,16 @@ def _tet_rows(meshes: tuple[int, ...], table: list[tuple[Any, ...]], quick: bool
 
 
 def _draw(figure: Any, curves: dict[str, Any], columns: dict[str, list[Any]]) -> None:
-    left, middle, right = figure.subplots(1, 3)
-    for name, colour in (("hold", "C0"), ("release", "C1")):
-        t, force, radius = curves[name]
+    left, right = figure.subplots(1, 2)
+    for name, label in (("hold", "held"), ("release", "drawn back from 1.5 s")):
+        t, force, _ = curves[name]
         shown = t <= 2.3
         theory = [ting(s)[0] if name == "release" and s > HELD else lee_radok(s) for s in t[shown]]
-        left.plot(t[shown], force[shown], colour, label={"hold": "held", "release": "drawn back from 1.5 s"}[name])
+        left.plot(t[shown], force[shown], label=label)
         left.plot(t[shown], theory, "k--", lw=0.9)
-        middle.plot(t[shown], radius[shown], colour)
-        size = [ting(s)[1] if name == "release" and s > HELD else np.sqrt(min(s, 1.0)) for s in t[shown]]
-        middle.plot(t[shown], size, "k--", lw=0.9)
     left.set(xlabel="t, s", ylabel="P/k", title="rings (dashed: Lee and Radok, Ting)")
-    middle.set(xlabel="t, s", ylabel="a, mm", title="contact radius")
     for (bulk, points), t in grouped(columns, "bulk", "resolution", body="tets"):
         error, kind = 100.0 * (t["P_over_k"] / t["theory"] - 1.0), "nu constant" if bulk else "K constant"
         right.plot(t["t"], error, "C0" if bulk else "C2", alpha=0.3 + 0.06 * points, label=f"{kind}, a/{points}")
-    right.set(xlabel="t, s", ylabel="error of the force, %", title="tets (dotted: tolerance)", ylim=(-0.8, 0.8))
-    for bound in (-0.5, 0.5):
-        right.axhline(bound, color="k", ls=":", lw=0.8)
-    right.axhline(0.0, color="k", lw=0.6)
+    right.axhspan(-0.5, 0.5, color="0.93", lw=0.0)
+    right.set(xlabel="t, s", ylabel="error of the force, %", title="tets (grey: tolerance)", ylim=(-0.8, 0.8))
