@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from finger3d.mechanics.discretise.build import build
 
@@ -71,17 +72,7 @@ def roundness(profile: Profile) -> float:
 
 def extrema(q: np.ndarray) -> int:
     """Local extrema of q along x that stand out by more than a fifth of its range."""
-    turning, last, least = 0, q[0], 0.2 * np.ptp(q)
-    direction = 0
-    for value in q:
-        if direction >= 0 and value > last or direction <= 0 and value < last:
-            if abs(value - last) > least or direction:
-                direction = direction or int(np.sign(value - last))
-                last = value
-        elif abs(value - last) > least:
-            turning += 1
-            direction, last = -direction, value
-    return turning
+    return sum(len(find_peaks(sign * q, prominence=0.2 * np.ptp(q))[0]) for sign in (1.0, -1.0))
 
 
 def statements_depths(here: str, profiles: Sequence[Profile]) -> list[Row]:
