@@ -20,9 +20,8 @@ from finger3d.contact.friction import OPEN, SLIP
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
-from ._common import ticks_at
 from ._halfplane import Profile, compliance, line, loading, under
-from ._rows import Result, Row, exact_columns, grouped, listed
+from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
 
@@ -75,8 +74,7 @@ def run(quick: bool) -> Result:
     rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
     rows.append(judged("rate-at-which-the-drop-of", rate))
     rows.append(judged("drop-of-load-that-reverses-the", drops[meshes[-1]], 2.0 / meshes[-1], finest=meshes[-1]))
-    columns = exact_columns(COLUMNS, table)
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, nu, found, shown))
 
 
 def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: list[Profile]) -> Iterator[Row]:
@@ -94,20 +92,15 @@ def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: lis
         yield judged("rate-at-which-the-excess", rate, here=here)
 
 
-def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:
-    left, middle, right = figure.subplots(1, 3)
+def _draw(figure: Any, nu: float, found: list[Profile], shown: list[Profile]) -> None:
+    left, right = figure.subplots(1, 2)
     half = found[: len(found) // 2]
     force = np.array([0.0, *(p.force for p in half)]) / max(p.force for p in half)
     depth = np.array([0.0, *(p.frame.target.depth_mm for p in half)])
     top = len(half) // 2
     pressing = np.interp(depth, depth[: top + 1], force[: top + 1])
-    left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {columns['nu'][-1]:g}, mu = {MU:g}")
+    left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {nu:g}, mu = {MU:g}")
     left.set(xlabel="depth / largest", ylabel="force - that of the press, 0.1 %", title="the loop, opened")
-    for nu, t in grouped(columns, "nu", body="cylinder", points_per_a=20):
-        middle.loglog(t["increments"], 100.0 * np.abs(t["work_over_lost"] - 1.0), "o-", label=f"cylinder, nu = {nu:g}")
-    counts = sorted(set(t["increments"]))
-    middle.set(xlabel="increments each way", ylabel="|work - work lost|, % of it", title="energy balance")
-    ticks_at(middle, counts[-3:])
     less = f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"
     for profile, name in ((shown[0], "loaded"), (shown[-1], less)):
         inside = (profile.x >= 0.0) & (profile.status != OPEN)
