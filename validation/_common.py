@@ -350,6 +350,18 @@ def quarter_block(x: Float, depths: Float, nu: float, reach: float, plane: Seque
     return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < reach)
 
 
+def ball_numbers(quarter: Body, force: Float, radius: float, modulus: float) -> tuple[float, float, float]:
+    """Force (N) of a ball on the whole body, contact radius (mm) by the second moment of the pressure, and the L2 error
+    of the pressure over that of Hertz at the same force, from the normal forces (c,) on a quarter."""
+    square = quarter.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
+    whole, area = 4.0 * force.sum(), quarter.surface.area
+    a = (0.75 * whole * radius / modulus) ** (1.0 / 3.0)
+    inside = np.maximum(0.0, 1.0 - (quarter.surface.points[:, [0, 2]] ** 2).sum(axis=1) / a**2)
+    hertz = 1.5 * whole / (np.pi * a**2) * np.sqrt(inside)
+    away = np.sqrt(area @ (force / area - hertz) ** 2 / (area @ hertz**2))
+    return float(whole), float(np.sqrt(2.5 * (force @ square) / force.sum())), float(away)
+
+
 def free_motion(problem: Problem, target: ObjectPose) -> Float:
     """Gap and tangential displacement (c, d), mm, of every point relative to a plane under no contact force."""
     geometry = contact_geometry(problem.placed(target).distance, problem.surface, axes=problem.axes)

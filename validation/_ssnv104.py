@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
-from ._common import Body, body, box, contact_axis, graded, held_at, mapped, rate
+from ._common import Body, ball_numbers, body, box, contact_axis, ellipse, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns
 
 R, E, NU = 50.0, 20_000.0, 0.3
@@ -67,20 +67,13 @@ def measured(count: int) -> Float:
     """Per depth: force (N), contact radius by the second moment (mm), peak of the line of p^2 (MPa), L2 error of p."""
     here = ball(count)
     gap = here.gap(lambda p: R - p[:, 1])
-    square = here.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
-    place = (here.surface.points[:, [0, 2]] ** 2).sum(axis=1)
-    area = here.surface.area
+    place = np.sqrt((here.surface.points[:, [0, 2]] ** 2).sum(axis=1))
     found = []
     for depth in DEPTHS:
         f = here.normal_force(gap - depth)
-        force = 4.0 * f.sum()
-        same = (0.75 * force * R / MODULUS) ** (1.0 / 3.0)
-        p = f / area
-        inner = place < (0.8 * same) ** 2
-        top = np.polyfit(place[inner], p[inner] ** 2, 1)[1]
-        hertz = 1.5 * force / (np.pi * same**2) * np.sqrt(np.maximum(0.0, 1.0 - place / same**2))
-        away = np.sqrt(area @ (p - hertz) ** 2 / (area @ hertz**2))
-        found.append((force, np.sqrt(2.5 * (f @ square) / f.sum()), np.sqrt(top), away))
+        force, a, away = ball_numbers(here, f, R, MODULUS)
+        reach = 0.8 * (0.75 * force * R / MODULUS) ** (1.0 / 3.0)
+        found.append((force, a, ellipse(place, f / here.surface.area, reach)[1], away))
     return np.array(found)
 
 

@@ -32,7 +32,7 @@ from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Leg
 from finger3d.objects import Cylinder
 
-from ._common import contact_axis, convergence, ellipse, ellipse_error, graded, quarter_block, rate
+from ._common import ball_numbers, contact_axis, convergence, ellipse, ellipse_error, graded, quarter_block, rate
 from ._halfplane import CANDIDATES, Profile, on_block
 from ._layer import line, point
 from ._press import converged
@@ -138,19 +138,10 @@ def force_at(a: float, nu: float) -> float:
 def measured_sphere(nu: float, count: int) -> Float:
     """Per depth: P/P_Hertz(a) by the moment, and the pressure's L2 error at the points over Hertz's own norm."""
     block = quarter_block(contact_axis(1.0, count, HEIGHT), graded(HEIGHT, 1.0 / count, 1.6), nu, 1.3)
-    square = block.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
-    place = (block.surface.points[:, [0, 2]] ** 2).sum(axis=1)
-    found = []
-    for v in PLACES:
-        f = block.normal_force(square / (2.0 * RADIUS) - depth(v, nu))
-        force = 4.0 * f.sum()
-        a = np.sqrt(2.5 * (f @ square) / f.sum())
-        same = (force / force_at(1.0, nu)) ** (1.0 / 3.0)
-        hertz = 1.5 * force / (np.pi * same**2) * np.sqrt(np.maximum(0.0, 1.0 - place / same**2))
-        area = block.surface.area
-        away = np.sqrt(area @ (f / area - hertz) ** 2 / (area @ hertz**2))
-        found.append((force / force_at(a, nu), away))
-    return np.array(found)
+    gap = block.gap(lambda p: (p[:, 0] ** 2 + p[:, 2] ** 2) / (2.0 * RADIUS))
+    forces = [block.normal_force(gap - depth(v, nu)) for v in PLACES]
+    found = [ball_numbers(block, force, RADIUS, 1.0 / (1.0 - nu**2)) for force in forces]
+    return np.array([(force / force_at(a, nu), away) for force, a, away in found])
 
 
 def _sphere(quick: bool) -> Result:

@@ -45,7 +45,7 @@ from finger3d.objects import (
 )
 from finger3d.objects.rigid import rotation
 
-from ._common import Body, body, increment
+from ._common import Body, body, held_at, increment
 from ._press import converged
 from ._rows import Result, exact_columns, listed, together
 from .triangulated_objects import ball
@@ -151,8 +151,7 @@ def finger(size: float) -> Mesh:
 
 def condensed(mesh: Mesh) -> Body:
     """Contact points within 2 mm of the pole."""
-    held = np.zeros(mesh.points.shape, dtype=bool)
-    held[np.unique(mesh.facets["base"])] = True
+    held = held_at(mesh, {"base": (0, 1, 2)})
     return body(mesh, Elasticity.of(1.0, 0.45), held, "contact", lambda p: np.hypot(p[:, 0], p[:, 2]) < 2.0)
 
 
