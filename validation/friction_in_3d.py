@@ -188,4 +188,4 @@ def draw_spread(figure: Any, panels: Mapping[str, Sequence[Curve]], columns: int
     for axes in every[:, 0]:
         axes.set_ylabel("standard deviation of mu")
     lines = {line.get_label(): line for axes in every.flat for line in axes.get_legend_handles_labels()[0]}
-    figure.legend(lines.values(), lines, loc="outside lower center", ncols=len(lines), frameon=False, fontsize=9)
+    figure.legend(lines.values(), lines, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
