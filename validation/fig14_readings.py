@@ -190,9 +190,9 @@ def _claims(curves: list[Curve]) -> Iterator[Row]:
 
 
 def _draw_models(figure: Any, curves: list[Curve]) -> None:
-    panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
+    panels = figure.subplots(1, 2)
     models = list(dict.fromkeys(c.model for c in curves))
-    for axes, leaning in zip(panels, ("30", "-30"), strict=False):
+    for axes, leaning in zip(panels, ("30", "-30"), strict=True):
         mu = np.linspace(0.06, 0.5, 50)
         c = NOISE / ERROR**2
         axes.plot(mu, 1e3 * c * ((mu - 0.5) ** 2 - 0.44**2), "k--", lw=1.5, label="measured, read by the vertex")
@@ -209,18 +209,6 @@ def _draw_models(figure: Any, curves: list[Curve]) -> None:
         axes.set_title(f"gauge at {leaning}°, y = 40 mm, z = 0, nu = 0.49")
     figure.legend(*panels[0].get_legend_handles_labels(), title="solid: free strain, dotted: foil of 4 mm",
                   loc="outside lower left", ncols=4, frameon=False)  # fmt: skip
-    shares = [[np.mean([getattr(c, by) for c in curves if c.model == m and c.kind == FREE and c.leaning == lean])
-               for lean in LEANING] for m in models for by in ("by_slope", "by_vertex")]  # fmt: skip
-    axes = panels[2]
-    axes.imshow(np.array(shares), cmap="Greens", vmin=0.0, vmax=1.0, aspect="auto")
-    for i, line in enumerate(shares):
-        for j, share in enumerate(line):
-            ink = "w" if share > 0.7 else "k"
-            axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8, color=ink)
-    names = [f"{name.split()[0]}°\nfrom {'y' if 'vertical' in name else 'x'}" for name in LEANING]
-    axes.set_xticks(range(len(LEANING)), names, fontsize=8)
-    axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=8)
-    axes.set_title("share of places and nu compatible")
 
 
 MUS_FOIL = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)
