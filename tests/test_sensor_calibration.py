@@ -13,6 +13,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from finger3d.analyses import pressed_body as pressing
+from finger3d.analyses.gauge_places import StrainField
 from finger3d.errors import Finger3dError
 from finger3d.mechanics.discretise.build import build
 from finger3d.sensor import Calibration, Tolerance, estimate, load, save
@@ -20,7 +21,6 @@ from finger3d.sensor.calibration import summary
 from finger3d.sensor.curve import MonotoneCubic
 from tests.commands import run
 from tests.sensor_cases import SCENE, curve, kinked, line, saturating, scene, straight, together, tolerance, turning
-from validation._strain_maps import StrainMap
 
 
 def test_the_interpolation_is_that_of_scipy() -> None:
@@ -259,32 +259,14 @@ def test_a_file_with_any_part_changed_or_removed_is_refused(tmp_path: Path, caps
 
 
 @pytest.mark.parametrize("domain", ["plane-strain", "solid"])
-def test_the_map_reads_what_a_gauge_there_reads(domain: str) -> None:
-    """The middles of squares at (35.5, 39.5) and, in the mirrored half, (-20.5, 30.5) mm."""
-    places = [(35.5, 39.5), (-20.5, 30.5)]
-    gauges = [{"name": f"{x}:{a}", "x_mm": x, "y_mm": y, "angle_deg": a} for x, y in places for a in (0.0, 40.0, 90.0)]
+def test_a_field_reads_what_a_gauge_there_reads(domain: str) -> None:
+    """At (35.5, 39.5) and, in the mirrored half, at (-20.5, 30.5) mm."""
+    places, angles = [(35.5, 39.5), (-20.5, 30.5)], (0.0, 40.0, 90.0)
+    gauges = [{"name": f"{x}:{a}", "x_mm": x, "y_mm": y, "angle_deg": a} for x, y in places for a in angles]
     size = {"size_mm": 8.0, "base_size_mm": 14.0, "mesher": "swept"} if domain == "solid" else SCENE["mesh"]
-    model = scene(gauge=gauges, model={"domain": domain}, mesh=size).model()
-    problem = build(model)
-    frames = {mu: pressing.press(problem, mu).frame for mu in (0.2, 0.4)}
-    found = StrainMap.of(problem, frames)
-    for x, y in places:
-        i, j = int(np.argmin(np.abs(found.y - y))), int(np.argmin(np.abs(found.x - x)))
-        for a in (0.0, 40.0, 90.0):
-            got = found.along(math.radians(a))[:, i, j]
-            assert got == pytest.approx([frames[mu].gauges[f"{x}:{a}"] for mu in (0.2, 0.4)], abs=1e-10)
-    slope = found.slope_at(0.0, 0.3)
-    assert slope.shape == (len(found.y), len(found.x))
-    assert np.isnan(slope[-1, 0])  # beside the dome
-    assert np.isfinite(slope[0]).all()
-
-
-def test_the_map_of_a_mirror_image_is_a_mirror_image() -> None:
-    problem = build(scene().model())
-    found = StrainMap.of(problem, {mu: pressing.press(problem, mu).frame for mu in (0.2, 0.6)})
-    assert np.allclose(found.along(0.5), found.along(math.pi - 0.5)[:, :, ::-1], atol=1e-12, equal_nan=True)
-    best, angle = found.best()
-    assert (
-        np.nanmax(found.worst_slope(np.array([0.5]))[0] - best) <= np.nanmax(best) * 0.05
-    )  # the best of 5 degree steps
-    assert np.nanmin(angle) >= 0.0
+    problem = build(scene(gauge=gauges, model={"domain": domain}, mesh=size).model())
+    mus = (0.2, 0.4)
+    frames = [pressing.press(problem, mu).frame for mu in mus]
+    found = StrainField.of_frames(problem, frames, mus).strain(np.insert(places, 2, 0.0, axis=1), np.radians(angles))
+    wanted = [[[frame.gauges[f"{x}:{a}"] for frame in frames] for a in angles] for x, _ in places]
+    assert found == pytest.approx(np.array(wanted), abs=1e-10)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,10 @@ from finger3d.contact.conditions import ContactProblem
 from finger3d.contact.friction import SLIP, Coulomb
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactSolution, ContactState
-from finger3d.fem.assembly import stiffness
+from finger3d.fem.assembly import Stiffness, stiffness
 from finger3d.fem.laws.material import Elasticity
 from finger3d.fem.mesh import Mesh, boundary, quadratic, signed_volumes
-from finger3d.fem.solvers.condense import condense
+from finger3d.fem.solvers.condense import Condensation, condense
 from finger3d.fem.surface import BoundarySurface, local_rows, restrict, surface
 from finger3d.mechanics.discretise.contact_points import contact_geometry
 from finger3d.mechanics.discretise.problem import Problem, scatter_to_points
@@ -225,10 +225,24 @@ def marched(
 
 @dataclass(frozen=True)
 class Body:
-    """A body condensed to the contact points of one side: compliance (c, d, c, d) mm/N in the vertical frame."""
+    """A body condensed to the contact points of one side, in the vertical frame.
 
+    Attributes
+    ----------
+    dofs : (r,) components of the points that may move, to which the body is condensed
+    """
+
+    mesh: Mesh
+    elastic: Elasticity
+    stiffness: Stiffness
     surface: BoundarySurface
-    compliance: Float
+    dofs: NDArray[np.int64]
+    condensed: Condensation
+
+    @cached_property
+    def compliance(self) -> Float:
+        """Displacements (c, d) mm of the points per unit force (c, d) N: (c, d, c, d)."""
+        return scatter_to_points(self.condensed.compliance, self.dofs, *self.surface.points.shape)
 
     def normal_force(self, gap: Float) -> Float:
         """Normal forces (c,) N under a rigid gap (c,) mm at rest without friction, negative where the object would
@@ -257,12 +271,10 @@ def body(
     face = restrict(face, keep(face.points))
     rows = local_rows(face, vertical_frame(mesh.dim))
     matrix = stiffness(mesh, elastic)
-    c, d = face.points.shape
     # a direction held at a point (a symmetry plane) cannot move: it is left out of the condensation
-    locked = held[face.nodes][:, [1, 0, 2][:d]].ravel()
-    free = np.flatnonzero(~locked)
-    small = condense(matrix, np.flatnonzero(held.ravel()), rows[free], solver).compliance
-    return Body(face, scatter_to_points(small, free, c, d))
+    dofs = np.flatnonzero(~held[face.nodes][:, [1, 0, 2][: mesh.dim]].ravel())
+    small = condense(matrix, np.flatnonzero(held.ravel()), rows[dofs], solver)
+    return Body(mesh, elastic, matrix, face, dofs, small)
 
 
 def ellipse(x: Float, p: Float, reach: float) -> tuple[float, float]:
@@ -325,14 +337,29 @@ def contact_axis(a: float, count: int, length: float, growth: float = 1.6) -> Fl
     return np.concatenate([fine, fine[-1] + graded(length - fine[-1], step * growth, growth)[1:]])
 
 
-def quarter_block(x: Float, depths: Float, nu: float, reach: float) -> Body:
+def quarter_block(x: Float, depths: Float, nu: float, reach: float, plane: Sequence[int] = (0,)) -> Body:
     """Quarter of a square block on a fixed base, E = 1 MPa: coordinates along x and z, and depths from the top.
 
-    Contact points lie within `reach` mm of the middle.
+    Parameters
+    ----------
+    reach : largest distance of the contact points from the middle, mm
+    plane : components that are held at x = 0
     """
     mesh = quadratic(box([x, depths[-1] - depths[::-1], x]))
-    held = held_at(mesh, {"x-": [0], "z-": [2], "y-": [0, 1, 2]})
+    held = held_at(mesh, {"x-": plane, "z-": [2], "y-": [0, 1, 2]})
     return body(mesh, Elasticity.of(1.0, nu), held, "y+", lambda p: np.hypot(p[:, 0], p[:, 2]) < reach)
+
+
+def ball_numbers(quarter: Body, force: Float, radius: float, modulus: float) -> tuple[float, float, float]:
+    """Force (N) of a ball on the whole body, contact radius (mm) by the second moment of the pressure, and the L2 error
+    of the pressure over that of Hertz at the same force, from the normal forces (c,) on a quarter."""
+    square = quarter.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
+    whole, area = 4.0 * force.sum(), quarter.surface.area
+    a = (0.75 * whole * radius / modulus) ** (1.0 / 3.0)
+    inside = np.maximum(0.0, 1.0 - (quarter.surface.points[:, [0, 2]] ** 2).sum(axis=1) / a**2)
+    hertz = 1.5 * whole / (np.pi * a**2) * np.sqrt(inside)
+    away = np.sqrt(area @ (force / area - hertz) ** 2 / (area @ hertz**2))
+    return float(whole), float(np.sqrt(2.5 * (force @ square) / force.sum())), float(away)
 
 
 def free_motion(problem: Problem, target: ObjectPose) -> Float:

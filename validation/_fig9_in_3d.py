@@ -16,7 +16,7 @@ import numpy as np
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.history import measure
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, draw_by_mu, fig9, line, said, strains
+from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, draw_grid, fig9, line, rows_by_mu, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns, listed
 from .fig9_strains import ANGLES, gauges, statements
@@ -87,13 +87,7 @@ def _statements(nu: float, shear: dict, gauge: dict, middle: dict, numbers: dict
 
 def _draw(figure: Any, x: np.ndarray, nu: float, shear: dict, gauge: dict, middle: dict) -> None:
     figure.set_size_inches(13.0, 8.6)
-    panels = figure.subplots(3, 3, sharey="row")
     figure.suptitle(f"The Fig. 9 finger at 10 mm, nu = {nu:g}: as built (left), and as the two plane models see it")
-    for column, plane in enumerate(PLANES):
-        draw_by_mu(panels[:, column], x, middle[plane, nu], [shear[plane, nu]], gauge[plane, nu])
-        panels[0, column].set_title("20 mm wide, z = 0" if plane == SOLID else plane)
-    labels = "friction along x (MPa)", "gamma_xy under the surface", "gauge strain at x = 36"
-    for axes, label in zip(panels[:, 0], labels, strict=True):
-        axes.set_ylabel(label)
-    panels[0, 0].legend(title="mu", frameon=False, ncols=2)
-    panels[2, 0].legend(title="angle", frameon=False, ncols=2)
+    profiles, strains, gauges = ([found[plane, nu] for plane in PLANES] for found in (middle, shear, gauge))
+    rows = rows_by_mu(x, profiles, {"gamma_xy under the surface": strains}, gauges)
+    draw_grid(figure, ["20 mm wide, z = 0", STRAIN, STRESS], rows)

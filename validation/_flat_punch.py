@@ -10,8 +10,6 @@ fraction of h.  So the error is of first order in h, and of one sign everywhere 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from finger3d._types import Float
@@ -75,17 +73,7 @@ def run(quick: bool) -> Result:
         curves[f"force within a/2, nu = {nu:g}"] = found[:, 3]
         table += [(nu, *e) for e in found]
     names = "nu corner_element_over_a worst_error rms_error error_of_inner_force"
-    return Result(tuple(rows), exact_columns(names, table), lambda figure: draw(figure, found[:, 0], curves))
-
-
-def draw(figure: Any, sizes: Float, curves: dict[str, Float]) -> None:
-    """Errors over the size at the corner, and the pressure against the closed form."""
-    left, right = figure.subplots(1, 2)
-    convergence(left, sizes, curves, 1.0, "first element at the corner / a", "relative error")
-    x, p, force = pressures(0.01, 0.3)
-    mean = float(force.sum())
-    fine = np.linspace(0.0, 0.999, 1000)
-    right.plot(fine, exact(fine, 2.0), "k--", linewidth=1.0, label="P / (pi sqrt(a^2 - x^2))")
-    right.plot(x, p / mean, "o", markersize=4.5, label="nodes, h = 0.01 a")
-    right.axvline(AWAY, color="0.6", linewidth=0.8)
-    right.set(ylim=(0.0, 4.0), xlabel="x / a", ylabel="pressure / mean pressure")
+    labels = "first element at the corner / a", "relative error"
+    return Result(
+        tuple(rows), exact_columns(names, table), lambda f: convergence(f.subplots(), found[:, 0], curves, 1.0, *labels)
+    )

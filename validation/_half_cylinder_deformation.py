@@ -61,10 +61,7 @@ def _draw_r5(figure: Any, found: dict[Any, Any]) -> None:
     for axes, (plane, nu) in zip(panels, SHOWN, strict=True):
         problem, frame, profile = found[plane, nu]
         _deformed(axes, problem, frame, 0.2)
-        t = np.linspace(0.0, np.pi, 200)
-        axes.plot(5 * np.cos(t), 5 * np.sin(t), color="#999999", lw=0.8)
-        axes.axhline(4.0, color="#c0392b", lw=1.2)
-        axes.set(xlim=(-5.8, 5.8), ylim=(-0.3, 5.3), aspect="equal", xlabel="x (mm)")
+        axes.set(xlim=(-5.8, 5.8), ylim=(-0.3, 5.3))
         told = f"{profile.force:.2f} N/mm, contact {2 * profile.deformed:.2f} mm wide"
         axes.set_title(f"{plane}, nu = {nu:g}\n{told}")
     panels[0].set_ylabel("y (mm)")
@@ -123,13 +120,18 @@ def _sensitivity(widths: dict[Any, tuple[float, ...]]) -> Row:
 
 
 def _deformed(axes: Any, problem: Problem, frame: StepResult, lw: float) -> None:
-    """Draw the deformed mesh and its mirror image."""
+    """Draw the deformed mesh and its mirror image, the outline at rest, and the plate."""
     from matplotlib.collections import PolyCollection
 
     mesh, parent, sign = unfold(problem.mesh, (0,))
     now = mesh.points + moved(problem, frame)[parent] * sign
     cells = list(now[mesh.cells[:, [0, 3, 1, 4, 2, 5]]])
     axes.add_collection(PolyCollection(cells, facecolor="#e9eef5", edgecolor="#8296ad", lw=lw))
+    design = problem.model.design
+    x = design.half_length_mm * np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 201))
+    axes.plot([x[0], *x, x[-1]], [0.0, *design.top(x, 0.0 * x), 0.0], color="#999999", lw=0.8)
+    axes.axhline(design.height_mm - frame.target.depth_mm, color="#c0392b", lw=1.2)
+    axes.set(aspect="equal", xlabel="x (mm)")
 
 
 def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[float, ...]]) -> None:
@@ -139,10 +141,7 @@ def _draw_fig9(figure: Any, drawn: dict[float, Any], widths: dict[Any, tuple[flo
         axes = figure.add_subplot(grid[0, column])
         problem, frame, profile = drawn[nu]
         _deformed(axes, problem, frame, 0.15)
-        x = np.linspace(-50.0, 50.0, 201)
-        axes.plot([-50, *x, 50], [0, *problem.model.design.top(x, 0 * x), 0], color="#999999", lw=0.8)
-        axes.axhline(problem.model.design.height_mm - 10.0, color="#c0392b", lw=1.2)
-        axes.set(xlim=(-62, 62), ylim=(-2, 54), aspect="equal", xlabel="x (mm)")
+        axes.set(xlim=(-62, 62), ylim=(-2, 54))
         told = f"{profile.force:.1f} N/mm, {2 * profile.deformed:.1f} mm"
         axes.set_title(f"plane strain, nu = {nu:g}: {told}")
     axes = figure.add_subplot(grid[1, :])

@@ -10,10 +10,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from finger3d.mechanics.discretise.build import build
 
-from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, draw_shown, half_cylinder, said
+from ._paper import CASES, MUS, SHOWN, STRAIN, STRESS, Profile, by_mu, draw_shown, half_cylinder, said
 from ._press import under
 from ._rows import Result, Row, columns, together
 
@@ -71,17 +72,7 @@ def roundness(profile: Profile) -> float:
 
 def extrema(q: np.ndarray) -> int:
     """Local extrema of q along x that stand out by more than a fifth of its range."""
-    turning, last, least = 0, q[0], 0.2 * np.ptp(q)
-    direction = 0
-    for value in q:
-        if direction >= 0 and value > last or direction <= 0 and value < last:
-            if abs(value - last) > least or direction:
-                direction = direction or int(np.sign(value - last))
-                last = value
-        elif abs(value - last) > least:
-            turning += 1
-            direction, last = -direction, value
-    return turning
+    return sum(len(find_peaks(sign * q, prominence=0.2 * np.ptp(q))[0]) for sign in (1.0, -1.0))
 
 
 def statements_depths(here: str, profiles: Sequence[Profile]) -> list[Row]:
@@ -108,7 +99,6 @@ def _near(profile: Profile, reach: float) -> tuple[np.ndarray, ...]:
 
 
 JUDGED_ZONES = ((STRESS, 0.0), (STRESS, 0.3), (STRESS, 0.49), (STRAIN, 0.3), (STRAIN, 0.49))
-DRAWN = ((STRESS, 0.3), (STRAIN, 0.49))
 
 
 def _zones(quick: bool) -> Result:
@@ -148,26 +138,12 @@ def statements_zones(here: str, early: Profile, last: Profile) -> list[Row]:
 
 
 def _draw_zones(figure: Any, found: dict[Any, list[Profile]]) -> None:
-    panels = figure.subplots(1, 3)
-    for axes, (plane, nu) in zip(panels, DRAWN, strict=False):
-        last = found[plane, nu][-1]
-        on = np.abs(last.x) < 3.2
-        axes.axvspan(-last.a, last.a, color="#fde3c4", lw=0, label="slip")
-        axes.axvspan(-last.c, last.c, color="#c9d9ee", lw=0, label="stick")
-        axes.plot(last.x[on], last.p[on], color="#222222", label="f_n")
-        axes.plot(last.x[on], 0.25 * last.p[on], "--", color="#777777", lw=1, label="± mu f_n")
-        axes.plot(last.x[on], -0.25 * last.p[on], "--", color="#777777", lw=1)
-        axes.plot(last.x[on], last.q[on], color="#c0392b", label="f_t")
-        axes.set(xlabel="x (mm)", xlim=(-3.2, 3.2), ylim=(-0.13, 0.5), title=f"{plane}, nu = {nu:g}, 1 mm")
-    panels[0].legend(loc="upper left", framealpha=1.0)
-    panels[0].set_ylabel("traction on the finger (MPa)")
-    for i, (plane, nu) in enumerate(JUDGED_ZONES):
-        profiles = found[plane, nu]
-        depth = 0.1 * np.arange(1, 11)
+    axes = figure.subplots()
+    for plane, nu in JUDGED_ZONES:
+        width = [profile.a - profile.c for profile in found[plane, nu]]
         style = "o-" if plane == STRESS else "s--"
-        panels[2].plot(depth, [p.a - p.c for p in profiles], style, ms=4, color=f"C{i}", label=f"{plane}, nu = {nu:g}")
-    panels[2].set(xlabel="depth (mm)", ylabel="width of each slip zone (mm)")
-    panels[2].legend(frameon=False)
+        axes.plot(0.1 * np.arange(1, 11), width, style, ms=4, label=f"{plane}, nu = {nu:g}")
+    axes.set(xlabel="depth (mm)", ylabel="width of each slip zone (mm)")
 
 
 def _mus(quick: bool) -> Result:
@@ -212,7 +188,7 @@ def statements_mus(
 
 def _draw_mus(figure: Any, found: dict[Any, Profile]) -> None:
     figure.suptitle("Tractions on the finger at 1 mm under five friction coefficients")
-    curves = {case: {f"{mu:g}": _near(found[*case, mu], 3.1) for mu in MUS} for case in SHOWN}
+    curves = {case: by_mu(_near(found[*case, mu], 3.1) for mu in MUS) for case in SHOWN}
     draw_shown(figure, TRACTIONS, "mu", curves)
 
 

@@ -17,10 +17,13 @@ from ._paper import (
     BELOW_R5,
     CASES,
     MUS,
+    NAMES_SHOWN,
     SHOWN,
     STRAIN,
     STRESS,
     Profile,
+    by_mu,
+    draw_grid,
     draw_shown,
     half_cylinder,
     line_r5,
@@ -146,7 +149,7 @@ def _on_all_lines(found: dict[Any, np.ndarray]) -> Iterator[Row]:
 
 def _draw_mus(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
     figure.suptitle(f"Strains {BELOW_R5:g} mm under the surface at 1 mm under five friction coefficients")
-    curves = {case: {f"{mu:g}": (x, *found[*case, mu]) for mu in MUS} for case in SHOWN}
+    curves = {case: by_mu((x, *found[*case, mu]) for mu in MUS) for case in SHOWN}
     draw_shown(figure, NAMES, "mu", curves)
 
 
@@ -208,18 +211,12 @@ def _statements(plane: str, nu: float, found: dict[Any, np.ndarray], signal: flo
 
 
 def _draw_kinetic(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
-    panels = figure.subplots(2, 3, sharex=True, sharey="col")
     figure.suptitle("Shear strain .5 mm under the surface at 1 mm, static mu = .25; rows: the rule for mu_k < mu_s")
-    for column, (plane, nu) in enumerate(SHOWN):
-        for row, branch in enumerate(BRANCHES):
-            axes = panels[row, column]
-            for i, ratio in enumerate(RATIOS):
-                axes.plot(x, found[plane, nu, 0.25, branch, ratio], color=f"C{i}", label=f"{ratio:g}", lw=1.2)
-            axes.axhline(0.0, color="#999999", lw=0.7)
-            axes.set_title(f"{plane}, nu = {nu:g}, branch {branch}")
-            panels[row, 0].set_ylabel("gamma_xy")
-        panels[1, column].set_xlabel("x (mm)")
-    panels[0, 0].legend(title="mu_k / mu_s", frameon=False)
+    rows = []
+    for rule in BRANCHES:
+        cells = [{f"{ratio:g}": (x, found[*case, 0.25, rule, ratio]) for ratio in RATIOS} for case in SHOWN]
+        rows.append((f"gamma_xy, {rule}", "x (mm)", "mu_k / mu_s", cells))
+    draw_grid(figure, NAMES_SHOWN, rows)
 
 
 def run(quick: bool) -> Result:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finger3d._types import Float
-from finger3d.contact.friction import OPEN, SLIP, STICK, Coulomb, FrictionLaw
+from finger3d.contact.friction import OPEN, SLIP, STICK, FrictionLaw
 from finger3d.fem.laws.material import Isotropic
 from finger3d.geometry.design import designs
 from finger3d.mechanics.discretise.build import build
@@ -22,7 +22,8 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Leg, MeshOptions, Model
 from finger3d.objects import Cylinder, RigidObject
 
-from ._press import changed, converged
+from . import _press
+from ._press import changed
 
 RADIUS = 1e3  # a/R = 1e-3: the theory neglects the slope of the surface, which turns pressure into friction
 DEPTH_OF_BLOCK = 200.0  # a/h = 0.005: the base's strain is 1 % of the contact's own at worst, see press_with_friction
@@ -68,8 +69,7 @@ def line(nu: float, points: float, legs: tuple[Leg, ...], height: float = DEPTH_
 
 def under(problem: Problem, friction: FrictionLaw | float, legs: tuple[Leg, ...] | None = None) -> list[Profile]:
     """March the problem under another friction, and other legs if given; the condensation is shared."""
-    law = Coulomb(friction) if isinstance(friction, float) else friction
-    steps = converged(changed(problem, friction=law, legs=legs or problem.model.legs))
+    steps = _press.under(changed(problem, legs=legs or problem.model.legs), friction)
     return [Profile.of(problem, step) for step in steps]
 
 

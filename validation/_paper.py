@@ -8,7 +8,7 @@ half cylinder, and so deep under Fig. 9's that it passes (36, 40) mm.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -176,51 +176,69 @@ said = listed(__file__)
 """Rows of the paper's statements, which _paper.toml lists."""
 
 
-def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: dict[Any, dict[str, Any]]) -> None:
+Drawn = tuple[str, str, str, Sequence[Mapping[str, Any]]]
+"""Row of a grid of panels: its quantity, what that is drawn over, the title of its legend, and for every column the
+places and values of the curves by label."""
+
+
+def draw_grid(figure: Any, columns: Sequence[str], rows: Sequence[Drawn]) -> None:
+    """Draw a grid of panels with titles above its columns."""
+    from matplotlib import colormaps
+
+    panels = figure.subplots(len(rows), len(columns), sharex="row", sharey="row", squeeze=False)
+    explained = ""
+    for line, (quantity, over, legend, cells) in zip(panels, rows, strict=True):
+        for axes, curves in zip(line, cells, strict=True):
+            for colour, (label, points) in zip(np.linspace(0.05, 0.85, len(curves)), curves.items(), strict=True):
+                axes.plot(*points, color=colormaps["plasma"](colour), label=label)
+            axes.axhline(0.0, color="#999999", lw=0.7)
+            axes.set_xlabel(over)
+        line[0].set_ylabel(quantity)
+        if legend != explained:
+            line[0].legend(title=legend, frameon=False)
+        explained = legend
+    for axes, title in zip(panels[0], columns, strict=True):
+        axes.set_title(title)
+
+
+NAMES_SHOWN = [f"{plane}, nu = {nu:g}" for plane, nu in SHOWN]
+
+
+def draw_shown(figure: Any, quantities: Sequence[str], legend: str, curves: Mapping[Any, Mapping[str, Any]]) -> None:
     """Draw a column for each case of SHOWN and a row for each quantity.
 
     Parameters
     ----------
-    figure
-        Figure to draw in.
     quantities
         Labels of the rows.
     legend
-        What the five curves of a case differ by: depth or mu.
+        What the curves of a case differ by: depth or mu.
     curves
         By case and label: places x (mm) and the values of every quantity there.
     """
-    from matplotlib import colormaps
-
-    colours = colormaps["viridis" if legend == "depth" else "plasma"](np.linspace(0.05, 0.85, 5))
-    panels = figure.subplots(len(quantities), len(SHOWN), sharex=True, sharey="row")
-    for column, case in zip(panels.T, SHOWN, strict=True):
-        for colour, (label, (x, *values)) in zip(colours, curves[case].items(), strict=True):
-            for axes, value in zip(column, values, strict=True):
-                axes.plot(x, value, color=colour, label=label)
-        for axes in column:
-            axes.axhline(0.0, color="#999999", lw=0.7)
-        column[0].set_title(f"{case[0]}, nu = {case[1]:g}")
-        column[-1].set_xlabel("x (mm)")
-    for axes, quantity in zip(panels[:, 0], quantities, strict=True):
-        axes.set_ylabel(quantity)
-    panels[0, 0].legend(title=legend, frameon=False)
+    cells = [
+        [{label: (x, v[k]) for label, (x, *v) in curves[case].items()} for case in SHOWN]
+        for k in range(len(quantities))
+    ]
+    draw_grid(figure, NAMES_SHOWN, [(q, "x (mm)", legend, row) for q, row in zip(quantities, cells, strict=True)])
 
 
-def draw_by_mu(
-    panels: Sequence[Any], x: Float, profiles: Sequence[Profile], strains: Sequence[Float], gauges: dict[int, Float]
-) -> None:
-    """Draw friction along x at x > 0, strains (mus, n) at x (n,), and gauges (mus,) by angle, a panel each."""
-    from matplotlib import colormaps
+def by_mu(values: Iterable[Any]) -> dict[str, Any]:
+    """Return values for the coefficients of MUS by label."""
+    return {f"{mu:g}": value for mu, value in zip(MUS, values, strict=True)}
 
-    first, *inner, last = panels
-    for i, (mu, profile) in enumerate(zip(MUS, profiles, strict=True)):
-        colour, on = colormaps["plasma"](0.85 * i / 4), profile.x >= 0.0
-        first.plot(profile.x[on], profile.q[on], color=colour, lw=1.1, label=f"{mu:g}")
-        for axes, strain in zip(inner, strains, strict=True):
-            axes.plot(x, strain[i], color=colour, lw=1.1)
-    for i, angle in enumerate((15, 30, 45, 60)):
-        last.plot(MUS, gauges[angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°")
-    for axes in panels:
-        axes.axhline(0.0, color="#999999", lw=0.7)
-        axes.set_xlabel("mu" if axes is last else "x (mm)")
+
+def rows_by_mu(x: Float, profiles: Sequence[Any], strains: Mapping[str, Any], gauges: Sequence[Any]) -> list[Drawn]:
+    """Return the rows of a grid whose columns are models.
+
+    Parameters
+    ----------
+    profiles : for each model those of all coefficients, whose friction is drawn at x > 0
+    strains : by name, for each model (mus, n) at x (n,)
+    gauges : for each model strains (mus,) by angle
+    """
+    right = [by_mu((p.x[p.x >= 0.0], p.q[p.x >= 0.0]) for p in own) for own in profiles]
+    inner = [(name, "x (mm)", "mu", [by_mu((x, v) for v in own) for own in of]) for name, of in strains.items()]
+    read = [{f"{t}°": (MUS, own[t]) for t in (15, 30, 45, 60)} for own in gauges]
+    rows = [("friction along x (MPa)", "x (mm)", "mu", right), *inner]
+    return [*rows, ("gauge strain at x = 36 mm", "mu", "angle", read)]

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from finger3d._types import Float
 from finger3d.fem.laws.material import Elasticity
 
-from ._common import Body, body, box, contact_axis, convergence, graded, held_at, mapped, rate
+from ._common import Body, ball_numbers, body, box, contact_axis, ellipse, graded, held_at, mapped, rate
 from ._rows import Result, Row, exact_columns
 
 R, E, NU = 50.0, 20_000.0, 0.3
@@ -67,20 +67,13 @@ def measured(count: int) -> Float:
     """Per depth: force (N), contact radius by the second moment (mm), peak of the line of p^2 (MPa), L2 error of p."""
     here = ball(count)
     gap = here.gap(lambda p: R - p[:, 1])
-    square = here.gap(lambda p: p[:, 0] ** 2 + p[:, 2] ** 2)
-    place = (here.surface.points[:, [0, 2]] ** 2).sum(axis=1)
-    area = here.surface.area
+    place = np.sqrt((here.surface.points[:, [0, 2]] ** 2).sum(axis=1))
     found = []
     for depth in DEPTHS:
         f = here.normal_force(gap - depth)
-        force = 4.0 * f.sum()
-        same = (0.75 * force * R / MODULUS) ** (1.0 / 3.0)
-        p = f / area
-        inner = place < (0.8 * same) ** 2
-        top = np.polyfit(place[inner], p[inner] ** 2, 1)[1]
-        hertz = 1.5 * force / (np.pi * same**2) * np.sqrt(np.maximum(0.0, 1.0 - place / same**2))
-        away = np.sqrt(area @ (p - hertz) ** 2 / (area @ hertz**2))
-        found.append((force, np.sqrt(2.5 * (f @ square) / f.sum()), np.sqrt(top), away))
+        force, a, away = ball_numbers(here, f, R, MODULUS)
+        reach = 0.8 * (0.75 * force * R / MODULUS) ** (1.0 / 3.0)
+        found.append((force, a, ellipse(place, f / here.surface.area, reach)[1], away))
     return np.array(found)
 
 
@@ -116,16 +109,13 @@ def run(quick: bool) -> Result:
     flat = [
         (n, 2.0 * d, *v) for n, level in zip(counts, levels, strict=True) for d, v in zip(DEPTHS, level, strict=True)
     ]
-    return Result(tuple(rows), exact_columns(names, flat), lambda figure: draw(figure, counts, errors, levels, true))
+    return Result(tuple(rows), exact_columns(names, flat), lambda figure: _draw(figure, levels[-1][:, 0], true))
 
 
-def draw(figure: Any, counts: tuple[int, ...], errors: list[float], levels: list[Float], true: Float) -> None:
-    """Errors over the point spacing; force over approach against both theories."""
-    left, right = figure.subplots(1, 2)
-    label = "relative L2 error of the pressure, rms over depths"
-    convergence(left, 1.0 / np.array(counts), {"pressure": errors}, 1.0, "point spacing / a", label)
-    for n, level in zip(counts, levels, strict=True):
-        right.plot(2.0 * DEPTHS, level[:, 0] / 1e3, "os^"[counts.index(n)], markersize=4.5, label=f"{n} points to a")
-    right.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")
-    right.plot(2.0 * DEPTHS, force_at(np.sqrt(R * DEPTHS)) / 1e3, "k:", linewidth=1.0, label="Hertz, half-spaces")
-    right.set(xlabel="approach of the two balls, mm", ylabel="force, kN")
+def _draw(figure: Any, force: Float, true: Float) -> None:
+    """Force over approach against both theories."""
+    axes = figure.subplots()
+    axes.plot(2.0 * DEPTHS, force / 1e3, "o", label="finest mesh")
+    axes.plot(2.0 * DEPTHS, force_at(true) / 1e3, "k--", linewidth=1.0, label="Hertz with Tatara's correction")
+    axes.plot(2.0 * DEPTHS, force_at(np.sqrt(R * DEPTHS)) / 1e3, "k:", linewidth=1.0, label="Hertz, half-spaces")
+    axes.set(xlabel="approach of the two balls, mm", ylabel="force, kN")

@@ -25,7 +25,7 @@ from finger3d.mechanics.model import MeshOptions
 from . import _half_cylinder_forces as forces
 from . import _half_cylinder_strains as inner
 from . import fig9_strains
-from ._paper import BELOW_FIG9, MUS, Profile, draw_by_mu, fig9, line, said, strains
+from ._paper import BELOW_FIG9, MUS, Profile, draw_grid, fig9, line, rows_by_mu, said, strains
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns
 
@@ -130,14 +130,11 @@ def _statements(here: str, x: Float, found: Pressed) -> list[Row]:
 
 
 def _draw(figure: Any, x: Float, found: dict[str, Pressed]) -> None:
-    figure.set_size_inches(13.5, 7.4)
-    panels = figure.subplots(2, 4)
-    figure.suptitle(f"The finger 20 mm wide at 10 mm, at z = 0, nu = {NU:g}")
-    for axes, (name, own) in zip(panels, found.items(), strict=True):
-        draw_by_mu(axes, x, own.profiles(own.last), [own.strain[:, 0], own.strain[:, 2]], own.read)
-        names = "friction along x (MPa)", "eps_x under the surface", "gamma_xy under the surface", "gauge at x = 36 mm"
-        for panel, title in zip(axes, names, strict=True):
-            panel.set_title(title)
-        axes[0].set_ylabel("large deformation" if "large" in name else "small strain")
-    panels[0, 0].legend(title="mu", frameon=False)
-    panels[0, 3].legend(title="angle", frameon=False)
+    figure.set_size_inches(10.0, 12.0)
+    figure.suptitle(f"The finger at 10 mm, at z = 0, nu = {NU:g}")
+    own = found.values()
+    strains = {
+        f"{name} under the surface": [one.strain[:, k] for one in own] for name, k in (("eps_x", 0), ("gamma_xy", 2))
+    }
+    rows = rows_by_mu(x, [one.profiles(one.last) for one in own], strains, [one.read for one in own])
+    draw_grid(figure, list(found), rows)

@@ -12,6 +12,7 @@ force of the increment; where friction turns during an increment it leaves an er
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -27,7 +28,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.march.solve import march
 from finger3d.mechanics.model import Leg
 
-from ._common import rate
+from ._common import convergence, rate
 from ._press import changed, fig9_model
 from ._rows import Result, Row, exact_columns, zero
 
@@ -81,21 +82,16 @@ def balance(problem: Problem, frame: StepResult) -> Balance:
 
 def least_loss(frames: list[StepResult]) -> float:
     """Smallest energy lost by friction at any point in any increment, over the largest."""
-    lost = [
-        -np.sum(
-            b.meshed_state.contact.force[:, 1:]
-            * (b.meshed_state.contact.accumulated_slip - a.meshed_state.contact.accumulated_slip),
-            axis=1,
-        )
-        for a, b in zip(frames, frames[1:], strict=False)
-    ]
+    states = [frame.meshed_state.contact for frame in frames]
+    slips = [end.accumulated_slip - start.accumulated_slip for start, end in itertools.pairwise(states)]
+    lost = [-np.sum(end.force[:, 1:] * slip, axis=1) for end, slip in zip(states[1:], slips, strict=True)]
     return float(np.min(lost) / np.max(lost))
 
 
 def run(quick: bool) -> Result:
     """Section and solid, compressible and not; ever more increments."""
     rows, table = [], []
-    curves: dict[str, dict[str, tuple[Float, Float]]] = {"mu = 0.25": {}, "mu = 0": {}}
+    curves: dict[str, tuple[Float, Float]] = {}
     for domain in ("plane-strain", "solid"):
         worst = dict.fromkeys(("force", "moment", "loss", "net"), 0.0)
         for nu in (0.3, 0.5) if quick else (0.3, 0.49, 0.5):
@@ -124,7 +120,6 @@ def _energy(problem: Problem, name: str, curves: Any, table: list[tuple[Any, ...
     for mu, counts, slide in ((0.25, (20, 40, 80), 15.0), (0.0, (5, 10, 20, 40), 0.0)):
         found = [balance(problem, along(problem, n, mu, slide)[-1]).work for n in counts]
         steps = 1.0 / np.array(counts)
-        curves[f"mu = {mu:g}"][name] = steps, np.abs(found)
         table += [(name, mu, n, e) for n, e in zip(counts, found, strict=True)]
         kind = f"{name}, mu = {mu:g}"
         if mu == 0.0:
@@ -135,21 +130,13 @@ def _energy(problem: Problem, name: str, curves: Any, table: list[tuple[Any, ...
         what, kept = f"work over stored and lost, {kind}, {counts[-1]} increments a leg", 1.0 / (1.0 - found[-1])
         yield Row(what, _ALWAYS, 1.0, kept, 1e-3, "second order; 0.03 % or less measured with so many")
         why = "points change state within an increment; more than the first order is seen"
+        curves[kind] = steps, np.abs(found)
         got = rate(steps[-3:], found[-3:])
         source = "friction under the mean normal force"
         yield Row(f"rate of the work's balance, {kind}", source, 2.0, got, 0.7, why, measure="at least")
 
 
-def draw(figure: Any, curves: dict[str, dict[str, tuple[Float, Float]]]) -> None:
+def draw(figure: Any, curves: dict[str, tuple[Float, Float]]) -> None:
     """Draw the work that is neither stored nor dissipated against the size of the increments."""
-    for (mu, both), axes in zip(curves.items(), figure.subplots(1, 2), strict=True):
-        for name, (steps, errors) in both.items():
-            axes.loglog(steps, errors, "o-", label=name)
-        if mu != "mu = 0":
-            steps, errors = list(both.values())[-1]  # of the solid
-            axes.loglog(steps, 2.0 * errors[-1] * (steps / steps[-1]) ** 2, "k--", label="second order")
-        axes.set(xlabel="1 / increments of a leg", ylabel="work not stored or dissipated, over the work")
-        ticks = sorted({float(s) for steps, _ in both.values() for s in steps})
-        axes.set_xticks(ticks, [f"1/{round(1 / t)}" for t in ticks])
-        axes.set_title(f"press, {mu}: round-off" if mu == "mu = 0" else f"press and slide, {mu}")
-        axes.set_xticks([], minor=True)
+    labels = "1 / increments of a leg", "work not stored or dissipated, over the work"
+    convergence(figure.subplots(), next(iter(curves.values()))[0], {k: e for k, (_, e) in curves.items()}, 2.0, *labels)

@@ -24,7 +24,7 @@ from finger3d.mechanics.model import Leg
 
 from . import _halfplane, _halfspace
 from ._common import ticks_at
-from ._rows import Result, Row, exact_columns, listed
+from ._rows import Result, Row, exact_columns, grouped, listed
 
 judged = listed(__file__)
 
@@ -117,7 +117,7 @@ def run(quick: bool) -> Result:
     table += [row for points in solid for row in ball(points, height, 10)]
     rows = (*_line_rows(table, fine), *_ball_rows(table, solid[-1]))
     columns = exact_columns(COLUMNS, table)
-    return Result(rows, columns, lambda figure: _draw(figure, {k: np.array(v) for k, v in columns.items()}, fine))
+    return Result(rows, columns, lambda figure: _draw(figure, columns, (fine, solid[-1])))
 
 
 def _line_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
@@ -153,30 +153,17 @@ def _ball_rows(table: list[tuple[float, ...]], fine: int) -> Iterator[Row]:
             yield judged("area-of-ball", area, here=here)
 
 
-def _draw(figure: Any, t: dict[str, np.ndarray], fine: int) -> None:
-    left, middle, right = figure.subplots(1, 3)
+def _draw(figure: Any, table: dict[str, list[float]], fine: tuple[int, int]) -> None:
+    left, right = figure.subplots(1, 2)
     s = np.linspace(0.0, 1.0, 200)
-    left.plot(s, np.sqrt(1.0 - s), "k--", lw=1, label="cylinder, exact")
-    left.plot(s, (1.0 - s) ** (1.0 / 3.0), "k:", lw=1, label="ball, exact")
-    flat = (t["dim"] == 2) & (t["increments"] == 10)
-    for d, chosen, name, mark in ((2, flat, "cylinder", "o"), (3, t["dim"] == 3, "ball", "s")):
-        last = chosen & (t["points_per_a"] == t["points_per_a"][t["dim"] == d].max())
-        left.plot(t["s"][last], t["c_over_a"][last], mark, label=f"{name}, finger3d")
-        looped = chosen & np.isfinite(t["W_over_exact"])
-        worst = {
-            n: 100 * np.abs(t["W_over_exact"][looped & (t["points_per_a"] == n)] - 1).max()
-            for n in t["points_per_a"][looped]
-        }
-        middle.loglog(list(worst), list(worst.values()), mark + "-", label=name)
-    middle.loglog([10, 40], [8, 2], "k:", lw=1, label="slope -1")
-    ticks_at(middle, [4, 10, 20, 40])
-    last = (t["dim"] == 2) & (t["points_per_a"] == fine)
-    for share in np.unique(np.round(t["s"][last], 2)):
-        at = last & (np.round(t["s"], 2) == share)
-        order = np.argsort(t["increments"][at])
-        gap = np.abs(t["loop_over_exact"] - t["W_over_exact"])[at][order]
-        right.loglog(t["increments"][at][order], 100 * gap, "o-", label=f"cylinder, s = {share:g}")
-    ticks_at(right, [5, 10, 20])
+    for (dim, points), t in grouped(table, "dim", "points_per_a", increments=10):
+        name, style = ("cylinder", "k--") if dim == 2 else ("ball", "k:")
+        if points in fine:
+            left.plot(s, (1.0 - s) ** (1.0 / dim), style, lw=1, label=f"{name}, exact")
+            left.plot(t["s"], t["c_over_a"], "o" if dim == 2 else "s", label=f"{name}, finger3d")
+        worst = 100.0 * np.nanmax(np.abs(t["W_over_exact"] - 1.0))
+        right.loglog(points, worst, "C0o" if dim == 2 else "C1s", label=name if points in fine else None)
+    right.loglog([10, 40], [8, 2], "k:", lw=1, label="slope -1")
+    ticks_at(right, [4, 10, 20, 40])
     left.set(xlabel="s = Q/(mu P)", ylabel="c/a", title="stick zone")
-    middle.set(xlabel="points per a", ylabel="error of the work lost in a cycle, %", title="mesh")
-    right.set(xlabel="increments to the peak", ylabel="|loop area - work lost|, % of exact", title="increments")
+    right.set(xlabel="points per a", ylabel="error of the work lost in a cycle, %", title="mesh")

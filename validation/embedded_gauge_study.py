@@ -125,30 +125,23 @@ def _steps_row(domain: str, value: np.ndarray, half: np.ndarray, mus: tuple[floa
 
 
 def _draw(figure: Any, found: dict[tuple[str, float], np.ndarray], mus: np.ndarray) -> None:
-    left, middle, right = figure.subplots(1, 3)
+    left, right = figure.subplots(1, 2)
     lengths = sorted({length for _, length in found})
     fine = np.geomspace(0.5, 12.0, 25)
     at = int(np.argmin(np.abs(mus - 0.5)))
-    for domain, colour in (("plane-strain", "C0"), ("solid", "C1")):
+    foils = {"plane-strain": (2, Foils(3000.0, 0.02, 0.15)), "solid": (3, Foils(3000.0, 0.02, 3.0))}
+    for colour, (domain, (dim, foil)) in zip(("C0", "C1"), foils.items(), strict=True):
+        name = domain.replace("-", " ")
         share = [100.0 * found[domain, n][at, 1] / found[domain, n][at, 0] for n in lengths]
-        left.loglog(lengths, share, colour + "o", label=f"finger, {domain.replace('-', ' ')}")
-        dim, foil = (2, Foils(3000.0, 0.02, 0.15)) if domain == "plane-strain" else (3, Foils(3000.0, 0.02, 3.0))
+        left.loglog(lengths, share, colour + "o", label=f"finger, {name}")
         left.loglog(fine, [100.0 * alone(n, foil, 1.0, NU, dim) for n in fine], colour + "-", lw=0.9)
-        free, read = found[domain, 4.0].T
-        middle.plot(mus, free, colour + "--", label=f"free, {domain.replace('-', ' ')}")
-        middle.plot(mus, read, colour + "-o", ms=3, label=f"read, {domain.replace('-', ' ')}")
-        slopes = [np.abs(np.gradient(found[domain, n], mus, axis=0)[at]) for n in lengths]
-        right.loglog(lengths, [s[0] for s in slopes], colour + "--", label=f"free, {domain.replace('-', ' ')}")
-        right.loglog(lengths, [s[1] for s in slopes], colour + "-o", ms=3, label=f"read, {domain.replace('-', ' ')}")
+        free, read = np.transpose([np.abs(np.gradient(found[domain, n], mus, axis=0)[at]) for n in lengths])
+        right.loglog(lengths, free, colour + "--", label=f"free, {name}")
+        right.loglog(lengths, read, colour + "-o", ms=3, label=f"read, {name}")
     plane = [100.0 * wing(n, 9.0, 1.0, NU) for n in fine]
     left.loglog(fine, plane, "k:", lw=1.2, label="Prandtl's equation")
     left.set(xlabel="length of the foil, mm", ylabel="read over free, %", title="lines: in an endless body")
-    middle.set(xlabel="mu", ylabel="strain", yscale="log", title="gauge of 4 mm")
     right.axhline(SLOPE, color="k", lw=0.8, label="implied by the paper")
-    right.set(xlabel="length of the foil, mm", ylabel="|d strain / d mu|", title="slope at mu = 0.5")
-    left.legend(fontsize=7)
-    middle.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.02, 0.1))
-    right.set_ylim(1e-6, 0.3)
-    right.legend(fontsize=7, loc="lower right")
+    right.set(xlabel="length of the foil, mm", ylabel="|d strain / d mu|", title="slope at mu = 0.5", ylim=(1e-6, 0.3))
     for axes in (left, right):
         ticks_at(axes, lengths)

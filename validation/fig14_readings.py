@@ -7,7 +7,7 @@ and a strain noise of 1.5e-4 makes an error of 0.1 in mu = 0.5.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +19,11 @@ from finger3d.contact.friction import Coulomb
 from finger3d.effects.embedded_gauge import Effect as EmbeddedGauge
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.mechanics.discretise.build import build
-from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Domain, Gauge, Leg, Model
 
 from ._paper import STRAIN, STRESS, said
 from ._press import fig9_model, paper_gauges
-from ._rows import Result, Row, at_least, at_most, columns, together
+from ._rows import Result, Row, at_most, columns, together
 
 NOISE, ERROR = 1.5e-4, 0.1
 MUS = np.array([0.06, 0.125, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
@@ -162,18 +160,12 @@ def _model(domain: Domain, nu: float, large: bool, gauges: Any, quick: bool) -> 
 
 
 def _read(model: Model, mus: Float) -> dict[str, Float]:
-    """Strain (m,) over mu by gauge."""
-    found = _pressed(build(model), mus)
-    return {name: np.array([frame.gauges[name] for frame in found.values()]) for name in found[float(mus[0])].gauges}
-
-
-def _pressed(problem: Problem, mus: Iterable[float]) -> dict[float, StepResult]:
-    """Last increments of converged presses by ascending mu."""
-    found = {press.mu: press.frame for press in presses(problem, tuple(map(float, mus)))}
-    for mu, frame in found.items():
+    """Strain (m,) over ascending mu by gauge, of converged presses."""
+    frames = {press.mu: press.frame for press in presses(build(model), tuple(map(float, mus)))}
+    for mu, frame in frames.items():
         if not frame.outcome.ok:
             raise AssertionError(f"mu = {mu:g}: {frame.outcome}")
-    return dict(sorted(found.items()))
+    return {name: np.array([frames[mu].gauges[name] for mu in sorted(frames)]) for name in frame.gauges}
 
 
 def _compatible(curves: list[Curve]) -> Iterator[Row]:
@@ -198,9 +190,9 @@ def _claims(curves: list[Curve]) -> Iterator[Row]:
 
 
 def _draw_models(figure: Any, curves: list[Curve]) -> None:
-    panels = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.8))
+    panels = figure.subplots(1, 2)
     models = list(dict.fromkeys(c.model for c in curves))
-    for axes, leaning in zip(panels, ("30", "-30"), strict=False):
+    for axes, leaning in zip(panels, ("30", "-30"), strict=True):
         mu = np.linspace(0.06, 0.5, 50)
         c = NOISE / ERROR**2
         axes.plot(mu, 1e3 * c * ((mu - 0.5) ** 2 - 0.44**2), "k--", lw=1.5, label="measured, read by the vertex")
@@ -217,35 +209,9 @@ def _draw_models(figure: Any, curves: list[Curve]) -> None:
         axes.set_title(f"gauge at {leaning}°, y = 40 mm, z = 0, nu = 0.49")
     figure.legend(*panels[0].get_legend_handles_labels(), title="solid: free strain, dotted: foil of 4 mm",
                   loc="outside lower left", ncols=4, frameon=False)  # fmt: skip
-    shares = [[np.mean([getattr(c, by) for c in curves if c.model == m and c.kind == FREE and c.leaning == lean])
-               for lean in LEANING] for m in models for by in ("by_slope", "by_vertex")]  # fmt: skip
-    axes = panels[2]
-    axes.imshow(np.array(shares), cmap="Greens", vmin=0.0, vmax=1.0, aspect="auto")
-    for i, line in enumerate(shares):
-        for j, share in enumerate(line):
-            ink = "w" if share > 0.7 else "k"
-            axes.text(j, i, f"{100 * share:.0f} %", ha="center", va="center", fontsize=8, color=ink)
-    names = [f"{name.split()[0]}°\nfrom {'y' if 'vertical' in name else 'x'}" for name in LEANING]
-    axes.set_xticks(range(len(LEANING)), names, fontsize=8)
-    axes.set_yticks(range(2 * len(models)), [f"{m}, {by}" for m in models for by in ("slope", "vertex")], fontsize=8)
-    axes.set_title("share of places and nu compatible")
 
 
-TURN = math.radians(30.0)
 MUS_FOIL = (0.06, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 1.0, 1.2)
-
-
-def model(quick: bool) -> Model:
-    """The finger with the gauge and its mirror image, in small strain."""
-    sizes, legs = (5.0, 12.0) if quick else (2.0, 6.0), (Leg(10.0, steps=5 if quick else 10),)
-    return FOIL.apply(fig9_model(0.49, *sizes, legs=legs, friction=Coulomb(0.25), gauges=paper_gauges(4.0)))
-
-
-def readings(model: Model, mus: tuple[float, ...]) -> dict[str, np.ndarray]:
-    """Free strain and that of the foil, and the normal force (N), for every mu."""
-    frames = _pressed(build(model), mus).values()
-    read = np.array([(f.gauges["g_free"], f.gauges["g"], f.state.force[:, 0].sum()) for f in frames])
-    return dict(zip(("free", "foil", "force"), read.T, strict=True))
 
 
 def _foil(quick: bool) -> Result:
@@ -255,56 +221,50 @@ def _foil(quick: bool) -> Result:
     Source: Maeno 2004, Sec. IV, Fig. 14: a gauge of 30 degrees resolves mu = 0.5 to 0.1 with a strain noise of
     1.5e-4, and a second-order equation goes through the readings. The Fig. 9 finger (nu = 0.49, foil of 4 mm, 0.02
     x 3 mm, 3000 MPa at x = 36, y = 40 mm, both of which the paper does not tell) is pressed 10 mm in ten increments
-    with nine values of mu, in small strain and at large deformation (neo-Hookean); the free strain is that of the
-    same press without the foil. The error of mu is the noise over the slope of the second-order fit at mu = 0.5, as
-    the paper's is, and over the change of the reading between its neighbours: where a parabola does not describe
-    the readings, its slope says little.
+    with nine values of mu at large deformation (neo-Hookean), in strain_to_friction.py in small strain; the free
+    strain is that of the same press without the foil. The error of mu is the noise over the slope of the second-order
+    fit at mu = 0.5, as the paper's is, and over the change of the reading between its neighbours: where a parabola
+    does not describe the readings, its slope says little.
 
-    Four curves; quick: a coarse mesh and three values of mu.
+    Two curves; quick: a coarse mesh and three values of mu.
     """
-    mus = MUS_FOIL[::4] if quick else MUS_FOIL
-    small = model(quick)
-    found = {"small strain": readings(small, mus), "large deformation": readings(LargeDeformation().apply(small), mus)}
+    mus = np.array(MUS_FOIL[::4] if quick else MUS_FOIL)
+    sizes, legs = (5.0, 12.0) if quick else (2.0, 6.0), (Leg(10.0, steps=5 if quick else 10),)
+    small = FOIL.apply(fig9_model(0.49, *sizes, legs=legs, friction=Coulomb(0.25), gauges=paper_gauges(FOIL_MM)))
+    read = _read(LargeDeformation().apply(small), mus)
+    found = {"free": read["g_free"], "foil": read["g"]}
     rows, lines = [], []
-    for name, curves in found.items():
-        for kind in ("free", "foil"):
-            error = _error(mus, curves[kind])
-            what = f"error of mu at .5 from a noise of 1.5e-4, second-order fit, {kind} strain, {name}"
+    for kind, strain in found.items():
+        errors = {"at .5 from a noise of 1.5e-4, second-order fit": _error(mus, strain)}
+        errors |= {f"at {mu:g} by the change between neighbours": _local_error(mus, strain, mu) for mu in (0.25, 0.5)}
+        for what, error in errors.items():
+            what = f"error of mu {what}, {kind} strain, large deformation"
             rows.append(at_most(what, "Maeno 2004, Sec. IV: 0.1", ERROR, error, "the paper's claim", "statement"))
-            for mu in (0.25, 0.5):
-                what = f"error of mu at {mu:g} by the change between neighbours, {kind} strain, {name}"
-                rows.append(at_most(what, "Maeno 2004, Sec. IV: 0.1", ERROR, _local_error(mus, curves[kind], mu),
-                                    "the paper's claim", "statement"))  # fmt: skip
-            lines += [(name, kind, mu, strain) for mu, strain in zip(mus, curves[kind], strict=True)]
-    force = found["large deformation"]["force"] / found["small strain"]["force"]
-    rows.append(at_least("normal force at large deformation over that of small strain, least over all mu", "stiffening",
-                         1.0, float(force.min()), "the contact grows faster", "sensitivity"))  # fmt: skip
-    stiff = max(np.ptp(found["large deformation"]["foil"]) / np.ptp(found["large deformation"]["free"]), 0.0)
-    rows.append(at_most("change of the strain over all mu, a foil's over free, large deformation",
-                        "a stiffer gauge moves " "less", 1.0, float(stiff), kind="sensitivity"))  # fmt: skip
-    return Result(tuple(rows), columns("model kind mu strain", lines), lambda figure: _draw_foil(figure, mus, found))
+        lines += [(kind, mu, value) for mu, value in zip(mus.tolist(), strain, strict=True)]
+    stiff = float(np.ptp(found["foil"]) / np.ptp(found["free"]))
+    what = "change of the strain over all mu, a foil's over free, large deformation"
+    rows.append(at_most(what, "a stiffer gauge moves less", 1.0, stiff, kind="sensitivity"))
+    return Result(tuple(rows), columns("kind mu strain", lines), lambda figure: _draw_foil(figure, mus, found))
 
 
-def _error(mus: tuple[float, ...], strain: np.ndarray) -> float:
+def _error(mus: Float, strain: Float) -> float:
     """Noise over the slope at mu = 0.5 of the parabola through the readings."""
     fit = np.polynomial.Polynomial.fit(mus, strain, 2)
     return NOISE / abs(float(fit.deriv()(0.5)))
 
 
-def _local_error(mus: Sequence[float] | Float, strain: Float, mu: float) -> float:
+def _local_error(mus: Float, strain: Float, mu: float) -> float:
     """Noise over the difference quotient of the readings around mu."""
     k = min(max(int(np.searchsorted(mus, mu)), 1), len(mus) - 2)
     return float(NOISE * (mus[k + 1] - mus[k - 1]) / max(abs(strain[k + 1] - strain[k - 1]), 1e-12))
 
 
-def _draw_foil(figure: Any, mus: tuple[float, ...], found: dict[str, dict[str, np.ndarray]]) -> None:
-    panels = figure.subplots(1, 2)
+def _draw_foil(figure: Any, mus: Float, found: dict[str, Float]) -> None:
     grid = np.linspace(min(mus), max(mus), 100)
-    for axes, kind in zip(panels, ("free", "foil"), strict=True):
-        for k, (name, curves) in enumerate(found.items()):
-            fit = np.polynomial.Polynomial.fit(mus, curves[kind], 2)
-            axes.plot(mus, 1e3 * curves[kind], f"C{k}o", label=f"{name}: mu to {_error(mus, curves[kind]):.2g} at .5")
-            axes.plot(grid, 1e3 * fit(grid), f"C{k}-", lw=1.0)
+    for axes, (kind, strain) in zip(figure.subplots(1, 2), found.items(), strict=True):
+        fit = np.polynomial.Polynomial.fit(mus, strain, 2)
+        axes.plot(mus, 1e3 * strain, "o", label=f"large deformation: mu to {_error(mus, strain):.2g} at .5")
+        axes.plot(grid, 1e3 * fit(grid), "C0-", lw=1.0)
         axes.set(xlabel="mu", ylabel="strain, 1e-3", title="free strain" if kind == "free" else "as the foil reads it")
 
 

@@ -12,7 +12,21 @@ import numpy as np
 
 from finger3d.mechanics.model import Gauge
 
-from ._paper import BELOW_FIG9, MUS, STRAIN, STRESS, Profile, fig9, half_cylinder, line, line_r5, said, strains
+from ._paper import (
+    BELOW_FIG9,
+    MUS,
+    STRAIN,
+    STRESS,
+    Profile,
+    by_mu,
+    draw_grid,
+    fig9,
+    half_cylinder,
+    line,
+    line_r5,
+    said,
+    strains,
+)
 from ._press import fig9_finger, under
 from ._rows import Result, Row, columns, together
 
@@ -68,21 +82,12 @@ def _statements(nu: float, x: np.ndarray, found: dict, small: dict, slip: dict) 
 
 
 def _draw_shear(figure: Any, x: np.ndarray, found: dict[Any, np.ndarray]) -> None:
-    from matplotlib import colormaps
-
-    panels = figure.subplots(2, 3, sharex=True, sharey="row")
     figure.suptitle(f"Shear strain {BELOW_FIG9:g} mm under the surface of the Fig. 9 finger at 10 mm")
-    for column, nu in enumerate(NUS):
-        for row, plane in enumerate((STRAIN, STRESS)):
-            axes = panels[row, column]
-            for i, mu in enumerate(MUS):
-                axes.plot(x, found[plane, nu][i], color=colormaps["plasma"](0.85 * i / 4), label=f"{mu:g}")
-            axes.axvline(36.0, color="#999999", ls=":", lw=1)
-            axes.axhline(0.0, color="#999999", lw=0.7)
-            axes.set_title(f"{plane}, nu = {nu:g}")
-            panels[row, 0].set_ylabel("gamma_xy")
-        panels[1, column].set_xlabel("x (mm); dotted: 36 mm")
-    panels[0, 0].legend(title="mu", frameon=False)
+    rows = []
+    for plane in (STRAIN, STRESS):
+        cells = [by_mu((x, values) for values in found[plane, nu]) for nu in NUS]
+        rows.append((f"gamma_xy, {plane}", "x (mm)", "mu", cells))
+    draw_grid(figure, [f"nu = {nu:g}" for nu in NUS], rows)
 
 
 ANGLES = (0, 15, 30, 45, 60, 75, 90)
@@ -146,16 +151,10 @@ def statements(plane: str, nu: float, mus: np.ndarray, strain: dict[int, np.ndar
 
 
 def _draw_gauges(figure: Any, mus: np.ndarray, found: dict[Any, np.ndarray]) -> None:
-    panels = figure.subplots(1, 4, sharey=True)
     figure.suptitle("Gauge strain at x = 36 mm, 3.3 mm under the surface, depth 10 mm")
-    for axes, (plane, nu) in zip(panels, CASES, strict=True):
-        for i, angle in enumerate(ANGLES[:-1]):
-            wide = {"lw": 2.2} if angle == 30 else {"lw": 1.1}
-            axes.plot(mus, found[plane, nu, BELOW_FIG9, angle], "o-", ms=3, color=f"C{i}", label=f"{angle}°", **wide)
-        axes.axhline(0.0, color="#999999", lw=0.7)
-        axes.set(xlabel="mu", title=f"{plane}, nu = {nu:g}")
-    panels[0].set_ylabel("normal strain along the gauge")
-    panels[0].legend(title="angle", frameon=False, ncols=2, loc="lower left")
+    cells = [{f"{t}°": (mus, found[*case, BELOW_FIG9, t]) for t in ANGLES[:-1]} for case in CASES]
+    names = [f"{plane}, nu = {nu:g}" for plane, nu in CASES]
+    draw_grid(figure, names, [("normal strain along the gauge", "mu", "angle", cells)])
 
 
 def run(quick: bool) -> Result:

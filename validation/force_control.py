@@ -189,16 +189,12 @@ def _creep_rows(model: Model, steps: list[Tree], per_second: int, force: float) 
 
 
 def _draw(figure: Any, cycles: dict[str, list[Tree]], count: int, curve: dict[str, Any]) -> None:
-    left, middle, right = figure.subplots(1, 3)
-    for name, steps in cycles.items():
-        force, depth = column(steps, "normal_force_N"), column(steps, "depth_mm")
-        force, depth = force / force.max(), depth / depth.max()
-        line = left.plot(depth[:count], force[:count], "o-", ms=4, label=f"{name}, up")[0]
-        left.plot(depth[count - 1 :], force[count - 1 :], "x--", ms=5, color=line.get_color(), label="down")
-        gap = depth[count:] - depth[: count - 1][::-1]
-        middle.plot(force[count:], 100.0 * gap, "o-", ms=4, color=line.get_color(), label=name)
+    left, right = figure.subplots(1, 2)
+    for k, (name, steps) in enumerate(cycles.items()):
+        force, depth = (column(steps, key) / column(steps, key).max() for key in ("normal_force_N", "depth_mm"))
+        left.plot(depth[:count], force[:count], f"C{k}o-", ms=4, label=f"{name}, up")
+        left.plot(depth[count - 1 :], force[count - 1 :], f"C{k}x--", ms=5, label="down")
     left.set(xlabel="depth / largest", ylabel="force / largest")
-    middle.set(xlabel="force / largest", ylabel="depth down less depth up, % of the largest")
     right.plot(curve["time"], curve["depth"], "o-", ms=2, label="held by force")
     right.axhline(curve["end"], color="k", lw=0.8, label="elastic, relaxed modulus")
     right.set(xlabel="time (s)", ylabel="depth (mm), finger without friction", ylim=(0.0, 1.1 * curve["end"]))

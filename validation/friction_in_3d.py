@@ -48,9 +48,14 @@ PAPER, MARKERS = "paper's gauge", "7 markers"
 PAPER_GAUGE = Gauge("p", 36.0, 40.0, angle=math.radians(30.0))
 FREE, READ = "free", "foil"
 MOST = 3
+COLOURS = {PAPER: "#b2182b", MARKERS: "#1b7837"}
+COLOURS |= {"1 best gauge": "#92c5de", "2 best gauges": "#4393c3", "3 best gauges": "#053061"}
 
 Spread = dict[tuple[Domain, str, str, str], Float]
 """Standard deviation of mu by domain, strain measure, readings, and free or foil."""
+
+Curve = tuple[str | None, Float, Mapping[str, Any]]
+"""Label, standard deviation of mu for all coefficients, and how it is drawn."""
 
 
 def model(domain: Domain, sizes: tuple[float, float], large: bool, steps: int) -> Model:
@@ -160,24 +165,27 @@ def _rows(spread: Spread) -> Iterator[Row]:
 
 
 def _draw(figure: Any, spread: Spread) -> None:
-    cases = list(dict.fromkeys((key[0], key[1]) for key in spread))
-    figure.set_size_inches(10.0, 4.0 * -(-len(cases) // 2))
-    panels = figure.subplots(-(-len(cases) // 2), min(len(cases), 2), sharey=True, squeeze=False).ravel()
-    colours = {PAPER: "#b2182b", MARKERS: "#1b7837"}
-    blues = dict(zip((n for n in dict.fromkeys(key[2] for key in spread) if "best" in n),
-                     ("#92c5de", "#4393c3", "#053061"), strict=False))  # fmt: skip
-    for (domain, measure), axes in zip(cases, panels, strict=True):
-        for key, sd in spread.items():
-            if key[:2] == (domain, measure):
-                style = "--" if key[3] == READ else "-"
-                label = f"{key[2]}, as foils" if key[3] == READ else key[2]
-                axes.semilogy(MUS, sd, style, color=(colours | blues)[key[2]], lw=1.8, label=label)
-        axes.axhline(LIMIT, color="#222222", lw=0.8)
-        axes.text(1.0, LIMIT * 1.08, "the paper's 0.1", fontsize=8, ha="right")
-        axes.axhline(UNKNOWN, color="#888888", lw=0.8, ls=":")
-        axes.text(1.0, UNKNOWN * 1.08, "nothing known", fontsize=8, ha="right")
-        axes.set(xlabel="friction coefficient mu", title=f"{NAMES[domain]}, {measure}", ylim=(2e-3, 0.4))
-    for axes in panels[::2]:
+    panels: dict[str, list[Curve]] = {}
+    for (domain, measure, name, read), sd in spread.items():
+        label, style = (f"{name}, as foils", "--") if read == READ else (name, "-")
+        curve = label, sd, {"ls": style, "color": COLOURS[name], "lw": 1.8}
+        panels.setdefault(f"{NAMES[domain]}, {measure}", []).append(curve)
+    draw_spread(figure, panels, 2)
+
+
+def draw_spread(figure: Any, panels: Mapping[str, Sequence[Curve]], columns: int) -> None:
+    """Draw standard deviations of mu, a panel for each title."""
+    rows, columns = -(-len(panels) // columns), min(len(panels), columns)
+    figure.set_size_inches(4.8 * columns, 4.2 * rows)
+    every = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    for axes, (title, curves) in zip(every.flat, panels.items(), strict=True):
+        for label, sd, style in curves:
+            axes.semilogy(MUS, sd, label=label, **style)
+        for level, text in ((LIMIT, "the paper's 0.1"), (UNKNOWN, "nothing known")):
+            axes.axhline(level, color="#888888", lw=0.8, ls=":")
+            axes.text(1.0, level * 1.08, text, fontsize=8, ha="right")
+        axes.set(xlabel="friction coefficient mu", title=title, ylim=(2e-3, 0.4))
+    for axes in every[:, 0]:
         axes.set_ylabel("standard deviation of mu")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
+    lines = {line.get_label(): line for axes in every.flat for line in axes.get_legend_handles_labels()[0]}
+    figure.legend(lines.values(), lines, loc="outside lower center", ncols=3, frameon=False, fontsize=9)

@@ -24,11 +24,10 @@ from finger3d.contact.friction import Coulomb
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.history import measure
-from finger3d.mechanics.march.solve import march
 from finger3d.scene import load
 
 from . import _layer
-from ._press import GEOMETRIES, changed
+from ._press import GEOMETRIES, changed, converged
 from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
@@ -46,13 +45,7 @@ EQUAL = (0.9, 0.95, 1.0, 1.05, 1.1)
 def pressed(name: str, *overrides: str) -> tuple[Problem, list[Any]]:
     """A scene, some keys changed: the condensed problem, and the frames of its press."""
     problem = build(load(GEOMETRIES / f"{name}.toml", list(overrides)).model())
-    return problem, _marched(problem)
-
-
-def _marched(problem: Problem) -> list[Any]:
-    frames = list(march(problem))
-    assert all(f.outcome.ok and f.residual <= 1e-8 for f in frames)
-    return frames
+    return problem, converged(problem)
 
 
 def force(problem: Problem, frames: list[Any]) -> float:
@@ -63,7 +56,7 @@ def force(problem: Problem, frames: list[Any]) -> float:
 def at_equal_radius(problem: Problem, radius: float, modulus: float) -> tuple[float, float]:
     """Force without friction over Hertz's at the same contact radius, and that radius (mm), at the end."""
     smooth = changed(problem, friction=Coulomb(0.0))
-    f = _marched(smooth)[-1].state.force[:, 0]
+    f = converged(smooth)[-1].state.force[:, 0]
     square = problem.surface.average @ np.sum(problem.surface.samples[:, [0, 2]] ** 2, axis=1)
     a = float(np.sqrt(2.5 * (f @ square[problem.symmetry.image_of]) / f.sum()))
     return float(f.sum()) * 3.0 * radius / (4.0 * modulus * a**3), a

@@ -159,8 +159,7 @@ def _checks(best: Model, finer: Model, size: float) -> list[Row]:
 
 
 def _draw(figure: Any, models: list[Model], best: Model) -> None:
-    figure.set_size_inches(12.5, 4.6)
-    left, middle, right = figure.subplots(1, 3)
+    left, right = figure.subplots(1, 2)
     fitting = [m for m in models if m.misfit <= FITS]
     for m in fitting:
         left.plot(*m.curve, color="#9ecae1", lw=0.8)
@@ -173,14 +172,10 @@ def _draw(figure: Any, models: list[Model], best: Model) -> None:
         for j, nu in enumerate(dict.fromkeys(m.nu for m in models)):
             own = [m for m in models if m.law == law and m.nu == nu]
             style = ("-", "--", ":")[i]
-            middle.plot([m.mu for m in own], [100.0 * m.misfit for m in own], style, marker="o", ms=3, color=f"C{j}",
-                        label=f"{law}, nu = {nu:g}")  # fmt: skip
-            right.errorbar([m.E for m in own], [m.predicted for m in own], [2.0 * m.predicted_sd for m in own],
-                           fmt="osv"[i], ms=4, lw=0.8, color=f"C{j}", label=f"{law}, nu = {nu:g}")  # fmt: skip
-    middle.axhline(100.0 * FITS, color="#222222", lw=0.8)
-    middle.set(xscale="log", xlabel="mu that is assumed", ylabel="largest distance from a force (%)", ylim=(0.0, None))
-    middle.legend(fontsize=7.5, frameon=False, ncols=2, handlelength=4.0)
-    right.axhline(FORCES[3], color="k", lw=1.0)
-    right.set(xlabel="Young's modulus that is identified (MPa)", ylabel="force at 2 mm from the first three (N)")
-    right.set_title("with two standard deviations; line: measured")
-    right.legend(fontsize=7.5, frameon=False, ncols=2)
+            label = f"{law}, nu = {nu:g}"
+            right.plot(
+                [m.mu for m in own], [100.0 * m.misfit for m in own], style, marker="o", color=f"C{j}", label=label
+            )
+    right.axhline(100.0 * FITS, color="#222222", lw=0.8)
+    right.set(xscale="log", xlabel="mu that is assumed", ylabel="largest distance from a force (%)", ylim=(0.0, None))
+    right.legend(fontsize=7.5, frameon=False, ncols=2, handlelength=4.0)

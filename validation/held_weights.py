@@ -209,23 +209,13 @@ def _rows(lifts: list[Lift], said: Float) -> list[Row]:
 
 
 def _draw(figure: Any, lifts: list[Lift]) -> None:
-    left, right = figure.subplots(1, 2, sharey=True)
+    axes = figure.subplots()
     acted = [x for x in lifts if math.isfinite(x.normal)]
-    mu, ratio, slips = (np.array([getattr(x, k) for x in acted]) for k in ("mu", "ratio", "slips"))
-    alone = [x for x in lifts if math.isfinite(x.single)]
-    held = f"{np.sum(~slips)} of {len(acted)} lifted without slip"
-    for axes, which, field, title in (
-        (left, acted, "normal", f"mean of {READINGS} readings: {held}"),
-        (right, alone, "single", "one reading"),
-    ):
-        over = [getattr(x, field) / x.least for x in which]
-        drawn = axes.scatter([x.mu for x in which], over, c=[1e3 * x.noise for x in which], s=14)
-        axes.axhline(1.0, color="k", lw=0.8, label="least, by Coulomb's law")
-        axes.axhline(1.3, color="k", lw=0.8, ls=":", label="1.3 times the least")
-        axes.set(xlabel="mu of the object", title=title, yscale="log")
-        axes.set_yticks([1.0, 1.3, 2.0, 3.0], ["1", "1.3", "2", "3"])
-        axes.set_yticks([], minor=True)
-    if slips.any():
-        left.plot(mu[slips], ratio[slips], "rx", ms=10, label="slips")
-    left.set_ylabel("normal force over the least")
-    figure.colorbar(drawn, ax=right, pad=0.01).ax.set_title("noise,\n1e-3", fontsize=8)
+    slips = [x for x in acted if x.slips]
+    drawn = axes.scatter([x.mu for x in acted], [x.ratio for x in acted], c=[1e3 * x.noise for x in acted], s=14)
+    axes.plot([x.mu for x in slips], [x.ratio for x in slips], "rx", ms=10, label="slips")
+    axes.axhline(1.0, color="k", lw=0.8, label="least, by Coulomb's law")
+    axes.axhline(1.3, color="k", lw=0.8, ls=":", label="1.3 times the least")
+    axes.set(xlabel="mu of the object", ylabel="normal force over the least", yscale="log")
+    axes.set_title(f"{len(acted) - len(slips)} of {len(acted)} lifted without slip")
+    figure.colorbar(drawn, ax=axes, pad=0.01).ax.set_title("noise,\n1e-3", fontsize=8)

@@ -88,14 +88,11 @@ def _ball(quick: bool) -> Result:
 
 
 def _draw_ball(figure: Any, data: dict[str, list[float]]) -> None:
-    left, right = figure.subplots(1, 2)
+    axes = figure.subplots()
     for size, t in grouped(data, "size_mm"):
-        left.plot(t["depth_mm"], t["inclination_deg"], "o-", label=f"edges of {size:g} mm")
-        right.plot(t["depth_mm"], t["half_width_mm"], "o", label=f"edges of {size:g} mm")
-    left.axhline(30.0, color="k", lw=0.8, label="line between the centres")
-    left.set(xlabel="depth (mm)", ylabel="inclination of the force (deg)", ylim=(27.0, 33.0))
-    right.plot(t["depth_mm"], t["hertz_mm"], "k-", lw=0.8, label="Hertz")
-    right.set(xlabel="depth (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None))
+        axes.plot(t["depth_mm"], t["half_width_mm"], "o", label=f"edges of {size:g} mm")
+    axes.plot(t["depth_mm"], t["hertz_mm"], "k-", lw=0.8, label="Hertz")
+    axes.set(xlabel="depth (mm)", ylabel="half width of contact (mm)", ylim=(0.0, None))
 
 
 DOME_FLANKS, WIDTH_FLANKS, DEPTH = 10.0, 2.0, 0.1

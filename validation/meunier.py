@@ -47,12 +47,8 @@ FITS = {
     "all tests": ("tension", "compression", "shear", "equibiaxial"),
 }
 PREDICTED = ("shear", "equibiaxial")
-MODES = {
-    "tension": "tension",
-    "compression": "compression",
-    "shear": "pure shear",
-    "equibiaxial": "equibiaxial tension",
-}
+MODES = {"shear": "pure shear", "equibiaxial": "equibiaxial tension"}
+"""Names of tests that are not their own."""
 
 
 @dataclass(frozen=True)
@@ -176,5 +172,5 @@ def _draw(figure: Any, fits: list[Fit], tests: dict[str, MaterialTest]) -> None:
             axes.plot(test.stretch, test.stress, "ko", ms=3.5, label="measured")
             axes.set(xlabel="stretch", ylabel="nominal stress (MPa)")
             kind = "fitted" if mode in FITS[own] else "predicted"
-            axes.set_title(f"{MODES[mode]}, {kind}\nlaws fitted to {own}", fontsize=9)
+            axes.set_title(f"{MODES.get(mode, mode)}, {kind}\nlaws fitted to {own}", fontsize=9)
         line[0].legend(frameon=False, fontsize=8)

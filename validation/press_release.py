@@ -1,9 +1,8 @@
 """When a press is released, is the area of the force-depth loop the work lost, and does friction reverse at once?
 
 Source: validation/REFERENCES.md, 2.7; Spence 1975 and Turner 1979 for unloading.  An elastic body gives back what it
-stored, so after release the work done on it equals the dissipation.  With N increments of the cylinder this holds
-within O(1/N^2); the ball is pressed in plain increments, whose work is taken at their ends, and within O(1/N).  The
-force at rest and the second cycle follow from it.
+stored, so after release the work done on it equals the dissipation.  With N increments this holds
+within O(1/N^2).  The force at rest and the second cycle follow from it.
 
 On unloading, friction at the very edge reverses while the inner points still slip outward under their decreasing limit.
 The edge point of a mesh represents one spacing, so the drop of load at which it slips back must vanish with the mesh.
@@ -21,16 +20,14 @@ from finger3d.contact.friction import OPEN, SLIP
 from finger3d.mechanics.discretise.problem import Problem
 from finger3d.mechanics.model import Leg
 
-from . import _halfspace
-from ._common import ticks_at
 from ._halfplane import Profile, compliance, line, loading, under
-from ._rows import Result, Row, exact_columns, grouped, listed
+from ._rows import Result, Row, exact_columns, listed
 
 judged = listed(__file__)
 
 MU = 0.25
 COLUMNS = "body nu points_per_a increments work lost_pressing lost_releasing work_over_lost second_over_first"
-"""Work of the cylinder in A P^2, of the ball in P depth."""
+"""Work in A P^2."""
 
 
 def cycle(problem: Problem, nu: float, points: int, count: int) -> tuple[tuple[Any, ...], list[Profile]]:
@@ -48,17 +45,6 @@ def cycle(problem: Problem, nu: float, points: int, count: int) -> tuple[tuple[A
     return row, found
 
 
-def ball(nu: float, points: int, height: float, count: int) -> tuple[Any, ...]:
-    """A row of the table for one cycle of a ball."""
-    depth = 1.0 / _halfspace.RADIUS
-    path = [depth * k / count for k in (*range(1, count + 1), *range(count - 1, -1, -1))]
-    found = _halfspace.press(_halfspace.quarter(nu, points, height), MU, [(d, 0.0) for d in path])
-    work = float(np.trapezoid([0.0, *(s.P for s in found)], [0.0, *path]))
-    top, lost = found[count - 1], found[-1].D
-    scale = top.P * depth
-    return "ball", nu, points, count, work / scale, top.D / scale, (lost - top.D) / scale, work / lost, np.nan
-
-
 def reversal(problem: Problem) -> tuple[float, list[Profile]]:
     """Share of the load that is gone when the outermost point first slips back, and the profiles up to there."""
     depth = problem.model.legs[-1].depth_mm
@@ -72,7 +58,7 @@ def reversal(problem: Problem) -> tuple[float, list[Profile]]:
 
 
 def run(quick: bool) -> Result:
-    """Cylinder: 10, 20, 40 points to a, 100 to 400 increments each way; ball: 6 points to a."""
+    """A cylinder: 10, 20, 40 points to a, 100 to 400 increments each way."""
     counts = (25, 50, 100) if quick else (100, 200, 400)
     meshes = (10, 20) if quick else (10, 20, 40)
     table, rows, drops = [], [], {}
@@ -85,13 +71,10 @@ def run(quick: bool) -> Result:
                 row, found = cycle(problem, nu, points, count)
                 table.append(row)
         rows += _cycle_rows(nu, table, counts, found)
-    table.append(ball(0.3, 4 if quick else 6, 20.0, 40))
-    rows.append(judged("work-over-work-lost-ball-nu", table[-1][7], value=table[-1][2]))
     rate = float(np.log(drops[meshes[0]] / drops[meshes[-1]]) / np.log(meshes[-1] / meshes[0]))
     rows.append(judged("rate-at-which-the-drop-of", rate))
     rows.append(judged("drop-of-load-that-reverses-the", drops[meshes[-1]], 2.0 / meshes[-1], finest=meshes[-1]))
-    columns = exact_columns(COLUMNS, table)
-    return Result(tuple(rows), columns, lambda figure: _draw(figure, columns, found, shown))
+    return Result(tuple(rows), exact_columns(COLUMNS, table), lambda figure: _draw(figure, nu, found, shown))
 
 
 def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: list[Profile]) -> Iterator[Row]:
@@ -109,20 +92,15 @@ def _cycle_rows(nu: float, table: list[Any], counts: tuple[int, ...], found: lis
         yield judged("rate-at-which-the-excess", rate, here=here)
 
 
-def _draw(figure: Any, columns: dict[str, list[Any]], found: list[Profile], shown: list[Profile]) -> None:
-    left, middle, right = figure.subplots(1, 3)
+def _draw(figure: Any, nu: float, found: list[Profile], shown: list[Profile]) -> None:
+    left, right = figure.subplots(1, 2)
     half = found[: len(found) // 2]
     force = np.array([0.0, *(p.force for p in half)]) / max(p.force for p in half)
     depth = np.array([0.0, *(p.frame.target.depth_mm for p in half)])
     top = len(half) // 2
     pressing = np.interp(depth, depth[: top + 1], force[: top + 1])
-    left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {columns['nu'][-2]:g}, mu = {MU:g}")
+    left.plot(depth / depth.max(), 1e3 * (force - pressing), label=f"nu = {nu:g}, mu = {MU:g}")
     left.set(xlabel="depth / largest", ylabel="force - that of the press, 0.1 %", title="the loop, opened")
-    for nu, t in grouped(columns, "nu", body="cylinder", points_per_a=20):
-        middle.loglog(t["increments"], 100.0 * np.abs(t["work_over_lost"] - 1.0), "o-", label=f"cylinder, nu = {nu:g}")
-    counts = sorted(set(t["increments"]))
-    middle.set(xlabel="increments each way", ylabel="|work - work lost|, % of it", title="energy balance")
-    ticks_at(middle, counts[-3:])
     less = f"load less {100 * (1 - shown[-1].force / shown[0].force):.2g} %"
     for profile, name in ((shown[0], "loaded"), (shown[-1], less)):
         inside = (profile.x >= 0.0) & (profile.status != OPEN)

@@ -16,7 +16,7 @@ from . import _halfplane, _halfspace, _rings
 from ._common import ticks_at
 from ._halfplane import RADIUS, Profile, compliance, line, loading, under
 from ._increments import PlainCoulomb
-from ._rows import Result, Row, exact_columns, listed, together
+from ._rows import Result, Row, exact_columns, grouped, listed, together
 
 judged = listed(__file__)
 
@@ -108,7 +108,7 @@ def _line(quick: bool) -> Result:
             rows += _step_rows(plain, c_last, finest, counts)
             rows.append(judged("q-x-largest-deviation-over-its", _off_curve(curves[nu])))
     columns = exact_columns(COLUMNS_LINE, table)
-    return Result(tuple(rows), columns, lambda figure: _draw_line(figure, curves[0.3], columns, finest, most))
+    return Result(tuple(rows), columns, lambda figure: _draw_line(figure, curves[0.3], columns, finest))
 
 
 def _extrapolated(at: dict[Any, np.ndarray], finest: int, mu: float, count: int) -> np.ndarray:
@@ -175,42 +175,19 @@ def _normalised(profile: Profile, at: np.ndarray) -> np.ndarray:
     return np.interp(at * profile.a, profile.x, profile.q) * compliance(0.3) * RADIUS / profile.a
 
 
-def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], finest: int, most: int) -> None:
-    left, middle, right = figure.subplots(1, 3)
-    figure.suptitle(f"nu = .3, mu = .25: error of friction {100 * _off_curve(profile):.1f} %")
+def _draw_line(figure: Any, profile: Profile, columns: dict[str, list[float]], finest: int) -> None:
+    left, right = figure.subplots(1, 2)
+    figure.suptitle(f"cylinder, nu = .3, mu = .25: error of friction {100 * _off_curve(profile):.1f} %")
     here = np.abs(profile.x) <= profile.a
     left.plot(profile.x[here] / profile.a, profile.q[here] * compliance(0.3) * RADIUS / profile.a, label="finger3d")
     left.plot(np.linspace(0, 1, 11), CURVE, "k--", label="integral equations")
     left.set(xlabel="x/a", ylabel="outward friction q A R/a", xlim=(0, 1), ylim=(0, None))
-    left.legend()
-    t = {k: np.array(v) for k, v in columns.items()}
-    tall = (t["block_height_mm"] == HEIGHTS[1]) & (t["plain"] == 0)
-    for nu, marker in ((0.3, "o"), (0.0, "s")):
-        of = tall & (t["nu"] == nu)
-        if of.any():
-            stuck, slip = of & (t["mu"] == STUCK), of & (t["mu"] == 0.25) & (t["increments"] == most)
-            for which, name, key, want in (
-                (stuck, "force, full stick", "P_over_Hertz", FULL_STICK_LINE[nu]),
-                (slip, "force, mu = .25", "P_over_Hertz", INTEGRALS_LINE[nu][0]),
-                (slip, "friction, mu = .25", "q_over_P", INTEGRALS_LINE[nu][1]),
-            ):
-                error = 100 * np.abs(t[key][which] / want - 1)
-                middle.loglog(t["points_per_a"][which], error, marker + "-", label=f"{name}, nu = {nu:g}")
-    middle.loglog([10, 40], [2, 0.5], "k:", label="slope -1")
-    middle.set(xlabel="points per a", ylabel="error, %", title="a/h = 1/200")
-    ticks_at(middle, [10, 20, 40])
-    middle.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2, frameon=False)
-    of = (t["nu"] == 0.3) & (t["mu"] == 0.25) & (t["points_per_a"] == finest)
-    for height in HEIGHTS:
-        which = of & (t["block_height_mm"] == height) & (t["plain"] == 1)
-        right.loglog(t["increments"][which], 1e4 * t["D_over_AP2"][which], "o-", label=f"plain, a/h = 1/{height:g}")
-    own = of & tall
-    name = f"finger3d, a/h = 1/{HEIGHTS[1]:g}"
-    right.loglog(t["increments"][own], 1e4 * t["reported_D_over_AP2"][own], "s-", label=name)
+    for (height, plain), t in grouped(columns, "block_height_mm", "plain", nu=0.3, mu=0.25, points_per_a=finest):
+        loss, name = (t["D_over_AP2"], "plain") if plain else (t["reported_D_over_AP2"], "finger3d")
+        right.loglog(t["increments"], 1e4 * loss, "o-" if plain else "s-", label=f"{name}, a/h = 1/{height:g}")
     right.loglog(list(STEPS), [1e4 * d for _, d in STEPS.values()], "k+", ms=10, label="integral equations")
     right.axhline(1e4 * INTEGRALS_LINE[0.3][2], color="k", ls="--", lw=0.8, label="N = infinity")
-    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)", title="nu = .3, mu = .25")
-    right.legend(fontsize=7)
+    right.set(xlabel="increments N", ylabel="1e4 dissipation/(A P^2)")
 
 
 C_OVER_A_SPHERE = {
@@ -259,15 +236,15 @@ def _sphere(quick: bool) -> Result:
                 [r.P / hertz_sphere(nu), r.T / r.P, r.D / (r.P * DEPTH), r.c / r.a, r.iterations]
             )
         for points in meshes:
-            ball = _halfspace.quarter(nu, points, 20.0 if quick else 50.0)
+            ball = _halfspace.Ball.on(_halfspace.block(nu, points, 20.0 if quick else 50.0))
             force = _halfspace.press(ball, 0.0, [(DEPTH, 0.0)])[-1].P
             steps = _halfspace.press(ball, 0.25, [(d, 0.0) for d in depths(40)])
             s = steps[-1]
             stuck, most = np.sqrt(s.stick_area / s.area), max(t.iterations for t in steps)
             found["tets", nu, 0.25, points, 40] = np.array([s.P / force, s.T / s.P, s.D / (s.P * DEPTH), stuck, most])
         rows += [*_ring_rows(nu, found, rings, many), *_tet_rows(nu, found, rings, meshes)]
-    table = [(*k, *v) for k, v in found.items()]
-    return Result(tuple(rows), exact_columns(COLUMNS_SPHERE, table), lambda figure: _draw_sphere(figure, found, rings))
+    table = exact_columns(COLUMNS_SPHERE, [(*k, *v) for k, v in found.items()])
+    return Result(tuple(rows), table, lambda figure: _draw_sphere(figure, table))
 
 
 def _ring_rows(nu: float, found: dict[Any, np.ndarray], rings: int, many: int) -> Iterator[Row]:
@@ -302,31 +279,23 @@ def _tet_rows(nu: float, found: dict[Any, np.ndarray], rings: int, meshes: tuple
         yield judged("c-a-of-tets", value[3], wanted, tolerance=1.0 / meshes[-1], here=here, finest=meshes[-1])
 
 
-def _draw_sphere(figure: Any, found: dict[Any, np.ndarray], rings: int) -> None:
-    left, middle, right = figure.subplots(1, 3)
-    for nu, colour in ((0.3, "C0"), (0.0, "C1")):
-        got = {k[2]: v for k, v in found.items() if k[0] == "rings" and k[1] == nu and k[2] < 10}
-        if not got:
-            continue
-        mus = sorted(got)
-        left.semilogx(
-            mus, [got[m][3] for m in mus], colour + "o", label=f"rings, nu = {nu:g}", mfc="none" if nu else None
-        )
+def _draw_sphere(figure: Any, table: dict[str, list[Any]]) -> None:
+    figure.suptitle("ball")
+    left, right = figure.subplots(1, 2)
+    for k, (nu, t) in enumerate(grouped(table, "nu", body="rings")):
+        slips = t["mu"] < STUCK
+        left.semilogx(t["mu"][slips], t["c_over_a"][slips], f"C{k}o", mfc="none", label=f"rings, nu = {nu:g}")
         wanted = {m: c for (n, m), c in C_OVER_A_SPHERE.items() if n == nu}
-        left.semilogx(list(wanted), list(wanted.values()), colour + "--", label="reference")
-        tets = {k[3]: v for k, v in found.items() if k[0] == "tets" and k[1] == nu}
-        points = list(tets)
-        for i, name, mark in ((0, "force", "o-"), (1, "friction", "s-")):
-            error = [100 * abs(tets[n][i] / INTEGRALS_SPHERE[nu][i] - 1) for n in points]
-            middle.loglog(points, error, colour + mark, label=f"{name}, nu = {nu:g}", mfc="w" if i else None)
-        exact = found["rings", nu, 0.25, rings, 40][2]
-        right.loglog(points, [tets[n][2] for n in points], colour + "o-", label=f"3D, nu = {nu:g}")
-        right.axhline(exact, color=colour, ls="--", lw=1, label=f"rings a/{rings} wide")
-    left.set(xlabel="mu", ylabel="stick radius / contact radius", title="stick")
-    middle.set(xlabel="points per a", ylabel="error, %", title="3D, mu = .25")
-    right.set(xlabel="points per a", ylabel="dissipation / (force depth)", title="dissipation, mu = .25")
-    for axes in (middle, right):
-        ticks_at(axes, points)
+        left.semilogx(list(wanted), list(wanted.values()), f"C{k}--", label="reference")
+    for k, (nu, t) in enumerate(grouped(table, "nu", body="tets")):
+        for name, mark, key, want in zip(
+            ("force", "friction"), "os", ("P_over_Hertz", "T_over_P"), INTEGRALS_SPHERE[nu], strict=False
+        ):
+            error = 100 * np.abs(t[key] / want - 1)
+            right.loglog(t["points_per_a"], error, f"C{k}{mark}-", label=f"{name}, nu = {nu:g}")
+    left.set(xlabel="mu", ylabel="stick radius / contact radius")
+    right.set(xlabel="points per a", ylabel="error, %", title="3D, mu = .25")
+    ticks_at(right, sorted(set(t["points_per_a"])))
 
 
 def run(quick: bool) -> Result:

@@ -27,7 +27,7 @@ from finger3d.mechanics.model import Leg, MeshOptions, Model
 
 from ._paper import said
 from ._rows import Result, Row, columns
-from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, UNKNOWN, best_gauges, markers, spreads, with_foils
+from .friction_in_3d import IDEAL, LIMIT, MARKERS, MUS, Curve, best_gauges, draw_spread, markers, spreads, with_foils
 
 RADII = (5.0, 10.0)
 FOIL, FOIL_MM = EmbeddedGauge(3000.0, 0.02, 1.5), 2.0
@@ -92,24 +92,12 @@ def _rows(found: Spread) -> Iterator[Row]:
 
 
 def _draw(figure: Any, found: Spread) -> None:
-    cases = list(dict.fromkeys((key[1], key[2]) for key in found))
     names = list(dict.fromkeys(key[3] for key in found))
-    figure.set_size_inches(4.4 * len(cases), 4.8)
-    panels = np.atleast_1d(figure.subplots(1, len(cases), sharey=True))
-    for (measure, tolerances), axes in zip(cases, panels, strict=True):
-        for (radius, m, t, readings), sd in found.items():
-            if (m, t) == (measure, tolerances):
-                colour = "#1b7837" if readings == MARKERS else f"C{names.index(readings)}"
-                width = 2.2 if radius == RADII[0] else 1.0
-                label = readings if radius == RADII[0] else None
-                axes.semilogy(MUS, sd, color=colour, lw=width, label=label)
-        axes.axhline(LIMIT, color="#222222", lw=0.8)
-        axes.axhline(UNKNOWN, color="#888888", lw=0.8, ls=":")
-        axes.text(1.0, UNKNOWN * 1.08, "nothing known", fontsize=8, ha="right")
-        axes.set(xlabel="friction coefficient mu", ylim=(4e-3, 0.4), title=f"{measure}, {tolerances}")
-    panels[0].set_ylabel("standard deviation of mu")
-    lines = {line.get_label(): line for axes in panels for line in axes.get_legend_handles_labels()[0]}
-    title = "thick: R = 5 mm, thin: R = 10 mm"
-    figure.legend(
-        lines.values(), lines, title=title, loc="outside lower center", ncols=len(lines), frameon=False, fontsize=9
-    )
+    panels: dict[str, list[Curve]] = {}
+    for (radius, measure, tolerances, readings), sd in found.items():
+        colour = "#1b7837" if readings == MARKERS else f"C{names.index(readings)}"
+        label, width = (readings, 2.2) if radius == RADII[0] else (None, 1.0)
+        curve = label, sd, {"color": colour, "lw": width}
+        panels.setdefault(f"{measure}, {tolerances}", []).append(curve)
+    draw_spread(figure, panels, len(CASES))
+    figure.suptitle("thick: R = 5 mm, thin: R = 10 mm")

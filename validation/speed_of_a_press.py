@@ -25,7 +25,7 @@ from finger3d.mechanics.history import StepResult
 from finger3d.mechanics.model import Gauge, Leg
 
 from ._paper import STRAIN, fig9, said
-from ._press import under
+from ._press import changed, under
 from ._rows import Result, Row, columns
 
 RATES = (0.02, 0.05, 0.1)
@@ -84,11 +84,11 @@ def _durations(body: Problem, control: str, bulk: bool, rate: float, steps: int)
     effect = Viscosity(tuple((rate, time) for time in DECADES), bulk)
     model = effect.apply(replace(body.model, legs=(Leg(DEPTH_MM, steps=steps, duration_s=USUAL),)))
     relaxing = build(model)
-    force = _force(_pressed(relaxing, MU)) if control == FORCE else None
+    force = _force(under(relaxing, MU)[-1]) if control == FORCE else None
 
     def pressed(mu: float, time: float) -> StepResult:
         leg = Leg(DEPTH_MM, steps=steps, duration_s=time, force_N=force)
-        return _pressed(replace(relaxing, model=replace(model, legs=(leg,))), mu)
+        return under(changed(relaxing, legs=(leg,)), mu)[-1]
 
     strain = np.array([pressed(mu, USUAL).gauges["g"] for mu in MUS])
     order = np.argsort(strain)
@@ -98,11 +98,6 @@ def _durations(body: Problem, control: str, bulk: bool, rate: float, steps: int)
         frame = pressed(MU, time)
         reads[time] = Read(float(mu_of(frame.gauges["g"])) - MU, _force(frame), frame.target.depth_mm)
     return reads
-
-
-def _pressed(problem: Problem, mu: float) -> StepResult:
-    """Last frame of a press."""
-    return under(problem, mu)[-1]
 
 
 def _force(frame: StepResult) -> float:
@@ -134,24 +129,16 @@ def _checks(name: str, body: Problem, found: Found) -> Iterator[Row]:
 
 def _draw(figure: Any, found: Found) -> None:
     models = list(dict.fromkeys(key[0] for key in found))
-    figure.set_size_inches(4.2 * len(models) + 4.0, 4.4)
-    panels = figure.subplots(1, len(models) + 1)
-    for axes, model in zip(panels, models, strict=False):
+    figure.set_size_inches(5.0 * len(models), 4.4)
+    for axes, model in zip(figure.subplots(1, len(models), squeeze=False)[0], models, strict=True):
         for (name, control, bulk, rate), reads in found.items():
             if name == model:
                 label = f"{control}, {'all moduli' if bulk else 'shear modulus'}" if rate == RATES[1] else None
-                style = "-" if bulk else "--"
-                axes.semilogx(list(reads), [r.mu_error for r in reads.values()], style, marker="o", ms=3, label=label,
-                              color="#2166ac" if control == DEPTH else "#b2182b", lw=0.5 + 12.0 * rate)  # fmt: skip
+                colour, style = "#2166ac" if control == DEPTH else "#b2182b", "o-" if bulk else "o--"
+                errors = [read.mu_error for read in reads.values()]
+                axes.semilogx(list(reads), errors, style, ms=3, label=label, color=colour, lw=0.5 + 12.0 * rate)
         axes.axhspan(-0.1, 0.1, color="#eeeeee", lw=0)
         axes.set(xlabel="duration of the press (s)", ylabel="error of mu = 0.25", title=model)
         shares = sorted({100.0 * key[3] for key in found if key[0] == model})
         title = f"{', '.join(f'{share:g}' for share in shares)} % per decade{', thin to thick' if shares[1:] else ''}"
         axes.legend(title=title, title_fontsize=8, frameon=False)
-    for (name, control, bulk, rate), reads in found.items():
-        if name == models[0] and control == DEPTH and bulk:
-            panels[-1].semilogx(list(reads), [r.force / reads[USUAL].force for r in reads.values()], "o-", ms=3,
-                                label=f"{100.0 * rate:g} % per decade")  # fmt: skip
-    panels[-1].set(xlabel="duration of the press (s)", ylabel="force at the same depth over that in 10 s",
-                   title=f"{models[0]}, all moduli")  # fmt: skip
-    panels[-1].legend(frameon=False)

@@ -14,7 +14,6 @@ what the increments may change in it.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from finger3d.analyses.calibrate.run import calibrated
 from finger3d.analyses.calibrate.settings import MUS
 from finger3d.analyses.reduced import ReducedModel
 from finger3d.effects.embedded_gauge import Effect
-from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.model import Domain, Leg, Model
 from finger3d.sensor import Calibration, ReadingCurve, estimate
 from finger3d.sensor.likelihood import CREDIBLE
@@ -34,12 +32,10 @@ from finger3d.sensor.likelihood import CREDIBLE
 from ._paper import said
 from ._press import fig9_model, paper_gauges
 from ._rows import Result, Row, columns, listed
-from ._strain_maps import StrainMap, resolution_panel, slope_panel
 
 judged = listed(__file__)
 
 NU, NOISE, LIMIT = 0.49, 1.5e-4, 0.1
-TURN = math.radians(30.0)
 FOIL = Effect(3000.0, 0.02, 3.0)
 SIZES: dict[Domain, tuple[float, float]] = {"plane-strain": (0.8, 3.0), "solid": (1.4, 5.0)}
 QUICK: dict[Domain, tuple[float, float]] = {"plane-strain": (3.0, 10.0), "solid": (5.0, 12.0)}
@@ -62,13 +58,12 @@ def run(quick: bool) -> Result:
     """Quick: coarse meshes, five values of mu, tolerances of one kind only."""
     mus = (0.02, 0.4, 0.5, 0.6, 1.2) if quick else MUS
     wanted = {**STEPS_ALONE, "gauge_angle_deg": 2.0} if quick else None
-    found, maps, rows = {}, {}, []
+    found, rows = {}, []
     for domain, sizes in (QUICK if quick else SIZES).items():
         free, points = calibrated(model(domain, sizes, 0.0, quick), "g", mus, {"gauge": NOISE}, LIMIT, wanted)
         found[domain, FREE] = free
         foil = FOIL.apply(model(domain, sizes, 4.0, quick))
         found[domain, READ] = calibrated(foil, "g", mus, {"gauge": NOISE}, LIMIT, OFF if quick else STEPS_ALONE)[0]
-        maps[domain] = StrainMap.of(points.problem, points.frames)
         rows += _checks(domain, free, points)
     for (domain, kind), calibration in found.items():
         rows += _statements(f"{kind}, {NAMES[domain]}", calibration)
@@ -79,20 +74,13 @@ def run(quick: bool) -> Result:
         spread = calibration.mu_sd(c.mu) if c.tolerances else np.full(len(c.mu), np.nan)
         from_curve = (c.reading, c.fit.at(c.mu), c.slope(c.mu), c.resolution(c.mu), _resolution_of_fit(c, c.mu))
         lines += [(domain, kind, *map(float, line)) for line in zip(c.mu, *from_curve, spread, strict=True)]
-    return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found, maps))
+    return Result(tuple(rows), columns(LINES, lines), lambda figure: _draw(figure, found))
 
 
 def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> list[Row]:
-    """What must hold whatever the answer: maps, the reduced model, and the coverage of the intervals."""
-    here = NAMES[domain]
-    problem, (first, *_, last) = points.problem, points.mus
-    near = StrainMap.of(problem, {mu: points.frames[mu] for mu in (first, last)})
-    i, j = int(np.argmin(np.abs(near.y - 40.5))), int(np.argmin(np.abs(near.x - 36.5)))
-    at = replace(problem.model.gauges[0], x_mm=36.5, y_mm=40.5)
-    other = build(replace(problem.model, gauges=(at,)))
-    reads = [other.read(points.frames[mu].meshed_state.contact.force) for mu in (first, last)]
-    row = np.array([next(value for column, value in read.items() if column.sensor == "g") for read in reads])
-    reduced = ReducedModel.of(problem).press(last).steps[-1].gauges["g"]
+    """What must hold whatever the answer: the reduced model, and the coverage of the intervals."""
+    here, (first, *_, last) = NAMES[domain], points.mus
+    reduced = ReducedModel.of(points.problem).press(last).steps[-1].gauges["g"]
     random = np.random.default_rng(20261121)
     count = 4000
     mu = random.uniform(first, last, count)
@@ -103,7 +91,6 @@ def _checks(domain: Domain, calibration: Calibration, points: CurvePoints) -> li
     hit = np.mean([any(low <= m <= high for low, high in e.intervals) for m, e in zip(mu, answers, strict=True)])
     scatter = math.sqrt(CREDIBLE * (1.0 - CREDIBLE) / count)
     return [
-        judged("strain-map-at-36-5-40", float(near.along(TURN)[1, i, j]), float(row[1]), last=last, here=here),
         judged("strain-from-the-reduced-model-mu", reduced, float(c.reading[-1]), last=last, here=here),
         judged("90-sets-that-contain-the-true", float(hit), CREDIBLE, tolerance=3.0 * scatter, count=count, here=here),
     ]
@@ -148,11 +135,11 @@ def _widths(found: Found) -> list[Row]:
     ] + [judged("change-by-foil", moved[domain, READ] / moved[domain, FREE], value=NAMES[domain]) for domain in NAMES]
 
 
-def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
-    figure.set_size_inches(12.0, 8.0)
-    panels = figure.subplots(2, 3, height_ratios=[1.0, 0.8])
+def _draw(figure: Any, found: Found) -> None:
+    figure.set_size_inches(12.0, 5.0)
+    *panels, right = figure.subplots(1, 3)
     colours = {"plane-strain": "#2166ac", "solid": "#b2182b"}
-    for axes, kind in zip(panels[0], (FREE, READ), strict=False):
+    for axes, kind in zip(panels, (FREE, READ), strict=True):
         for domain, name in NAMES.items():
             c = found[domain, kind].readings[0]
             axes.plot(c.grid, 1e3 * c.at(c.grid), color=colours[domain], lw=1.5, label=name)
@@ -161,7 +148,6 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
         axes.set(xlabel="mu", ylabel="strain, 1e-3", title=f"gauge at 30°: {kind}")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.legend(frameon=False)
-    right = panels[0, 2]
     for (domain, kind), calibration in found.items():
         c = calibration.readings[0]
         style = "-" if kind == FREE else ":"
@@ -170,12 +156,3 @@ def _draw(figure: Any, found: Found, maps: dict[Domain, StrainMap]) -> None:
     right.plot(0.5, 0.1, "k*", ms=11, label="the paper, measured")
     right.set(xlabel="mu", ylabel="standard deviation of mu", title="from a strain noise of 1.5e-4", ylim=(5e-4, 50.0))
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), frameon=False)
-    for axes, domain in zip(panels[1], NAMES, strict=False):
-        slope_panel(figure, axes, maps[domain], TURN, 0.5)
-        axes.set_title(f"slope at mu = .5, 30°, {NAMES[domain]}")
-    best, _ = maps["solid"].best(0.0, 0.6)
-    resolution_panel(figure, panels[1, 2], maps["solid"], NOISE / np.maximum(best, 1e-12), LIMIT)
-    panels[1, 2].set_title("worst to mu = .6, best angle, 20 mm wide")
-    for axes in panels[1]:
-        axes.plot(36.0, 40.0, "ko", mfc="none", ms=8)
-        axes.set(xlabel="x (mm)", ylabel="y (mm)")

@@ -106,15 +106,11 @@ def _gear(quick: bool) -> Result:
 
 
 def _draw_gear(figure: Any, table: dict[str, Any]) -> None:
-    left, right = figure.subplots(1, 2)
-    left.plot(table["angle_deg"], [-f for f in table["force_y_N"]], "o-", label="vertical, down")
-    left.plot(table["angle_deg"], table["force_x_N"], "s-", label="sideways")
-    left.axhline(0.0, color="0.6", lw=0.8)
-    left.set(xlabel="turn of the wheel (deg)", ylabel="force on the finger (N)", title="gear")
-    right.plot(table["angle_deg"], table["torque_Nmm"], "o-", label="reported")
-    right.plot(table["angle_deg"], table["of_points_Nmm"], "x", label="from the points")
-    right.axhline(0.0, color="0.6", lw=0.8)
-    right.set(xlabel="turn of the wheel (deg)", ylabel="torque on the finger about the axis (N mm)", title="gear")
+    axes = figure.subplots()
+    axes.plot(table["angle_deg"], [-f for f in table["force_y_N"]], "o-", label="vertical, down")
+    axes.plot(table["angle_deg"], table["force_x_N"], "s-", label="sideways")
+    axes.axhline(0.0, color="0.6", lw=0.8)
+    axes.set(xlabel="turn of the wheel (deg)", ylabel="force on the finger (N)", title="gear")
 
 
 E, NU = 1.0, 0.3

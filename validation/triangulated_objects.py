@@ -1,10 +1,8 @@
-"""Does a triangulated ball or bar press like the exact one, and are distances right at its edges and corners?
+"""Does a triangulated ball or bar press like the exact one?
 
-References: the height of a ball and of a bar in closed form; the distance from a box, sqrt(sum max(|x| - b, 0)^2)
-outside and the largest |x| - b inside.  The facets of a curved body lie inside it by the sagitta s^2/8R of their edges
-s, so gaps, first touch and force have errors of O(s^2), and a rate of 2 is required.  The sign of the distance at edges
-and corners is right only with angle-weighted normals (Baerentzen and Aanaes 2005); the errors of the nearest triangle's
-own normal are counted for comparison.
+References: the height of a ball and of a bar in closed form.  The facets of a curved body lie inside it by the sagitta
+s^2/8R of their edges s, so gaps, first touch and force have errors of O(s^2), and a rate of 2 is required.  Distances
+from edges and corners are tested in tests/test_geometry_surfaces.py.
 
 The finger is a block, 3D, swept, with the same mesh for all objects.  The triangulated objects are made here, as an STL
 file would hold them, and moved off the origin.
@@ -29,7 +27,7 @@ from finger3d.objects import ContactPath, Cylinder, MeshObject, PlacedObject, Ri
 
 from ._common import convergence, rate
 from ._press import converged
-from ._rows import Result, Row, exact_columns, listed
+from ._rows import Result, exact_columns, listed
 
 judged = listed(__file__)
 
@@ -70,7 +68,7 @@ def pressed(obj: RigidObject, size: float) -> float:
 
 
 def run(quick: bool) -> Result:
-    """Two shapes on three fineness levels; distances from a box."""
+    """Two shapes on three fineness levels."""
     levels = (24, 40, 64) if quick else (32, 64, 128, 256)
     size = 1.0 if quick else 0.4
     rows, table, curves = [], [], {}
@@ -101,41 +99,8 @@ def run(quick: bool) -> Result:
             judged("force", 1.0 + errors["force"][-1], tolerance=3.0 * sagitta / 0.4, name=name, finest=levels[-1]),
             judged("first-touch", errors["first touch"][-1], tolerance=sagitta, name=name),
         ]
-    rows += _distance_rows()
     columns = "shape sectors triangles height_error_mm first_touch_error_mm force_error"
     return Result(tuple(rows), exact_columns(columns, table), lambda figure: _draw(figure, edges, curves))
-
-
-def _distance_rows() -> list[Row]:
-    rng = np.random.default_rng(0)
-    p = rng.uniform(-4.0, 4.0, (2000, 3))
-    body = box(1.0, 2.0, 3.0)
-    distance, normal = body.signed_distance(p)
-    q = np.abs(p) - [1.0, 2.0, 3.0]
-    exact = np.linalg.norm(np.maximum(q, 0.0), axis=1) + np.minimum(q.max(axis=1), 0.0)
-    step = 1e-6
-    slope = np.stack(
-        [(body.signed_distance(p + e)[0] - body.signed_distance(p - e)[0]) / (2 * step) for e in step * np.eye(3)],
-        axis=1,
-    )
-    smooth = np.abs(np.linalg.norm(slope, axis=1) - 1.0) < 1e-3  # not on the box's own medial surfaces
-    needle = Triangles(
-        np.array([[0.0, 0, 0], [1.0, 10, 0], [-0.5, 10, 0.8], [-0.5, 10, -0.8]]),
-        np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]),
-    )
-    direction = rng.normal(size=(4000, 3))
-    near = 0.05 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    near = near[near[:, 1] < -0.01]
-    wrong = float((needle.signed_distance(near)[0] <= 0.0).mean())
-    closest, face, _ = needle.closest(near)
-    naive = float((np.einsum("ij,ij->i", near - closest, needle.normals[face]) <= 0.0).mean())
-    off, turned = float(np.abs(distance - exact).max()), float(np.abs(normal - slope)[smooth].max())
-    return [
-        judged("signed-distance-from-a-box-largest", off),
-        judged("its-normal-against-the-distance-s", turned),
-        judged("share-of-points-around-a-needle", wrong),
-        judged("the-same-by-the-nearest-triangle", naive),
-    ]
 
 
 def _draw(figure: Any, edges: list[float], curves: dict[str, list[float]]) -> None:

@@ -45,7 +45,7 @@ from finger3d.objects import (
 )
 from finger3d.objects.rigid import rotation
 
-from ._common import Body, body, increment
+from ._common import Body, body, held_at, increment
 from ._press import converged
 from ._rows import Result, exact_columns, listed, together
 from .triangulated_objects import ball
@@ -151,8 +151,7 @@ def finger(size: float) -> Mesh:
 
 def condensed(mesh: Mesh) -> Body:
     """Contact points within 2 mm of the pole."""
-    held = np.zeros(mesh.points.shape, dtype=bool)
-    held[np.unique(mesh.facets["base"])] = True
+    held = held_at(mesh, {"base": (0, 1, 2)})
     return body(mesh, Elasticity.of(1.0, 0.45), held, "contact", lambda p: np.hypot(p[:, 0], p[:, 2]) < 2.0)
 
 
@@ -217,24 +216,21 @@ def _angles(quick: bool) -> Result:
     table: dict[str, Any] = {"angle_deg": list(angles)}
     for name, forces in (("turned", with_mesh), ("one", alone)):
         table |= {f"{name}_mesh_F{axis}_N": [f[-1, i] for f in forces] for i, axis in enumerate("xyz")}
-    return Result(tuple(rows), table, lambda figure: _draw_angles(figure, np.array(angles), np.array(with_mesh), world))
+    return Result(tuple(rows), table, lambda figure: _draw_angles(figure, np.array(angles), with_mesh[0][-1], world))
 
 
-def _draw_angles(figure: Any, angles: Float, with_mesh: Float, world: Float) -> None:
-    """Friction at the end, as the standing observer sees it, and the force over the increments, turned back."""
-    left, right = figure.subplots(1, 2)
+def _draw_angles(figure: Any, angles: Float, first: Float, world: Float) -> None:
+    """Friction at the end, as the standing observer sees it."""
+    axes, (ahead, _, aside) = figure.subplots(), first
     around = np.linspace(0.0, angles.max(), 181)
-    ahead, aside = with_mesh[0, -1, 0], with_mesh[0, -1, 2]
     c, s = np.cos(np.radians(around)), np.sin(np.radians(around))
-    left.plot(around, ahead * c + aside * s, "C0--", lw=1.0, label="x: that of 0 deg, turned")
-    left.plot(around, aside * c - ahead * s, "C1--", lw=1.0, label="z: that of 0 deg, turned")
-    left.plot(angles, world[:, 0], "C0o", label="x: solved on one mesh")
-    left.plot(angles, world[:, 2], "C1s", label="z: solved on one mesh")
-    left.set(xlabel="angle of the scene, deg", ylabel="friction on the finger at the end, N")
-    steps = np.arange(1, with_mesh.shape[1] + 1)
-    for angle, force in zip(angles, with_mesh, strict=True):
-        right.plot(steps, -force[:, 1], "o-", mfc="none", ms=4 + 3 * list(angles).index(angle), label=f"{angle:g} deg")
-    right.set(xlabel="increment: press, then slide", ylabel="normal force, mesh turned too, N", xticks=steps)
+    for name, colour, turned, found in (
+        ("x", "C0", ahead * c + aside * s, world[:, 0]),
+        ("z", "C1", aside * c - ahead * s, world[:, 2]),
+    ):
+        axes.plot(around, turned, colour + "--", lw=1.0, label=f"{name}: that of 0 deg, turned")
+        axes.plot(angles, found, colour + "o", label=f"{name}: solved on one mesh")
+    axes.set(xlabel="angle of the scene, deg", ylabel="friction on the finger at the end, N")
 
 
 def run(quick: bool) -> Result:

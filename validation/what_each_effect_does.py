@@ -131,20 +131,16 @@ def _draw(figure: Any, found: dict[tuple[str, str], dict[str, float]]) -> None:
         for i, effect in enumerate(effects):
             change = [100.0 * (found[domain, effect][q] / base[q] - 1.0) for q in QUANTITIES]
             at = np.arange(len(QUANTITIES)) + (i - (len(effects) - 1) / 2.0) * height
-            axes.barh(at, np.clip(change, -100.0, 200.0), height, label=LABELS[effect])
-            for y, c in zip(at, change, strict=True):
-                if abs(c) >= 0.5:
-                    axes.text(min(max(c, -100.0), 200.0) + (2.0 if c > 0 else -2.0), y, f"{c:+.0f}", va="center",
-                              ha="left" if c > 0 else "right", fontsize=7)  # fmt: skip
+            bars = axes.barh(at, np.clip(change, -100.0, 200.0), height, label=LABELS[effect])
+            axes.bar_label(bars, [f"{c:+.0f}" if abs(c) >= 0.5 else "" for c in change], padding=2, fontsize=7)
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_yticks(np.arange(len(QUANTITIES)), names)
         axes.invert_yaxis()
         axes.set(xlim=(-125.0, 225.0), xlabel="change by the effect (%)")
         axes.set(title={"plane-strain": "section, plane strain", "solid": "solid, 20 mm wide"}[domain])
         seconds = [found[domain, name]["cpu_seconds"] for name in ("none", *effects)]
-        times.barh(range(len(seconds)), seconds, color=["#777777", *(f"C{i}" for i in range(len(effects)))])
-        for y, value in enumerate(seconds):
-            times.text(1.15 * value, y, f"{value:.2g}" if value < 10.0 else f"{value:.0f}", va="center", fontsize=8)
+        bars = times.barh(range(len(seconds)), seconds, color=["#777777", *(f"C{i}" for i in range(len(effects)))])
+        times.bar_label(bars, [f"{s:.2g}" if s < 10.0 else f"{s:.0f}" for s in seconds], padding=2, fontsize=8)
         times.set(xscale="log", xlim=(0.5 * min(seconds), 6.0 * max(seconds)), xlabel="time (s)")
         times.set_yticks([0], ["none"])
         times.invert_yaxis()
