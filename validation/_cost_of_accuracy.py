@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,23 +93,10 @@ def run(quick: bool) -> Result:
     # pytetwild meshes are made here, once, and their time counts
     with empty_mesh_cache(), Bench(MODULE) as bench:
         runs = best_of(bench, "measured", cases, lambda s: 1 if quick else 3 if s < 1.5 else 2 if s < 4.0 else 1)
-        plain, floats = _others(bench, made, quick)
-    return _judged(made, runs, plain, floats, quick)
+    return _judged(made, runs, quick)
 
 
-def _others(bench: Bench, made: Mapping[str, Groups], quick: bool) -> tuple[Runs, Runs]:
-    """Plain factorisations of some of the matrices, and single precision."""
-    if quick:
-        wanted, single = made[SECTION]["mixed"][-1:], made[SECTION]["steps"]
-    else:
-        wanted = [c for c in made[SOLID]["mixed"] if c.size in (2.0, 1.0, 0.6)]
-        single = [*made[SECTION]["steps"], *made[SOLID]["steps"]]
-    single = [replace(c, counts=(10,)) for c in single]
-    once = {c: bench("plain", asdict(c)) for c in wanted}
-    return once, {c: bench("single", asdict(c)) for c in single}
-
-
-def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, quick: bool) -> Result:
+def _judged(made: Mapping[str, Groups], runs: Runs, quick: bool) -> Result:
     rows, lines, errors, steps, truths = [], [], {}, {}, {}
     for body, series in made.items():
         truths[body] = {q: truth(series[BEST[body]], runs, q) for q in QUANTITIES}
@@ -127,13 +114,12 @@ def _judged(made: Mapping[str, Groups], runs: Runs, plain: Runs, floats: Runs, q
             rows += _default_rows(body, runs, errors, truths[body], steps[body])
         lines += [_run_line(c, runs[c], errors[c]) for c in runs if c.body == body]
     advices = [(b, a) for b, series in made.items() for a in _advices(series, runs, errors, truths[b], rates)]
-    rows += [*_float_rows(floats), *_extrapolation_rows(made, runs, errors, truths, rates)]
+    rows += _extrapolation_rows(made, runs, errors, truths, rates)
     holes = sum(a.case is None for _, a in advices)
     if not quick:
         rows.append(judged("cells", holes))
     lines += [_advice_line(body, a) for body, a in advices]
     lines += [{"kind": "rate of the error", "quantity": q, "rate": round(power, 3)} for q, power in rates.items()]
-    lines += [_plain_line(c, p, runs[c]) for c, p in plain.items()] + [_float_line(c, f) for c, f in floats.items()]
     table = of_records(lines)
     return Result(tuple(rows), table, lambda figure: draw(figure, [dict.fromkeys(table, "") | line for line in lines]))
 
@@ -264,14 +250,6 @@ def _default_rows(
         yield judged("error-of-at-the-defaults-mm", got, abs(limit), truths[q].uncertainty, q=q, **words)
 
 
-def _float_rows(floats: Runs) -> Iterator[Row]:
-    """A compliance kept in single precision: what it changes, and how near to the limit of a step it stops."""
-    for case, found in floats.items():
-        here = f"compliance of {found['rows']} rows kept in single precision, {case.body}"
-        yield judged("largest-change-of-force-friction-sum", found["change"], here=here)
-        yield judged("violation", found["residual"], here=here)
-
-
 def _run_line(case: Case, run: Mapping[str, Any], errors: Mapping[str, float]) -> dict[str, Any]:
     count = case.counts[0] if 10 not in case.counts else 10
     own = {k: float(f"{v:.5g}") for k, v in errors.items()}
@@ -299,20 +277,3 @@ def _advice_line(body: str, a: Advice) -> dict[str, Any]:
         "steps": a.steps, "dofs": a.dofs, "seconds": round(a.seconds, 3), "mesh_s": round(a.mesh_seconds, 3),
         "peak_MB": round(a.peak_mb, 1),
     }  # fmt: skip
-
-
-def _plain_line(case: Case, found: Mapping[str, Any], run: Mapping[str, Any]) -> dict[str, Any]:
-    """A plain factorisation, and how many times its time go by for the whole chain without meshing."""
-    plain, own = found["processor_seconds"]["factorisation"], run["processor_seconds"]
-    return {
-        "kind": "one plain factorisation", "body": case.body, "element": case.element, "size_mm": case.size,
-        "dofs": found["dofs"], "seconds": round(plain, 4), "peak_MB": round(found["peak_MB"], 1),
-        "load": round(found["load"], 2), "chain_over_it": round((seconds(run) - own["mesh"]) / plain, 3),
-        "assembly_over_it": round(own["assembly"] / plain, 3),
-    }  # fmt: skip
-
-
-def _float_line(case: Case, found: Mapping[str, Any]) -> dict[str, Any]:
-    saved = found["processor_seconds"]["single"] / found["processor_seconds"]["double"]
-    return {"kind": "single precision: seconds of a dense solve over those in double", "body": case.body,
-            "size_mm": case.size, "contact_points": found["rows"], "seconds": round(saved, 3)}  # fmt: skip

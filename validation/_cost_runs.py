@@ -1,19 +1,14 @@
-"""What a process of its own does with a case of `_cost`: press it, factor its matrix, or round its compliance."""
+"""What a process of its own does with a case of `_cost`: press it."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from finger3d.contact.friction import OPEN
 from finger3d.geometry.design import designs
 from finger3d.mechanics.formulations import formulation_of
 
-from ._common import free_motion
-from ._cost import Case, assembled, condensed, factored, free_part, in_steps, numbers, processor_s
+from ._cost import Case, assembled, condensed, in_steps, numbers, processor_s
 from ._each_iteration import EachIteration
 
 MODULE = __name__.rpartition(".")[2]
@@ -73,41 +68,3 @@ def measured(given: dict[str, Any]) -> dict[str, Any]:
     usual = str(10 if 10 in case.counts else case.counts[0])
     answer |= {"numbers": found, "iterations": iterations, "factorizations": factorizations[usual]}
     return {**answer, "cpu_s": time.process_time() - used, "seconds": seconds, "processor_seconds": processor}
-
-
-def plain(given: dict[str, Any]) -> dict[str, Any]:
-    """Processor time of a plain factorisation of a case's matrix, held unknowns out."""
-    problem = assembled(Case.of(given))[0]
-    seconds = {"factorisation": factored(free_part(problem))[1]}
-    return {"processor_seconds": seconds, "dofs": int(problem.body.stiffness.upper.shape[0])}
-
-
-def single(given: dict[str, Any]) -> dict[str, Any]:
-    """What a compliance kept in single precision changes, and what a solve in single precision would save."""
-    case = Case.of(given)
-    problem = condensed(assembled(case)[0])
-    rounded = problem.delassus.astype(np.float32).astype(np.float64)
-    count = case.counts[0]
-    frames = [
-        in_steps(p, count)[-1] for p in (problem, replace(problem, system=replace(problem.system, delassus=rounded)))
-    ]
-    state = frames[1].meshed_state.contact
-    c, d = state.force.shape
-    # the state found with the rounded compliance, held against the true one; position is the change from the start
-    moved = free_motion(problem, frames[1].target) + np.einsum("aibj,bj->ai", problem.delassus, state.force)
-    gap = np.where(state.status == OPEN, np.maximum(-moved[:, 0], 0.0), np.abs(moved[:, 0]))
-    dense = problem.delassus.reshape(c * d, c * d)
-    seconds = {}
-    for name, kind in (("double", np.float64), ("single", np.float32)):
-        matrix, right = dense.astype(kind), np.ones(c * d, dtype=kind)
-        np.linalg.solve(matrix, right)
-        begin = processor_s()
-        np.linalg.solve(matrix, right)
-        seconds[name] = processor_s() - begin
-    values = [numbers(problem.points, f) for f in frames]
-    return {
-        "processor_seconds": seconds,
-        "residual": float(gap.max() / frames[1].target.depth_mm),
-        "change": max(abs(values[1][k] / values[0][k] - 1.0) for k in ("force", "friction_sum", "gauge_strain")),
-        "rows": c * d,
-    }
