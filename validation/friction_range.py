@@ -1,4 +1,4 @@
-"""Over which range of mu do increments settle, and how far does a hold creep, here, by the paper's rule and in peers?
+"""Over which range of mu do increments settle, here, by the paper's rule and in peers?
 
 finger3d and the paper's rule: the increments of all histories of hard_cases.py, read from its committed table; those of
 the paper's rule count up to its first cycle.  CalculiX 2.20: the deck that `finger3d export --solver calculix` writes
@@ -8,8 +8,7 @@ slope, the shear stress over the displacement of a point that sticks.  The deck'
 stress of 0.11 MPa at mu = 1 moves a sticking point by 0.014 mm; it is raised a hundred times, to 800 MPa/mm, to come
 nearer to points that do not move.  FElupe 11.3: the same mesh and path, with its rigid plane of penalties and its
 cutbacks, which halve an increment up to ten times.  Its defaults take both penalties from the mean stiffness of the
-nodes, with which the finger enters the plane by 1.8 % of the depth; the tangential one is raised a hundred times, too.
-The creep is that of creep_of_a_hold.py, from its committed table.  Where ccx or FElupe is not installed its committed
+nodes, with which the XX ccx or FElupe is not installed its committed
 results are judged.
 """
 
@@ -35,12 +34,6 @@ from ._rows import Result, Row, at_most, columns, committed, committed_instead
 STIFFER = 100.0
 LIMIT_S = 900.0
 COLUMNS = "mu increments settled paper_settled calculix_share calculix_stiff_share felupe_share felupe_stiff_share"
-SHOWN = {  # pads, impratio, noslip_iterations of creep_of_a_hold
-    "MuJoCo,\ndefault": ("box", 1.0, 0.0),
-    "MuJoCo,\nimpratio 10": ("box", 10.0, 0.0),
-    "MuJoCo,\nnoslip 10": ("box", 1.0, 10.0),
-    "MuJoCo, noslip\n10, ellipsoids": ("ellipsoid", 1.0, 10.0),
-}
 
 
 def press(mu: float) -> Model:
@@ -64,8 +57,7 @@ def run(quick: bool) -> Result:
     ]
     lines = [(*_counted(mu), *(x for shares in theirs for x in shares.get(mu, (np.nan, np.nan)))) for mu in MU]
     table = columns(COLUMNS, lines)
-    creeps = _creeps()
-    return Result(tuple(_rows(table, creeps)), table, lambda figure: _draw(figure, table, creeps))
+    return Result(tuple(_rows(table)), table, lambda figure: _draw(figure, table))
 
 
 def _counted(mu: float) -> tuple[float, int, int, int]:
@@ -86,19 +78,7 @@ def _peer(
     return {x["mu"]: (x[f"{name}_share"], x[f"{name}_stiff_share"]) for x in lines}
 
 
-def _creeps() -> dict[str, float]:
-    """Creep in a minute, mm, by program and setting."""
-    lines = committed("creep_of_a_hold")
-    found = {"finger3d": next(x["creep_mm_per_min"] for x in lines if x["program"] == "finger3d")}
-    keys = ("pad_kg", "time_step_ms", "impratio", "noslip_iterations")
-    for name, (pads, impratio, noslip) in SHOWN.items():
-        wanted = (1.0, 2.0, impratio, noslip)
-        match = (x for x in lines if x["pads"] == pads and tuple(x[k] for k in keys) == wanted)
-        found[name] = abs(next(match)["creep_mm_per_min"])
-    return found
-
-
-def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
+def _rows(table: dict[str, list[Any]]) -> list[Row]:
     total, settled, paper = (sum(table[k]) for k in ("increments", "settled", "paper_settled"))
     here = f"{total} increments at mu = 0 to 1e6"
 
@@ -111,9 +91,7 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
         at_most(f"the same by the paper's rule, of {here}", "hard_cases, finger3d", settled, paper, kind="sensitivity"),
         least("CalculiX", "stick slope of its deck", table["calculix_share"]),
         least("FElupe", "its own stick slope", table["felupe_share"]),
-        at_most("creep of a hold in a minute, finger3d (mm)", "creep_of_a_hold", 1e-12, creeps["finger3d"],
-            "a bound above round-off"),
-    ]  # fmt: skip
+    ]
     for peer in ("CalculiX", "FElupe"):
         tried = table[f"{peer.lower()}_stiff_share"]
         if np.isfinite(tried).any():
@@ -121,11 +99,9 @@ def _rows(table: dict[str, list[Any]], creeps: dict[str, float]) -> list[Row]:
     return rows
 
 
-ROUND_OFF = 1e-12  # mm
-
-
-def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) -> None:
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+def _draw(figure: Any, table: dict[str, list[Any]]) -> None:
+    figure.set_size_inches(7.0, 4.5)
+    axes = figure.subplots()
     names = [f"{mu:g}" for mu in table["mu"]]
     t: dict[str, Float] = {k: np.array(v, dtype=float) for k, v in table.items()}
     for share, style, size, label in (
@@ -136,17 +112,9 @@ def _draw(figure: Any, table: dict[str, list[Any]], creeps: dict[str, float]) ->
         (t["felupe_stiff_share"], ">:", 6, "FElupe, a hundred times that"),
         (t["paper_settled"] / t["increments"], "s--", 6, "rule of the 2004 paper"),
     ):
-        left.plot(names, 100.0 * share, style, ms=size, label=label)
-    left.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
-    left.set_title("increments that settle; peers: share of the press")
-    seen = {name: mm for name, mm in creeps.items() if mm > ROUND_OFF}
-    right.semilogx(list(seen.values()), [name.replace("\n", " ") for name in seen], "o", color="C4")
-    for number, mm in enumerate(seen.values()):
-        right.annotate(f"{mm:.2g}", (mm, number), (6, 0), textcoords="offset points", va="center")
-    none = [name for name in creeps if name not in seen]
-    right.set(xlim=(1e-5, 1e3), xlabel="creep in a minute (mm)", ylim=(len(seen) - 0.5, -0.5))
-    right.text(0.5, 0.03, f"{', '.join(none)}: none" if none else "", transform=right.transAxes, ha="center")
-    right.set_title("object of 45 g held with 12 N, mu = 1")
+        axes.plot(names, 100.0 * share, style, ms=size, label=label)
+    axes.set(xlabel="friction coefficient mu", ylabel="solved (%)", ylim=(-5.0, 160.0), yticks=range(0, 101, 20))
+    axes.set_title("increments that settle; peers: share of the press")
     total, settled, paper = (int(t[k].sum()) for k in ("increments", "settled", "paper_settled"))
     figure.supxlabel(
         f"finger3d settles {settled} of {total} increments, the paper's rule {paper} up to its first cycles", fontsize=9
