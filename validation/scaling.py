@@ -20,7 +20,7 @@ import numpy as np
 from finger3d._machine import cores
 
 from ._child import Bench, available_gb, best_of
-from ._rows import GOAL, Result, Row, at_least, at_most, of_records
+from ._rows import GOAL, Result, Row, at_least, at_most, grouped, of_records
 from ._scaling import BODIES, STAGES, Size, sweep_seconds
 
 Runs = Mapping[Size, dict[str, Any]]
@@ -34,7 +34,6 @@ ROWS = (Size(2.4, 9.6), Size(1.3, 16.0), Size(0.77, 16.0), Size(0.52, 16.0), Siz
 SWEPT = Size(1.45, 6.0)
 WORKER_TRIES = 3
 NEED_GB = {Size(0.95, 1.25): 10.0, Size(0.95, 0.98): 15.0, Size(0.9, 0.9): 21.5, Size(0.385, 16.0): 10.0}
-COLOURS = dict(zip(STAGES, ("C7", "C0", "C1", "C3", "C2", "#c5b0d5"), strict=True))
 
 
 def run(quick: bool) -> Result:
@@ -46,7 +45,8 @@ def run(quick: bool) -> Result:
     judged = [*_memory_rows(runs), *_contact_rows(runs), *_growth_rows(runs, unknowns, quick)]
     judged += _one_factorisation(runs)
     judged += [] if quick or cores() < 2 else _workers()
-    return Result(tuple(judged), _table(runs, unknowns, rows), lambda figure: _draw(figure, runs, unknowns, rows))
+    table = _table(runs, unknowns, rows)
+    return Result(tuple(judged), table, lambda figure: _draw(figure, table))
 
 
 def _sizes(quick: bool) -> tuple[list[Size], list[Size]]:
@@ -129,46 +129,17 @@ def _table(runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> dict[s
     ])  # fmt: skip
 
 
-def _draw(figure: Any, runs: Runs, unknowns: Sequence[Size], rows: Sequence[Size]) -> None:
-    """Stacked seconds, and memory by stage, over both series."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
+def _draw(figure: Any, table: Mapping[str, Any]) -> None:
+    """Seconds and memory of every stage, over both series."""
     figure.set_size_inches(12.0, 9.0)
-    panels = figure.subplots(2, 2)
-    for column, (sizes, key, other) in enumerate(((unknowns, "dofs", "rows"), (rows, "rows", "dofs"))):
-        top, low = panels[0][column], panels[1][column]
-        sizes = sorted(sizes, key=lambda s: runs[s][key])
-        label = "unknowns (contact rows)" if key == "dofs" else "contact rows (unknowns)"
-        names = [f"{runs[s][key]:,}\n({runs[s][other]:,})" for s in sizes]
-        at = np.arange(len(sizes))
-        total = np.array([sum(runs[s]["seconds"].values()) for s in sizes])
-        bottom = np.zeros(len(sizes))
-        for stage, colour in COLOURS.items():
-            share = 100.0 * np.array([runs[s]["seconds"][stage] for s in sizes]) / total
-            top.bar(at, share, bottom=bottom, color=colour, label=stage, width=0.7)
-            bottom += share
-        for x, seconds in zip(at, total, strict=True):
-            top.annotate(f"{seconds:.3g} s", (x, 100.0), ha="center", va="bottom", fontsize=9)
-        top.set(ylabel="share of the time (%)", ylim=(0.0, 112.0))
-        width = 0.8 / len(STAGES)
-        for i, stage in enumerate(STAGES):
-            peak = [runs[s]["peaks"][stage] / 1000.0 for s in sizes]
-            low.bar(at + (i - 2.5) * width, peak, width, color=COLOURS[stage], label=stage)
-        low.set(ylabel="peak memory of the stage (GB)", yscale="log", xlabel=label)
-        if key == "dofs":
-            for dofs, limit in LIMITS_MB.items():
-                found = [i for i, s in enumerate(sizes) if runs[s]["dofs"] >= dofs]
-                if found:
-                    low.plot(found[0] + np.array([-0.45, 0.45]), [limit / 1000.0] * 2, "k--", lw=1.2,
-                             label="limit" if dofs == 40_000 else None)  # fmt: skip
-        for axes in (top, low):
-            axes.set_xticks(at, names, fontsize=8)
-            axes.grid(axis="y", alpha=0.3)
-        low.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        low.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        low.yaxis.set_minor_formatter(NullFormatter())
-    panels[0][0].set_title("contact and body refined")
-    panels[0][1].set_title("only the contact refined")
-    handles = dict(zip(*reversed(panels[1][0].get_legend_handles_labels()), strict=True))
-    handles |= dict(zip(*reversed(panels[0][0].get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=7, frameon=False)
+    titles = {"unknowns": "contact and body refined", "contact rows": "only the contact refined"}
+    for (top, low), (series, t) in zip(figure.subplots(2, 2).T, grouped(table, "series"), strict=True):
+        x = t["dofs" if series == "unknowns" else "rows"]
+        for stage in STAGES:
+            top.loglog(x, t[f"{stage}_s"], "o-", ms=4, label=stage)
+            low.loglog(x, t[f"{stage}_peak_MB"], "o-", ms=4, label=stage)
+        top.loglog(x, t["seconds"], "ks--", ms=4, label="all")
+        if series == "unknowns":
+            low.loglog(*zip(*LIMITS_MB.items(), strict=True), "k_", ms=24, label="limit of all")
+        top.set(title=titles[series], ylabel="time of the stage (s)")
+        low.set(xlabel=series, ylabel="peak memory of the stage (MB)")
