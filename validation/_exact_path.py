@@ -13,8 +13,8 @@ problem, in which only points on the border of their set may change it (Klarbrin
     r_n = 0, w_n = 0        open with w'_n >= 0; or touching with r' in the friction cone, and friction opposes slip
     |r_t| = mu r_n > 0      stick with sigma r'_t <= mu r'_n; or slip with sigma w'_t <= 0
 
-It is solved by changes of the active set, and by Lemke's method where active sets come back.  Rates need not exist if
-friction is large: forces then jump, and a short increment of the path is solved as such.
+It is solved by changes of the active set.  Rates need not exist if friction is large: where no set is found, forces
+jump, and a short increment of the path is solved as such.
 
 Increments have a limit on such paths, since contact is piecewise linear in the motion; elsewhere there is no reference.
 """
@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 from finger3d._types import Float
 from finger3d.contact.conditions import TOLERANCE, ContactProblem, residual
 from finger3d.contact.friction import OPEN, SLIP, STICK, Status
-from finger3d.contact.lemke import lemke
 from finger3d.contact.solve import solve_increment
 from finger3d.contact.state import ContactState, next_state
 from finger3d.errors import Outcome
@@ -54,14 +53,11 @@ _ROUND_OFF = 1e-11
 _CONTINUOUS = 1e-8
 """Change of the forces at an event, over the largest, that is round-off."""
 
-_TOGETHER, _ONE_BY_ONE = 12, 60
-"""Changes of the active set: first of all points that violate a condition, then of the worst only."""
+_CHANGES = 12
+"""Changes of the active set at an event, of all points that violate a condition."""
 
 _LEAST_EVENTS, _EVENTS_A_POINT = 400, 40
 """Largest number of events: a constant, and one for each contact point."""
-
-_LARGEST_RATES = 1200
-"""Largest number of rows of the tableau of `rates_start`."""
 
 _STRIDES = tuple(10.0**k for k in range(-9, 1))
 """Shares of the path that an increment over a jump is tried with, until there is a solution."""
@@ -169,35 +165,15 @@ class _Path:
         at_limit = (normal > border) & ((self._set.status == SLIP) | (beyond >= -border * self._limit))
         at_limit &= self.problem.friction > 0.0
         sign = np.where(at_limit, np.sign(self.force[:, 1]), self._set.sign)
-        line = self._improved(_ActiveSet(self._set.status, sign), at_apex, at_limit, (True, False))
-        return self._by_pivots(at_apex, at_limit, sign) if line is None else line
-
-    def _improved(
-        self, chosen: _ActiveSet, at_apex: NDArray[np.bool_], at_limit: NDArray[np.bool_], ways: tuple[bool, ...]
-    ) -> _Line | None:
-        """Change an active set until the rates satisfy all conditions; None where a set comes back.
-
-        Parameters
-        ----------
-        ways : whether all points that violate a condition change, or the worst only, one way after the other
-        """
-        for together in ways:
-            tried = set[bytes]()
-            for _ in range(_TOGETHER if together else _ONE_BY_ONE):
-                line = self._solved(chosen)
-                if line is None:
-                    break
-                violation, better = self._violations(chosen, line, at_apex, at_limit)
-                if violation.max(initial=0.0) <= 0.0:
-                    self._set = chosen
-                    return line if self._continues(line) else None
-                tried.add(chosen.status.tobytes() + chosen.sign.tobytes())
-                changes = violation > 0.0 if together else np.arange(len(violation)) == violation.argmax()
-                chosen = _ActiveSet(
-                    np.where(changes, better.status, chosen.status), np.where(changes, better.sign, chosen.sign)
-                )
-                if chosen.status.tobytes() + chosen.sign.tobytes() in tried:
-                    break
+        chosen: _ActiveSet | None = _ActiveSet(self._set.status, sign)
+        for _ in range(_CHANGES):
+            found, line = chosen, self._solved(chosen)
+            if line is None:
+                break
+            chosen = self._mended(found, line, at_apex, at_limit)
+            if chosen is None:
+                self._set = found
+                return line if self._continues(line) else None
         return None
 
     def _continues(self, line: _Line) -> bool:
@@ -205,10 +181,10 @@ class _Path:
         largest = max(float(np.abs(self.force).max(initial=0.0)), float(np.abs(line.force_rate).max(initial=0.0)))
         return bool(np.abs(line.force - self.force).max(initial=0.0) <= _CONTINUOUS * largest)
 
-    def _violations(
+    def _mended(
         self, chosen: _ActiveSet, line: _Line, at_apex: NDArray[np.bool_], at_limit: NDArray[np.bool_]
-    ) -> tuple[Float, _ActiveSet]:
-        """Return by how much (c,) N points violate their conditions, 0 within round-off, and the set that mends it."""
+    ) -> _ActiveSet | None:
+        """Return the set in which the points that violate their conditions change; None if there are none."""
         (status, sign), mu, rho = chosen, self.problem.friction, self.problem.augmentation
         n, t = line.force_rate.T
         gap, slip = (rho * line.displacement_rate).T
@@ -225,7 +201,7 @@ class _Path:
         mend(at_apex & (status == STICK), (np.abs(t) - mu * n) / self._limit, SLIP, np.sign(t))
         mend(at_limit & (status == STICK), (sign * t - mu * n) / self._limit, SLIP)
         mend((at_apex | at_limit) & (status == SLIP) & (mu > 0.0), sign * slip, STICK)
-        return violation, _ActiveSet(into, towards)
+        return _ActiveSet(into, towards) if violation.any() else None
 
     def _solved(self, chosen: _ActiveSet) -> _Line | None:
         """Return the line with an active set; None if its equations are singular."""
@@ -253,12 +229,6 @@ class _Path:
         lines[:, :, 1] = ratio * lines[:, :, 0]
         lines[:, stick, 1] = solved[len(touching) : len(rows)].T
         return _Line(lines[0], lines[1], self._through_body(lines[1]) + self._rate)
-
-    def _by_pivots(self, at_apex: NDArray[np.bool_], at_limit: NDArray[np.bool_], sign: Float) -> _Line | None:
-        """Return the line by Lemke's method; None if there is none."""
-        stick = (self._set.status != OPEN) & ~at_apex & ~at_limit
-        found = rates_start(self.problem, self._rate, (stick, at_limit, at_apex), sign)
-        return None if found is None else self._improved(_ActiveSet(*found), at_apex, at_limit, (False,))
 
     # --- from event to event --------------------------------------------------------------------------------------
 
@@ -349,56 +319,6 @@ class _Path:
     def _through_body(self, force: Float) -> Float:
         """Return the displacement W r (c, d) mm of forces (c, d) N."""
         return np.asarray((self.problem.delassus @ force.ravel()).reshape(force.shape))
-
-
-def rates_start(
-    problem: ContactProblem,
-    rate: Float,
-    points: tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]],
-    sign: Float,
-) -> tuple[NDArray[np.int8], Float] | None:
-    """Return status (c,) and direction of friction (c,) that the rates of forces have in a section, or None.
-
-    Parameters
-    ----------
-    rate : (c, 2) mm, of the free motion
-    points : (c,) each
-        Points that stick, points at their friction limit, which stick or slip, and points without gap and force.
-    sign : (c,), direction of friction of points at their limit
-    """
-    stick, at_limit, at_apex = points
-    c, mu, w, q = len(sign), problem.friction, problem.delassus, rate.ravel()
-    apex, limit = np.flatnonzero(at_apex), np.flatnonzero(at_limit)
-    unit = np.eye(2 * c).reshape(c, 2, 2 * c)  # [point, direction] -> force of size 1
-    n, t = unit[:, 0], unit[:, 1]
-    bilateral = np.concatenate([n[stick], t[stick], (n + (sign * mu)[:, None] * t)[limit]])
-    zero = np.concatenate([n[stick], t[stick], n[limit]])  # displacements that vanish
-    forces = np.concatenate([-sign[limit, None] * t[limit], n[apex], t[apex], -t[apex]])
-    f, k, b = len(forces), len(apex), len(bilateral)
-    m = f + k
-    if m > _LARGEST_RATES:
-        return None
-    equations, right = zero @ w @ bilateral.T, zero @ np.column_stack([w @ forces.T, q])
-    into = forces @ np.column_stack([w @ bilateral.T, w @ forces.T, q])
-    try:
-        reduced = into[:, b:] - into[:, :b] @ np.linalg.solve(equations, right)
-    except np.linalg.LinAlgError:
-        return None
-    matrix, load = np.zeros((m, m)), np.zeros(m)
-    matrix[:f, :f], load[:f] = reduced[:, :-1], reduced[:, -1]
-    normals, towards, away = (slice(f - (3 - i) * k, f - (2 - i) * k) for i in range(3))
-    matrix[towards, f:] = matrix[away, f:] = np.eye(k)
-    matrix[f:, normals], matrix[f:, towards], matrix[f:, away] = np.diag(mu[apex]), -np.eye(k), -np.eye(k)
-    matrix[:f, :f] /= np.abs(matrix[:f, :f]).max(initial=0.0) or 1.0
-    z = lemke(matrix, load / (np.abs(load).max(initial=0.0) or 1.0), 20 * m)
-    if z is None:
-        return None
-    status, direction = np.full(c, OPEN, dtype=np.int8), sign.copy()
-    status[stick] = STICK
-    status[limit] = np.where(z[: len(limit)] > 0.0, STICK, SLIP)
-    status[apex] = np.where(z[normals] > 0.0, np.where(z[f:] > 0.0, SLIP, STICK), OPEN)
-    direction[apex] = np.sign(z[towards] - z[away])
-    return status, direction
 
 
 # --- presses --------------------------------------------------------------------------------------------------------
