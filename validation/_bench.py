@@ -26,23 +26,17 @@ from typing import Any
 import numpy as np
 
 from finger3d._machine import child_environment, cores
-from finger3d.analyses.press import press
 from finger3d.analyses.pressed_body import presses
-from finger3d.analyses.sweep.run import sweep
 from finger3d.contact.friction import Coulomb
 from finger3d.effects.large_deformation import Effect as LargeDeformation
 from finger3d.mechanics.discretise.build import build
 from finger3d.mechanics.discretise.problem import Problem
-from finger3d.mechanics.formulations import formulation_of
 from finger3d.mechanics.model import Domain, Model
 from finger3d.progress import Progress
 
 from ._cost import factored, free_part
 from ._press import changed, converged, fig9_model
 from ._rows import Row, at_most
-from .beside_ansys import SCENES
-from .label_rate import DRAWN, OBJECTS
-from .label_rate import scene as pad_under
 
 LARGE, MIDDLE, QUICK = 1.1, 1.25, 3.0  # mm: 150 000, 47 000 and 8 000 unknowns
 MUS = (0.06, 0.125, 0.25, 0.5, 1.0)
@@ -77,20 +71,17 @@ def _seconds(act: Callable[[], Any]) -> float:
 
 
 def measured(size: float) -> dict[str, float]:
-    """A press in this process and one of all MUS, seconds by stage; peak memory; the same again; then plain PARDISO.
+    """A press in this process and one of all MUS, seconds by stage; the same again; then plain PARDISO.
 
     The shorter time of each stage counts: the plain factorisation finds memory that was used before, and memory touched
     for the first time is slow, above all on a virtual machine.
     """
-    import resource
-
     problem, found = _pressed(size)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     del problem  # frees the memory of its factor
     problem, again = _pressed(size)
     upper = free_part(problem)
     del problem
-    return _least([found, again]) | {"peak_MB": peak, "factorisation": factored(upper)[0]}
+    return _least([found, again]) | {"factorisation": factored(upper)[0]}
 
 
 def _pressed(size: float) -> tuple[Problem, dict[str, float]]:
@@ -208,26 +199,21 @@ def run(quick: bool, report: Progress) -> Iterator[list[Row]]:
     yield list(_sensitivity(quick))
     report.stage("sweeps of five values of mu")
     yield _sweeps(quick)
-    report.stage("slides of a gel pad, and labels")
-    yield [*_slides(quick), _labels(quick)]
     report.stage("large deformation")
-    yield _large_deformation(QUICK if quick else MIDDLE)
+    yield [_large_deformation(QUICK if quick else MIDDLE)]
 
 
 def _stages(sizes: Sequence[float], quick: bool) -> list[Row]:
-    """Return the stages of a press over one factorisation, five values of mu over one, MUMPS, and memory."""
-    runs = {size: [_child(size) for _ in range(1 if quick else 2)] for size in sizes}
-    best = {size: _least(runs[size]) for size in sizes}
+    """Return the stages of a press over one factorisation, five values of mu over one, and MUMPS."""
+    best = {size: _least([_child(size) for _ in range(1 if quick else 2)]) for size in sizes}
     rows = _ratios(best[sizes[-1]])
-    for size, most in zip(sizes, (2.0,) if quick else (2.0, 5.0), strict=True):
+    for size in sizes:
         once = best[size]["assembly"] + best[size]["condensation"]
         five = (once + best[size]["contact_all"]) / (once + best[size]["contact"])
         unknowns = f"{best[size]['dofs']:.0f} unknowns"
         rows.append(_row(f"5 values of mu against one, stages alone, {unknowns}", 1.25, five))
         mumps = best[size]["mumps"] / best[size]["condensation"]
         rows.append(_row(f"condensation by MUMPS against PARDISO, {unknowns}", 5.0, mumps))
-        peak = max(run["peak_MB"] for run in runs[size]) / 1024.0
-        rows.append(_row(f"peak memory, GB, {unknowns}", most, peak))
     return rows
 
 
@@ -245,46 +231,14 @@ def _sweeps(quick: bool) -> list[Row]:
     ]
 
 
-def _slides(quick: bool) -> Iterator[Row]:
-    """Yield the time of the published slides of a gel pad over that of one condensation of the same mesh."""
-    for scene in SCENES[-1:] if quick else SCENES[1:]:
-        for effects in ({"auto": False}, {"auto": False, "large_deformation": {}}):
-            tables = scene.tables(2.0 if quick else 1.0) | {"effects": effects}
-            spent = press(tables, error=False, figures=False).summary()["cost"]["seconds"]
-            ratio = (spent["assembly"] + spent["condensation"] + spent["contact"]) / spent["condensation"]
-            model, most = ("large deformation", 100.0) if len(effects) > 1 else ("small strain", 10.0)
-            seconds = ratio * spent["condensation"]
-            yield _row(f"{scene.name}, {model}, {seconds:.1f} s, over one condensation", most, ratio)
-
-
-def _labels(quick: bool) -> Row:
-    """Return how many samples with labels take as long as the condensation of their body."""
-    size, count = (1.0, 3) if quick else (0.85, 40)
-    with tempfile.TemporaryDirectory(prefix="finger3d_bench_") as out:
-        ranges = DRAWN | OBJECTS["ball"][1]
-        table = sweep(pad_under("ball", size, False), ranges, out, sample=f"random:{count}", workers=1).columns
-    samples = float(table["build_seconds"][0]) / (float(np.sum(table["seconds"])) / count)
-    what = "samples of a gel pad under a ball, with labels, in the time of meshing and condensation"
-    return Row(what, "goal of this project", 2.0, samples, 0.0, _load(), "statement", "at least")
-
-
-def _large_deformation(size: float) -> list[Row]:
-    """Return factorisations and time of a press at large deformation, of many presses over one, and of a section."""
-    model = LargeDeformation().apply(fig9(size))
-    problem = build(model)
-    workspace = formulation_of(model).workspace()
-    one = _seconds(lambda: converged(problem, workspace))
-    body = f"large deformation, {problem.body.stiffness.upper.shape[0]} unknowns, 10 increments"
-    rows = [
-        _row(f"{body}: factorisations", 15.0, workspace.factorizations),
-        _row(f"{body}: time over that of one condensation", 20.0, one / problem.body.condensed.seconds),
-    ]
+def _large_deformation(size: float) -> Row:
+    """Return the time of presses under many values of mu over that of one."""
+    problem = build(LargeDeformation().apply(fig9(size)))
+    one = _seconds(lambda: converged(problem))
     mus = np.linspace(0.05, 1.25, 3 if size == QUICK else 25)
     every = _seconds(lambda: _under_all(problem, mus.tolist()))
-    rows.append(_row(f"{body}: {len(mus)} values of mu against one", 8.0, every / one))
-    section = build(LargeDeformation().apply(fig9(1.0, "plane-strain")))
-    what = f"large deformation of the section, {section.body.stiffness.upper.shape[0]} unknowns, 10 increments, s"
-    return [*rows, _row(what, 1.0, _seconds(lambda: converged(section)))]
+    what = f"large deformation, {problem.body.stiffness.upper.shape[0]} unknowns, 10 increments"
+    return _row(f"{what}: {len(mus)} values of mu against one", 8.0, every / one)
 
 
 def _ratios(best: dict[str, float]) -> list[Row]:
