@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ._cost import LARGE, SECTION, SOLID
-from ._rows import committed
 
 Line = Mapping[str, Any]
 
@@ -20,11 +19,12 @@ _FLOOR = 1e-5
 
 
 def draw(figure: Any, lines: Sequence[Line]) -> None:
-    """Draw six panels from the lines of the study's table."""
+    """Draw five panels from the lines of the study's table."""
     figure.set_size_inches(10.5, 11.5)
-    panels = figure.subplots(3, 2).ravel()
+    *panels, empty = figure.subplots(3, 2).ravel()
+    empty.remove()
     runs = [line for line in lines if line["kind"] == "run"]
-    for axes, panel in zip(panels, (_elements, _numbers, _grading, _memory, _condensation, _large), strict=True):
+    for axes, panel in zip(panels, (_elements, _numbers, _memory, _condensation, _large), strict=True):
         panel(axes, runs)
 
 
@@ -62,17 +62,6 @@ def _numbers(axes: Any, runs: Sequence[Line]) -> None:
         _plot(axes, series(runs, SOLID), "seconds", f"error_{quantity}", name, mark)
     axes.set(title="Which number is dear?  Solid, mixed elements", xlabel="processor time, mesh to last increment (s)")
     axes.set(ylabel="error, %", ylim=(None, 200.0))
-
-
-def _grading(axes: Any, _: Sequence[Line]) -> None:
-    graded = [line for line in committed("graded_meshes") if line["goal"] == "normal_force_N"]
-    for domain, body in (("plane-strain", SECTION), ("solid", SOLID)):
-        for way, mark in (("equal grading", "o-"), ("graded", "s--")):
-            some = [line for line in graded if (line["domain"], line["way"]) == (domain, way)]
-            label = f"{body}, {'towards it' if way == 'graded' else way}"
-            _plot(axes, [{**line, "error": line["true_error"]} for line in some], "dofs", "error", label, mark,
-                  color=COLOURS[body])  # fmt: skip
-    axes.set(title="What does grading towards the force save?", xlabel="unknowns", ylabel="error, %")
 
 
 def _memory(axes: Any, runs: Sequence[Line]) -> None:

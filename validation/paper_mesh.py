@@ -93,7 +93,7 @@ class Coarse:
 
 
 def run(quick: bool) -> Result:
-    """Coarse and fine, both rules, all coefficients; two finer linear meshes for the rate of the force."""
+    """Coarse and fine, both rules, all coefficients."""
     mesh = linear_mesh(NODES)
     found, lines, made = {}, [], []
     x, gauges = line_r5(count=15)
@@ -111,7 +111,6 @@ def run(quick: bool) -> Result:
                 failed = sum(not s.outcome.ok for s in steps)
                 lines.append((plane, nu, mu, rule, force, a, c, friction, failed, max(s.residual for s in steps)))
         made += _statements(plane, nu, x, found)
-    made.append(_locking(quick))
     names = "plane nu mu rule force_N_per_mm a_mm c_mm friction_sum_N_per_mm steps_not_settled residual"
     return Result(tuple(made), columns(names, lines), lambda figure: _draw(figure, x, found))
 
@@ -143,48 +142,27 @@ def _statements(plane: str, nu: float, x: np.ndarray, found: dict[Any, Any]) -> 
     ]
 
 
-def _locking(quick: bool) -> Row:
-    """How fast the force of linear triangles, too large where they lock, comes down."""
-    fine = half_cylinder(0.49, STRAIN, 0.1 if quick else 0.05)
-    wanted = Profile.of(fine, under(fine, 0.0)[-1]).force
-    errors, sizes = [], []
-    for nodes in (NODES, 5 * NODES):
-        mesh = linear_mesh(nodes)
-        body = Coarse.of(mesh, STRAIN, 0.49)
-        errors.append(_numbers(body, body.press(0.0, "projection")[-1].state)[0] / wanted - 1.0)
-        sizes.append(len(mesh.points) ** -0.5)
-    rate = float(np.log(errors[0] / errors[1]) / np.log(sizes[0] / sizes[1]))
-    what = f"rate of the frictionless force of linear triangles ({100 * errors[0]:.1f} % too large), {STRAIN}, nu = .49"
-    reason = "two meshes, and an edge that jumps from node to node"
-    return Row(what, "corners of the base, Williams 1952: 2 lambda", 1.19, rate, 0.3, reason, measure="absolute")
-
-
 def _draw(figure: Any, x: np.ndarray, found: dict[Any, Any]) -> None:
     figure.set_size_inches(13.0, 8.4)
-    panels = figure.subplots(3, len(CASES), sharex="row")
+    panels = figure.subplots(3, len(CASES), sharex=True)
     body = found[(*CASES[0], 0.25, "swap")][0]
     counts = f"{len(body.mesh.points)} nodes, {len(body.mesh.cells)} linear triangles"
-    marks = "circles: swap rule, crosses: projection, lines: quadratic elements of .05 mm"
-    figure.suptitle(f"{counts}; {marks}; 1 mm, mu = .25")
-    for column, (plane, nu) in enumerate(CASES):
+    figure.suptitle(f"Circles: {counts} and swaps; lines: quadratic elements of .05 mm; 1 mm, mu = .25")
+    for column, (plane, nu) in zip(panels.T, CASES, strict=True):
         profile, shear = found[plane, nu, 0.25, "fine"]
-        on = np.abs(profile.x) < 3.2
-        top, middle, low = panels[:, column]
-        top.plot(profile.x[on], profile.p[on], color="#222222")
-        middle.plot(profile.x[on], profile.q[on], color="#c0392b")
-        low.plot(x, shear, color="#2c5d8f")
-        for rule, mark in (("swap", "o"), ("projection", "x")):
-            body, steps = found[plane, nu, 0.25, rule]
-            where = body.mesh.points[body.nodes]
-            length = np.gradient(np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(where, axis=0).T))]))
-            here = np.abs(where[:, 0]) < 3.2
-            traction = steps[-1].state.force / length[:, None]
-            top.plot(where[here, 0], traction[here, 0], mark, color="#222222", mfc="none", ms=6)
-            middle.plot(where[here, 0], traction[here, 1], mark, color="#c0392b", mfc="none", ms=6)
-            low.plot(x, body.shear(steps[-1].state, x), mark, color="#2c5d8f", mfc="none", ms=6)
-        top.set_title(f"{plane}, nu = {nu:g}")
-        low.set_xlabel("x (mm)")
-        for axes in (middle, low):
+        body, steps = found[plane, nu, 0.25, "swap"]
+        where = body.mesh.points[body.nodes]
+        length = np.gradient(np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(where, axis=0).T))]))
+        traction = steps[-1].state.force / length[:, None]
+        for axes, fine_x, fine, coarse_x, coarse, colour in (
+            (column[0], profile.x, profile.p, where[:, 0], traction[:, 0], "#222222"),
+            (column[1], profile.x, profile.q, where[:, 0], traction[:, 1], "#c0392b"),
+            (column[2], x, shear, x, body.shear(steps[-1].state, x), "#2c5d8f"),
+        ):
             axes.axhline(0.0, color="#999999", lw=0.7)
+            axes.plot(fine_x, fine, color=colour)
+            axes.plot(coarse_x, coarse, "o", color=colour, mfc="none", ms=6)
+        column[0].set_title(f"{plane}, nu = {nu:g}")
+        column[2].set(xlabel="x (mm)", xlim=(-4.2, 4.2))
     for axes, label in zip(panels[:, 0], ("f_n (MPa)", "f_t (MPa)", "gamma_xy .5 mm deep"), strict=True):
         axes.set_ylabel(label)
