@@ -156,31 +156,13 @@ def _rows(found: list[Judged], what: str) -> Iterator[Row]:
 def _draw(figure: Any, found: list[Judged]) -> None:
     """Draw true over estimated changes, and the band of the factor."""
     figure.set_size_inches(13.5, 4.5)
-    panels = figure.subplots(1, 3)
     figure.suptitle("True change against the change that a press reports; the band is a factor of 1.5")
-    for axes, kind in zip(panels, KINDS, strict=True):
-        reach = 0.0
+    for axes, kind in zip(figure.subplots(1, 3), KINDS, strict=True):
         for said, colour, label in ((False, "#b0b0b0", "not reported"), (True, "#2c5d8f", "reported")):
             some = [j for j in found if j.kind == kind and j.estimate.significant == said]
-            if not some:
-                continue
-            told = np.array([(j.estimate.change, j.true, j.estimate.error) for j in some])
-            x, y, bar = 100.0 * told.T / [_scale(j, found) for j in some]
-            axes.errorbar(x, y, xerr=bar if said else None, fmt="o", ms=3.5, lw=0.8, color=colour, label=label)
-            reach = float(np.abs([*x, *y]).max()) if said else reach
-        reach = 1.1 * reach or 2.0
-        line_x = np.linspace(-reach, reach, 101)
-        axes.fill_between(line_x, line_x / FACTOR, line_x * FACTOR, color="#2c5d8f", alpha=0.12, lw=0.0)
-        axes.plot(line_x, line_x, color="#222222", lw=0.8)
-        unit = "% of the largest strain" if kind == "gauge" else "% of the number"
-        axes.set(title=f"{KINDS[kind]}, {LARGE}", xlim=(-reach, reach), ylim=(-reach, reach))
-        axes.set(xlabel=f"estimated change, {unit}", ylabel=f"true change, {unit}")
-    panels[0].legend(loc="upper left")
-
-
-def _scale(judged: Judged, found: list[Judged]) -> float:
-    """Return what a change is drawn relative to: the number, or for gauges the largest strain of the press."""
-    if judged.kind != "gauge":
-        return max(abs(judged.estimate.value), 1e-12)
-    same = [j for j in found if (j.scene, j.kind) == (judged.scene, "gauge")]
-    return max(max(abs(j.estimate.value) for j in same), 1e-12)
+            axes.loglog(*np.abs([(j.estimate.change, j.true) for j in some]).reshape(-1, 2).T, "o", ms=3.5,
+                        color=colour, label=label)  # fmt: skip
+        ends = np.array(axes.get_xlim())
+        axes.fill_between(ends, ends / FACTOR, ends * FACTOR, color="#2c5d8f", alpha=0.12, lw=0.0)
+        unit = "strain" if kind == "gauge" else "N"
+        axes.set(title=f"{KINDS[kind]}, {LARGE}", xlabel=f"|estimated change|, {unit}", ylabel=f"|true change|, {unit}")
