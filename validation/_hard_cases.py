@@ -14,7 +14,7 @@ helps slip satisfies the paper's own conditions; it is counted as wrong_way, and
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from operator import itemgetter
 from typing import Any
@@ -49,22 +49,11 @@ COLUMNS = (
 CRITERION = "convergence criterion of finger3d: residual <= 1e-8"
 
 
-@dataclass(frozen=True)
-class Grid:
-    """What is varied in one dimension."""
-
-    dim: int
-    nu: tuple[float, ...]
-    mu: tuple[float, ...]
-    steps: tuple[int, ...]
-    sizes: tuple[float, ...]
-
-
-def grids(quick: bool) -> tuple[Grid, ...]:
-    """The two grids, thinned to what matters most where it must be quick."""
+def grids(quick: bool) -> tuple[tuple[Any, ...], ...]:
+    """Dimension, nu, mu, increments and edge lengths of both grids, thinned to what matters most where it is quick."""
     if quick:
-        return (Grid(2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]), Grid(3, (0.49,), (0.25,), (2,), (10.0,)))
-    return Grid(2, NU, MU, STEPS, SIZES[2]), Grid(3, (0.0, 0.3, 0.49, 0.5), (0.0, 0.25, 1.0, 1e6), (1, 10), SIZES[3])
+        return (2, (0.0, 0.5), (0.0, 0.25, 1e6), (1, 5), SIZES[2][:1]), (3, (0.49,), (0.25,), (2,), (10.0,))
+    return (2, NU, MU, STEPS, SIZES[2]), (3, (0.0, 0.3, 0.49, 0.5), (0.0, 0.25, 1.0, 1e6), (1, 10), SIZES[3])
 
 
 def slide(mu: float) -> float:
@@ -162,10 +151,10 @@ def _literal(problem: Problem) -> list[Outcome]:
 def run(quick: bool) -> Result:
     """The two grids, and every case of `_hard.py`."""
     table: list[tuple[Any, ...]] = []
-    for grid in grids(quick):
-        for nu, size in product(grid.nu, grid.sizes):
-            problem = finger(grid.dim, nu, size)
-            for mu, steps in product(grid.mu, grid.steps):
+    for dim, nus, mus, counts, sizes in grids(quick):
+        for nu, size in product(nus, sizes):
+            problem = finger(dim, nu, size)
+            for mu, steps in product(mus, counts):
                 table += case(problem, mu, steps)
     *listed, counts = zip(*table, strict=True)
     columns = dict(zip(COLUMNS, map(list, listed), strict=True))
@@ -200,21 +189,14 @@ def _grid_rows(dim: int, columns: dict[str, list[Any]], counts: tuple[list[float
 
 
 def _draw(figure: Any, columns: dict[str, list[Any]]) -> None:
-    left, middle, right = figure.subplots(1, 3)
+    panels = dict(zip(("median", "max"), figure.subplots(1, 2), strict=True))
     for dim, mark in ((2, "o"), (3, "s")):
         legs = dict(sorted(grouped(columns, "mu", dim=dim), key=itemgetter(0)))
         names = [f"{mu:g}" for mu in legs]
-        for axes, key in ((left, "iterations_median"), (middle, "iterations_max")):
+        for key, axes in panels.items():
             for quantile, style, name in ((0.5, "-", "median"), (1.0, "--", "largest")):
-                values = [np.quantile(part[key], quantile) for part in legs.values()]
+                values = [np.quantile(part[f"iterations_{key}"], quantile) for part in legs.values()]
                 axes.plot(names, values, mark + style, label=f"{dim}D, {name} of the legs")
-    left.axhline(10, color="k", lw=0.8, ls=":")
-    for axes, what in ((left, "median"), (middle, "largest")):
+    panels["median"].axhline(10, color="k", lw=0.8, ls=":")
+    for axes, what in zip(panels.values(), ("median", "largest"), strict=True):
         axes.set(xlabel="mu", ylabel=f"{what} iterations per part", yscale="symlog", ylim=(-0.2, 500.0))
-    for key, label in (("settled", "finger3d"), ("paper_settled", "the paper's rule")):
-        share = {mu: 100 * t[key].sum() / t["increments"].sum() for mu, t in grouped(columns, "mu")}
-        right.plot([f"{mu:g}" for mu in sorted(share)], [share[mu] for mu in sorted(share)], "o-", label=label)
-    right.set(xlabel="mu", ylabel="settled increments, %", ylim=(0, 105))
-    for axes in (left, middle, right):
-        axes.tick_params(axis="x", rotation=45)
-        axes.legend(loc="upper left" if axes is not right else "lower right")
