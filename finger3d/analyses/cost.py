@@ -135,15 +135,8 @@ class Costs:
 
     def table(self) -> list[list[str]]:
         """Return the names of the columns, and a line for each row."""
-        head = [
-            "error",
-            "edges, mm",
-            "increments",
-            "unknowns",
-            "seconds",
-            "memory",
-            *(name.replace("_", " ") for name in self.names),
-        ]
+        named = (name.replace("_", " ") for name in self.names)
+        head = ["error", "edges, mm", "increments", "unknowns", "seconds", "memory", *named]
         return [head, *(_line(row, self.names) for row in self.rows)]
 
 
@@ -192,9 +185,8 @@ def cost(
 
         timed = [row for row in rows if row.dofs]
         errors = {name: [row.errors[name] for row in timed] for name in found.names}
-        draw_cost(
-            Path(png), found.title, [row.seconds for row in timed], errors, rows[0].seconds if rows[0].dofs else None
-        )
+        own_s = rows[0].seconds if rows[0].dofs else None
+        draw_cost(Path(png), found.title, [row.seconds for row in timed], errors, own_s)
     return found
 
 

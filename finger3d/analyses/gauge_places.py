@@ -459,24 +459,18 @@ class GaugePlaces:
 
     def as_dict(self) -> Tree:
         """Return the content of gauges.json."""
-        sd, each = self.found.mu_sd, self.found.alone
-        gauges = self.found.gauges
-        first = [replace(self.found, gauges=gauges[: i + 1]).objective for i in range(len(gauges))]
+        tables = _gauge_tables(self.found)
+        for count, (table, own) in enumerate(zip(tables, self.found.alone, strict=True), start=1):
+            table["mean_mu_sd_alone"] = float(own.mean())
+            table["mean_mu_sd_with_those_before"] = replace(self.found, gauges=self.found.gauges[:count]).objective
+            table["mu_sd_alone"] = own
         return {
             "scene": self.scene.as_dict(),
             "mu": list(self.mus),
-            "mu_sd": sd,
+            "mu_sd": self.found.mu_sd,
             "mean_mu_sd": self.found.objective,
             "spacing_mm": self.found.spacing_mm,
-            "gauges": [
-                {
-                    **table,
-                    "mean_mu_sd_alone": float(own.mean()),
-                    "mean_mu_sd_with_those_before": before,
-                    "mu_sd_alone": own,
-                }
-                for table, own, before in zip(_gauge_tables(self.found), each, first, strict=True)
-            ],
+            "gauges": tables,
         }
 
 
@@ -577,11 +571,9 @@ def _map(found: GaugeSet, number: int, everywhere: Candidates) -> tuple[Float, F
 
 def _gauge_tables(found: GaugeSet) -> list[Tree]:
     """Return the keys of the gauges as tables of a scene have them."""
-    places = [dict(zip(("x_mm", "y_mm", "z_mm"), gauge.place.tolist(), strict=True)) for gauge in found.gauges]
-    return [
-        {"name": f"g{i}", **place, "angle_deg": math.degrees(gauge.angle)}
-        for i, (place, gauge) in enumerate(zip(places, found.gauges, strict=True), start=1)
-    ]
+    keys = "name", "x_mm", "y_mm", "z_mm", "angle_deg"
+    rows = ((f"g{i}", *g.place.tolist(), math.degrees(g.angle)) for i, g in enumerate(found.gauges, start=1))
+    return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
 def _with_gauges(given: TreeView, path: Path | None, found: GaugeSet) -> Scene:

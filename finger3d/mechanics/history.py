@@ -459,11 +459,8 @@ def _gross_slip(points: ContactPoints, steps: Sequence[StepResult], margin: Floa
         if step.outcome is Outcome.SLIPS:
             return SlipEvent(number + 1, 0.0)
         along = np.delete(Move(_pose_before(steps, number), step.target).change, [0, TIME])
-        if (
-            margin[number] > 0.0
-            or np.abs(along).max() <= ROUND_OFF
-            or not limits(points, step.state, step.friction).any()
-        ):
+        held = margin[number] > 0.0 or not limits(points, step.state, step.friction).any()
+        if held or np.abs(along).max() <= ROUND_OFF:
             continue
         known = number > 1 and margin[number - 1] > 0.0
         share = _share(left[number - 2], left[number - 1], _ratio(steps, number)) if known else 1.0
@@ -508,10 +505,8 @@ def _entry(points: ContactPoints, steps: Sequence[StepResult], event: SlipEvent,
         move, share = Move(_pose_before(steps, number), steps[number].target), increments - number
         return pose_entry(move.at(min(max(share, 0.0), 1.0)))
 
-    at, where = (
-        pose(event.increments),
-        {} if event.point is None else dict(zip(_PLACE, points.points[event.point].tolist(), strict=True)),
-    )
+    at = pose(event.increments)
+    where = {} if event.point is None else dict(zip(_PLACE, points.points[event.point].tolist(), strict=True))
     if error is None:
         return {"step": event.step, **at, **where}
     ends = [pose(event.increments - error), pose(event.increments + error)]
