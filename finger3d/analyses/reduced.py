@@ -25,7 +25,7 @@ from finger3d.contact.friction import Coulomb, FrictionLaw, TwoCoefficients
 from finger3d.contact.solve import RuleName
 from finger3d.errors import Finger3dError
 from finger3d.fem.laws.material import Isotropic
-from finger3d.fem.surface import BoundarySurface
+from finger3d.fem.surface import OF_POINTS, BoundarySurface
 from finger3d.geometry.design import DesignSummary
 from finger3d.io import read_arrays, write_arrays
 from finger3d.mechanics.discretise.contact_points import MARGIN, ContactPoints
@@ -49,7 +49,7 @@ _OF_MESH = ("size_mm", "base_size_mm", "mesher", "layers", "gauge_refinement")
 _OF_MODEL = ("legs", "gauges", "markers", "taxels", "domain", "rule", "warnings", "filled")
 """Attributes of a model that a file stores as they are."""
 
-_OF_SURFACE = ("nodes", "face", "points", "area", "normals", "samples")
+_OF_SURFACE = (*OF_POINTS, "samples")
 _OF_POINTS = ("nodes", "face", "points", "area", "facets")
 """Arrays of a surface, and of its contact points, that a file stores under these names."""
 

@@ -318,19 +318,13 @@ def contact_table(points: ContactPoints, step: StepResult) -> Tree:
     normal = _normals(points, state)
     return {
         "face": [FREE_FACES[k] for k in points.face],
-        "x_mm": points.points[:, 0],
-        "y_mm": points.points[:, 1],
-        "z_mm": points.points[:, 2],
+        **{f"{axis}_mm": points.points[:, k] for k, axis in enumerate("xyz")},
         "area_mm2": points.area,
         **{f"normal_{axis}": normal[:, k] for k, axis in enumerate("xyz")},
         "pressure_MPa": state.force[:, 0] / points.area,
-        "shear_x_MPa": friction[:, 0] / points.area,
-        "shear_y_MPa": friction[:, 1] / points.area,
-        "shear_z_MPa": friction[:, 2] / points.area,
+        **{f"shear_{axis}_MPa": friction[:, k] / points.area for k, axis in enumerate("xyz")},
         "gap_mm": state.gap,
-        "slip_x_mm": slip[:, 0],
-        "slip_y_mm": slip[:, 1],
-        "slip_z_mm": slip[:, 2],
+        **{f"slip_{axis}_mm": slip[:, k] for k, axis in enumerate("xyz")},
         "margin": margins(points, state, step.friction),
         "status": [STATUS_NAMES[s] for s in state.status],
     }

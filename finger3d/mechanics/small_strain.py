@@ -323,9 +323,8 @@ class Increment:
         expected = start.force if guess is None else guess
         near = np.flatnonzero((geometry.gap < 2.0 * _NEAR * scale) | (expected[:, 0] > 0.0))
         delassus = rotated_delassus(self.body.delassus, rotations[near], near)
-        contact = ContactProblem.of(
-            start.of_points(near), free_displacement[near], delassus, law, scale, area=area[near]
-        )
+        touched = start.of_points(near)
+        contact = ContactProblem.of(touched, free_displacement[near], delassus, law, scale, area[near])
         at = problem.surface.centroids[near] + expansion_point[near]
         increment, part = self._solved(contact, expected[near], bases[near], at)
         force, status = np.zeros_like(expected), np.full(len(expected), OPEN, dtype=np.int8)

@@ -306,15 +306,9 @@ class IncrementEquations:
         free_displacement = self.relative_displacement(now, force) + at_points(displacement)
         free_displacement -= (delassus.reshape(force.size, force.size) @ force.ravel()).reshape(force.shape)
         free_displacement[:, 1:] += start.tangential_displacement
-        contact = ContactProblem.of(
-            start,
-            free_displacement,
-            delassus,
-            problem.model.friction,
-            self.length_scale,
-            self._augmentation,
-            problem.surface.area,
-        )
+        law, area = problem.model.friction, problem.surface.area
+        contact = ContactProblem.of(start, free_displacement, delassus, law, self.length_scale, area)
+        contact = replace(contact, augmentation=self._augmentation, is_definite=False)
         turning = np.zeros((force.size, 0 if turned is None else turned.shape[1]))
         for k, one in enumerate([] if turned is None else turned.T):
             turning[:, k] = at_points(one).ravel()
