@@ -230,10 +230,7 @@ def _parts(contents: MeshContents) -> tuple[Int | None, tuple[str, ...]]:
 
 def _check_cells(path: Path, mesh: Mesh) -> None:
     """Refuse inverted cells: by the volume of the straight ones, and by the Jacobian of the curved ones."""
-    for determinants, what in (
-        (signed_volumes(mesh), "flat or inverted"),
-        (curved_jacobians(mesh), "folded"),
-    ):
+    for what, determinants in {"flat or inverted": signed_volumes(mesh), "folded": curved_jacobians(mesh)}.items():
         bad = np.flatnonzero(~(determinants > 0.0))
         if len(bad):
             place = mesh.points[mesh.cells[bad[0], :4]].mean(axis=0)

@@ -122,10 +122,8 @@ def _extreme(piece: CrossSection, along: int, sign: float) -> tuple[float, float
 def openings(ports: Ports) -> list[Solid]:
     """Return the pour hole and the vents as solids through the lid."""
     x, z = ports.pour
-    return [
-        cone((x, -LID_MM, z), ports.funnel_mm, ports.pour_mm, LID_MM, "y"),
-        *(cylinder((vx, -LID_MM, vz), ports.vent_mm, LID_MM, "y") for vx, vz in ports.vents),
-    ]
+    vents = [cylinder((vx, -LID_MM, vz), ports.vent_mm, LID_MM, "y") for vx, vz in ports.vents]
+    return [cone((x, -LID_MM, z), ports.funnel_mm, ports.pour_mm, LID_MM, "y"), *vents]
 
 
 LENGTH_MM, SECTION_MM = 5.0, (0.1, 3.0)

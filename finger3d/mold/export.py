@@ -56,10 +56,8 @@ class Exported:
     def rows(self) -> list[tuple[str, str]]:
         """The volumes in words."""
         off = self.stl_volume_mm3 / self.volume_mm3 - 1.0
-        rows = [
-            ("volume", f"{self.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}"),
-            ("tolerance", f"{self.tolerance_mm:.3g} mm"),
-        ]
+        rows = [("volume", f"{self.volume_mm3:.6g} mm3; finger.stl differs by {off:+.1e}")]
+        rows.append(("tolerance", f"{self.tolerance_mm:.3g} mm"))
         if self.silicone_ml is not None:
             rows.append(("silicone", f"{self.silicone_ml:.3g} ml in the cavity; see sheet.txt"))
         return rows

@@ -122,24 +122,16 @@ def mold(
     check_foils(body, gauges, options)
     recessed = recesses(finger)
     fillings = [placed(filling, "a recess").solid for filling in recessed]
-    planned = pours(
-        {label: body if cast is shape else placed(cast, label or MAIN) for label, cast in silicones.items()},
-        {label: placed(solids[label], label) for label in rigid},
-        fillings,
-        body,
-        options,
-    )
+    cast = {label: body if one is shape else placed(one, label or MAIN) for label, one in silicones.items()}
+    inserts = {label: placed(solids[label], label) for label in rigid}
+    planned = pours(cast, inserts, fillings, body, options)
     layout = layout_of(*body.box, options)
     slots = {foil: slot(foil, layout, options) for foil in gauges}
     check_strips(planned, slots)
     undercut = check_opening(filled(finger, recessed, options), options, may_turn=not gauges)
     cavity = [] if body.cad is None else [body.cad, *fillings]
-    features = [
-        screws(layout, options),
-        half_pegs(layout, options),
-        lid_pegs(layout, options),
-        Feature(cut=dict.fromkeys(HALVES, [*slots.values(), *cavity])),
-    ]
+    hollows = Feature(cut=dict.fromkeys(HALVES, [*slots.values(), *cavity]))
+    features = [screws(layout, options), half_pegs(layout, options), lid_pegs(layout, options), hollows]
     parts = halves(layout, features)
     for pour in planned:
         parts |= lid_parts(pour, layout, features)

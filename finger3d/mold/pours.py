@@ -132,17 +132,8 @@ def pours(
         lid = "lid" if len(silicones) == 1 else f"lid_{label or MAIN}"
         later = list(silicones.values())[i + 1 :]
         pushed = [*fillings, *([_positive([*later, *inserts.values()], body, options, lid)] if later else pins)]
-        made.append(
-            Pour(
-                label=label,
-                lid=lid,
-                silicone_mm3=silicone.volume_mm3,
-                ports=_ports(silicone, body, bool(pushed), options),
-                cast=tuple(silicones.values())[: i + 1],
-                pushed=tuple(pushed),
-                inserts={} if later else placed,
-            )
-        )
+        ports, cast = _ports(silicone, body, bool(pushed), options), tuple(silicones.values())[: i + 1]
+        made.append(Pour(label, lid, silicone.volume_mm3, ports, cast, tuple(pushed), {} if later else placed))
     return tuple(made)
 
 

@@ -70,10 +70,8 @@ class Calibration(SensorModel):
         """Return an estimate for each set of readings (m, k); `noise` (m, k) has their standard deviations."""
         stds = np.broadcast_to(self.noise if noise is None else noise, readings.shape)
         model = self if tolerances else self.without_tolerances
-        return [
-            estimator(model, self.limit, tuple(std.tolist())).estimate(reading)
-            for reading, std in zip(readings, stds, strict=True)
-        ]
+        estimators = (estimator(model, self.limit, tuple(std.tolist())) for std in stds)
+        return [one.estimate(reading) for one, reading in zip(estimators, readings, strict=True)]
 
     @cached_property
     def without_tolerances(self) -> Calibration:

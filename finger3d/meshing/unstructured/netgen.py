@@ -102,12 +102,5 @@ def run_child(glued: Glued, field: Sizing, limit: float) -> tuple[Float, Int]:
         export_step(Compound(glued.shape.solids()), path)
         step = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     points, sizes = size_points(field)
-    return run_mesher(
-        _meshers.netgen,
-        limit,
-        step=step,
-        rate=RATE,
-        largest=_EDGE_SHARE * field.base_mm,
-        points=points,
-        sizes=_EDGE_SHARE * sizes,
-    )
+    largest, sizes = _EDGE_SHARE * field.base_mm, _EDGE_SHARE * sizes
+    return run_mesher(_meshers.netgen, limit, step=step, rate=RATE, largest=largest, points=points, sizes=sizes)

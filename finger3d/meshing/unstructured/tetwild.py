@@ -100,10 +100,8 @@ def _body(design: Design, symmetry: tuple[str, ...], field: Sizing) -> tuple[Tes
     diagonal = float(np.linalg.norm(field.high - field.low))
     # With an envelope below the sagitta of the longest edge a hemisphere takes 20 times as long, with too fine a mesh.
     least, usual, most = _ENVELOPE
-    epsilon = min(
-        max(usual, field.base_mm**2 / (8.0 * radius * diagonal)), most, _ENVELOPE_SHARE * field.size_mm / diagonal
-    )
-    epsilon = max(epsilon, least)
+    epsilon = max(usual, field.base_mm**2 / (8.0 * radius * diagonal))
+    epsilon = max(min(epsilon, most, _ENVELOPE_SHARE * field.size_mm / diagonal), least)
     if faceted:
         return coarser(faceted, _DECIMATION_SHARE * epsilon * diagonal), epsilon
     assert glued is not None
@@ -150,17 +148,7 @@ def run_child(
 
     pytetwild finds the inside by winding numbers, which triangles inside the body would make ambiguous.
     """
-    bg_points, bg_tets, bg_values = field.background()
-    return run_mesher(
-        _meshers.pytetwild,
-        limit,
-        points=points,
-        triangles=triangles,
-        edge_length=field.longest_mm,
-        epsilon=epsilon,
-        stop_energy=STOP_ENERGY,
-        keep_outside=keep_outside,
-        bg_points=bg_points,
-        bg_tets=bg_tets,
-        bg_values=bg_values,
-    )
+    surface = {"points": points, "triangles": triangles}
+    limits = {"edge_length": field.longest_mm, "epsilon": epsilon, "stop_energy": STOP_ENERGY}
+    sizes = dict(zip(("bg_points", "bg_tets", "bg_values"), field.background(), strict=True))
+    return run_mesher(_meshers.pytetwild, limit, **surface, **limits, keep_outside=keep_outside, **sizes)
