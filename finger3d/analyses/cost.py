@@ -228,9 +228,8 @@ def _pilot(model: Model, factor: float, meant: int) -> _Pilot:
     steps, chosen = march_automatic(problem)
     steps[-1].check("cost: a coarse press")
     seconds = time.perf_counter() - start - meshed
-    found = estimate(
-        problem, steps, numbers=press_numbers, chosen=chosen, companions=partial(companion_presses, unknowns=meant)
-    )
+    companions = partial(companion_presses, unknowns=meant)
+    found = estimate(problem, steps, numbers=press_numbers, chosen=chosen, companions=companions)
     if not found.discretisation:
         raise Finger3dError(f"cost: a coarse press has no error bars: {found.method}")
     numbers, kinds = press_numbers(problem, steps[-1]), kinds_of(steps[-1].readings)

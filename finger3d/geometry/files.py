@@ -20,6 +20,7 @@ from finger3d._types import Float
 from finger3d.errors import Finger3dError
 from finger3d.geometry.surface import Triangles, connected, has_three_corners
 from finger3d.geometry.surface_checks import crossings, mistake
+from finger3d.io import file_bytes
 
 if TYPE_CHECKING:
     from build123d import Compound, Face, Solid
@@ -79,24 +80,15 @@ def _check_crossings(path: Path, surface: Triangles) -> None:
         )
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
-
-
 def content(path: Path) -> str:
     """Return the SHA-256 of a file."""
     import hashlib
 
-    return hashlib.sha256(_bytes(path)).hexdigest()
+    return hashlib.sha256(file_bytes(path)).hexdigest()
 
 
 def _stl(path: Path, scale: float) -> Triangles:
-    content = _bytes(path)
+    content = file_bytes(path)
     points = _binary_stl(path, content) if _is_binary(content) else _text_stl(path, content)
     far = np.isfinite(points) & (np.abs(points) * scale > _LARGEST_COORDINATE_MM)
     if far.any():
@@ -219,7 +211,7 @@ def read_step(path: Path) -> StepBody:
     Finger3dError
         If this is no STEP file, or holds no solid or an invalid one.
     """
-    size = len(_bytes(path))
+    size = len(file_bytes(path))
     require(f"{path}: a STEP file", "build123d")
     from build123d import Compound
     from OCP.BinTools import BinTools

@@ -16,7 +16,7 @@ import numpy as np
 
 from finger3d._types import Float, Tree, TreeView
 from finger3d.errors import Finger3dError, MissingError
-from finger3d.io import checksum, write_csv, write_json
+from finger3d.io import checksum, file_bytes, write_csv, write_json
 from finger3d.sensor.curve import FEWEST, QUANTITIES, ReadingCurve, SensorModel, Tolerance
 from finger3d.sensor.likelihood import Estimate, estimator, ranges_text
 
@@ -266,12 +266,9 @@ def load(path: str | Path) -> Calibration:
         In one line: no such file, no JSON (cut short), no calibration, another version, or changed since.
     """
     again = "calibrate again: finger3d calibrate SCENE --gauge NAME --out DIR"
+    content = file_bytes(path, "; finger3d calibrate writes calibration.json")
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise Finger3dError(f"{path}: there is no such file; finger3d calibrate writes calibration.json") from None
-    except OSError as error:
-        raise Finger3dError(f"{path}: cannot be read: {error.strerror}") from None
+        data = json.loads(content.decode("utf-8"))
     except (ValueError, RecursionError):
         raise Finger3dError(f"{path}: not JSON, or cut short; {again}") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
