@@ -74,10 +74,9 @@ def _check_crossings(path: Path, surface: Triangles) -> None:
     crossed = crossings(surface)
     if len(crossed):
         place = surface.corners[crossed[0]].mean(axis=0)
-        raise Finger3dError(
-            f"{path}: the body's surface runs through itself at {len(crossed)} triangles, the first near "
-            f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm; mend it where it was drawn"
-        )
+        near = f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm; mend it where it was drawn"
+        what = f"the body's surface runs through itself at {len(crossed)} triangles"
+        raise Finger3dError(f"{path}: {what}, the first near {near}")
 
 
 def content(path: Path) -> str:
@@ -92,10 +91,9 @@ def _stl(path: Path, scale: float) -> Triangles:
     points = _binary_stl(path, content) if _is_binary(content) else _text_stl(path, content)
     far = np.isfinite(points) & (np.abs(points) * scale > _LARGEST_COORDINATE_MM)
     if far.any():
-        raise Finger3dError(
-            f"{path}: a point at {points[far].flat[0]:g}: coordinates must be numbers from "
-            f"-{number(_LARGEST_COORDINATE_MM)} to {number(_LARGEST_COORDINATE_MM)} mm; mend it where it was drawn"
-        )
+        most = number(_LARGEST_COORDINATE_MM)
+        allowed = f"coordinates must be numbers from -{most} to {most} mm; mend it where it was drawn"
+        raise Finger3dError(f"{path}: a point at {points[far].flat[0]:g}: {allowed}")
     return welded(points, np.arange(len(points)).reshape(-1, 3))
 
 

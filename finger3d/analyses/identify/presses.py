@@ -99,9 +99,8 @@ class MeasuredPress:
             row = int(np.argmax(np.abs(values)))
             found, extents = abs(float(values[row])), [float(np.abs(one[name]).max()) for one in simulated]
             least, most = min(extents), max(extents)
-            opposed = found > SHARPEST and all(
-                values @ one[name] < _OPPOSITE * np.linalg.norm(values) * np.linalg.norm(one[name]) for one in simulated
-            )
+            size, own = np.linalg.norm(values), [one[name] for one in simulated]
+            opposed = found > SHARPEST and all(values @ one < _OPPOSITE * size * np.linalg.norm(one) for one in own)
             if opposed or not least / _UNIT_RATIO - SHARPEST <= found <= most * _UNIT_RATIO + SHARPEST:
                 raise Finger3dError(
                     f"{self.path}: line {self.lines[row]}: {name} = {values[row]:g}: the scene gives up to "
@@ -131,9 +130,8 @@ def read_measured(path: Path, known: Sequence[str]) -> MeasuredPress:
     indices = [name for name in INDEX if name in names]
     if not indices:
         has = ", ".join(repr(name)[:40] for name in table.names) or "no line of names"
-        raise Finger3dError(
-            f"{path}: must have a column {listed(INDEX)}, which says when a row was measured; it has {has}"
-        )
+        needed = f"a column {listed(INDEX)}, which says when a row was measured"
+        raise Finger3dError(f"{path}: must have {needed}; it has {has}")
     for base in (name.removesuffix(STD) for name in names):
         if base not in every:
             near = next((n for n in known if n.endswith(f"_{base}")), None) or nearest(base, list(known))
@@ -170,10 +168,8 @@ def check_stds(path: Path, lines: Sequence[int], name: str, stds: Float) -> None
     """Raise an error for the first standard deviation (n,) of a column that is out of range."""
     bad = np.flatnonzero((stds < _LEAST_STD) | (stds > _LARGEST_STD))
     if len(bad):
-        raise Finger3dError(
-            f"{path}: line {lines[int(bad[0])]}: {name}{STD} = {stds[bad[0]]:g}: must be from {_LEAST_STD:g} to "
-            f"{_LARGEST_STD:g}"
-        )
+        allowed = f"must be from {_LEAST_STD:g} to {_LARGEST_STD:g}"
+        raise Finger3dError(f"{path}: line {lines[int(bad[0])]}: {name}{STD} = {stds[bad[0]]:g}: {allowed}")
 
 
 def _direction(index: str, at: Float) -> float:
