@@ -138,9 +138,8 @@ def export(
             files += written
             remarks += told
             silicone = assembly.silicone_mm3 / 1e3
-    return Exported(
-        tuple(files), _volume(design, solid, body), body.surface.volume, body.tolerance_mm, silicone, tuple(remarks)
-    )
+    volumes = _volume(design, solid, body), body.surface.volume
+    return Exported(tuple(files), *volumes, body.tolerance_mm, silicone, tuple(remarks))
 
 
 def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> None:
@@ -149,10 +148,8 @@ def _check(design: Design, out: Path, tolerance_mm: float, needs_cad: bool) -> N
         require("export", "build123d")
     largest = _LARGEST_TOLERANCE * design.height_mm
     if not _LEAST_TOLERANCE_MM <= tolerance_mm <= largest:
-        raise Finger3dError(
-            f"--tolerance-mm {tolerance_mm}: must be from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, "
-            "a fifth of the finger's height"
-        )
+        allowed = f"from {_LEAST_TOLERANCE_MM:g} to {largest:.4g}, a fifth of the finger's height"
+        raise Finger3dError(f"--tolerance-mm {tolerance_mm}: must be {allowed}")
     if isinstance(design, Imported) and holds(out, ("finger.step", "finger.stl"), design.path):
         raise Finger3dError(f"--out {out}: holds {Path(design.path).name}, the finger's own file; name another folder")
 

@@ -105,10 +105,8 @@ def mold(
         for its openings, or for the reasons of `finger3d.mold.pours.pours`.
     """
     if options.split == "x" and gauges:
-        raise Finger3dError(
-            f'--split x: the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along '
-            "x; use --split z, or a scene without gauges"
-        )
+        why = f'the strips of gauge "{gauges[0].names[0]}" run along z and would lock halves that open along x'
+        raise Finger3dError(f"--split x: {why}; use --split z, or a scene without gauges")
     solids = solids or {}
     silicones = _silicones(shape, solids, rigid, options)
     finger = Body.of(shape, options.machine.tolerance_mm)
@@ -177,10 +175,9 @@ def filled(finger: Body, fillings: Sequence[Solid], options: MoldOptions) -> Bod
         depth = undercut_depth(Body.of(filling, tolerance).surface, 1, 1.0)
         if depth > max(options.undercut_mm, tolerance):
             center = ", ".join(f"{coordinate:.4g}" for coordinate in filling.center())
-            raise Finger3dError(
-                f"mold: the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm: the "
-                "lid, which fills it, cannot be pulled out; change the body, or allow it with --undercut-mm"
-            )
+            what = f"the recess in the base near ({center}) mm widens inside, an undercut of {depth:.2g} mm"
+            advice = "change the body, or allow it with --undercut-mm"
+            raise Finger3dError(f"mold: {what}: the lid, which fills it, cannot be pulled out; {advice}")
     return Body.of(one(finger.solid.fuse(*fillings).clean(), "the finger"), tolerance) if fillings else finger
 
 
@@ -199,7 +196,5 @@ def check_split(finger: Body, options: MoldOptions) -> None:
     low, high = finger.box
     axis = 0 if options.split == "x" else 2
     if not low[axis] < options.split_mm < high[axis]:
-        raise Finger3dError(
-            f"--split-mm {options.split_mm:g}: the split plane misses the finger; must be between {low[axis]:.6g} and "
-            f"{high[axis]:.6g} mm along {options.split}"
-        )
+        allowed = f"must be between {low[axis]:.6g} and {high[axis]:.6g} mm along {options.split}"
+        raise Finger3dError(f"--split-mm {options.split_mm:g}: the split plane misses the finger; {allowed}")
